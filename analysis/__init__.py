@@ -1,0 +1,1 @@
+"""firable.analysis"""

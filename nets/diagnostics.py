@@ -1,0 +1,149 @@
+"""Diagnostics: what is wrong with an input, where, and what to write instead.
+
+Every refusal of firable carries a code, a position, the excerpt and a hint, and all refusals of one input are
+reported together. The model (`Net`) knows nothing of files: it names the *subject* of a problem, a path such as
+`("transitions", "G1", "from", "conveyor.cvx")`, and the reader that built the net knows where each subject stands in
+its text. So the rules of a well-formed net are written once, for text, PNML and nets built by a program.
+
+To add a diagnostic: one row in `CODES`, the place that reports it, a case in the tests of its room.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+Subject = tuple[str, ...]
+"""What a problem is about: a path of names from the root of the net, e.g. `("places", "robot.free")`."""
+
+
+class Severity(StrEnum):
+    """How bad a diagnostic is; only errors refuse the input."""
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+CODES: Final[dict[str, str]] = {
+    # F1: the text
+    "F1001": "the file cannot be read",
+    "F1002": "the file is empty",
+    "F1003": "the file is too large",
+    "F1004": "not a text file",
+    "F1005": "not valid YAML",
+    "F1006": "duplicate key",
+    "F1007": "ambiguous YAML",
+    "F1008": "unknown key",
+    "F1009": "missing key",
+    "F1010": "wrong kind of value",
+    "F1011": "unsupported version of the format",
+    "F1012": "not a formula",
+    "F1013": "not valid PNML",
+    "F1014": "PNML that this toolkit cannot represent",
+    "F1015": "not valid JSON",
+    # F2: the net
+    "F2001": "duplicate name",
+    "F2002": "unknown place",
+    "F2003": "unknown signal",
+    "F2004": "unknown transition",
+    "F2005": "unknown controller",
+    "F2006": "more than one token on a place",
+    "F2007": "double arc",
+    "F2008": "a gate whose source is a transition",
+    "F2009": "self-loop",
+    "F2010": "a gate that is both internal and external",
+    "F2011": "a place or signal without an owner",
+    "F2012": "not a name",
+    "F2013": "malformed arbiter",
+    "F2014": "a completion signal without a command",
+    "F2015": "more than one coordinator",
+    "F2016": "duplicate transition number",
+    "F2017": "an arc to something that is not a place",
+    "F2018": "a signal that is both a sensor and a completion",
+    "F2019": "the owner and the name of a place or signal disagree",
+    "F2020": "a change of the net that would change its meaning",
+    # F3: analysis
+    "F3001": "a machine is started that no command ever stops",
+    "F3002": "an output signal on a place marked in M0",
+    "F3003": "conflicting commands to one machine",
+    "F3004": "the budget is used up",
+    # F4: decomposition
+    "F4001": "the net cannot be split",
+    "F4002": "an obligation is refuted",
+    "F4003": "the net may not be bundled",
+    # F5: running
+    "F5001": "the bundle is damaged or has been changed",
+    "F5002": "the bundle is not proved",
+    "F5003": "the plant file does not fit the bundle",
+    "F5004": "the trace is not a trace of the net",
+    "F5005": "the trace file is malformed",
+    # F9: our own fault
+    "F9001": "internal error",
+}
+"""The code of every diagnostic and its title."""
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Where a diagnostic points: a file, a line and a column (both from 1), and the text of the line."""
+
+    file: str
+    line: int
+    column: int
+    excerpt: str = ""
+    length: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One thing that is wrong, or questionable, in an input."""
+
+    code: str
+    message: str
+    hint: str = ""
+    subject: Subject = ()
+    span: Span | None = None
+    severity: Severity = Severity.ERROR
+
+    def __post_init__(self) -> None:
+        if self.code not in CODES:
+            raise ValueError(f"{self.code} is not in the table of codes")
+
+    @property
+    def title(self) -> str:
+        """The title of the code."""
+        return CODES[self.code]
+
+    def __str__(self) -> str:
+        where = f"{self.span}: " if self.span else ""
+        lines = [f"{where}{self.severity}[{self.code}]: {self.message}"]
+        if self.span and self.span.excerpt:
+            gutter = f"{self.span.line:5d} | "
+            marker = " " * (len(gutter) + self.span.column - 1) + "^" * max(1, self.span.length)
+            lines += [gutter + self.span.excerpt, marker]
+        if self.hint:
+            lines.append(f"  hint: {self.hint}")
+        return "\n".join(lines)
+
+
+class InputError(Exception):
+    """The input is refused; `diagnostics` says why, the most important reason first."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
+        self.diagnostics: tuple[Diagnostic, ...] = tuple(diagnostics)
+        if not self.diagnostics:
+            raise ValueError("an input is refused for at least one reason")
+        super().__init__("\n".join(str(diagnostic) for diagnostic in self.diagnostics))
+
+
+def did_you_mean(name: str, known: Sequence[str]) -> str:
+    """The start of a hint that names the closest known name, or nothing where none is close."""
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, known, n=1, cutoff=0.6)
+    return f"did you mean '{close[0]}'? " if close else ""
