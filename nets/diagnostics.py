@@ -43,6 +43,7 @@ CODES: Final[dict[str, str]] = {
     "F1013": "not valid PNML",
     "F1014": "PNML that this toolkit cannot represent",
     "F1015": "not valid JSON",
+    "F1016": "not carried over by the conversion",
     # F2: the net
     "F2001": "duplicate name",
     "F2002": "unknown place",
@@ -87,13 +88,17 @@ CODES: Final[dict[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Where a diagnostic points: a file, a line and a column (both from 1), and the text of the line."""
+    """Where a diagnostic points: a file, a line and a column (both from 1), and the text of the line.
+
+    The excerpt of a very long line is a window of it; `excerpt_column` is the column of its first character.
+    """
 
     file: str
     line: int
     column: int
     excerpt: str = ""
     length: int = 1
+    excerpt_column: int = 1
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}:{self.column}"
@@ -124,7 +129,9 @@ class Diagnostic:
         lines = [f"{where}{self.severity}[{self.code}]: {self.message}"]
         if self.span and self.span.excerpt:
             gutter = f"{self.span.line:5d} | "
-            marker = " " * (len(gutter) + self.span.column - 1) + "^" * max(1, self.span.length)
+            offset = self.span.column - self.span.excerpt_column
+            length = max(1, min(self.span.length, len(self.span.excerpt) - offset))
+            marker = " " * (len(gutter) + offset) + "^" * length
             lines += [gutter + self.span.excerpt, marker]
         if self.hint:
             lines.append(f"  hint: {self.hint}")
@@ -145,5 +152,7 @@ def did_you_mean(name: str, known: Sequence[str]) -> str:
     """The start of a hint that names the closest known name, or nothing where none is close."""
     from difflib import get_close_matches
 
+    # Comparing is slow where both are many or long: a hint is not worth a minute.
+    known = [candidate for candidate in known if abs(len(candidate) - len(name)) <= 4][:2000] if len(name) <= 80 else []
     close = get_close_matches(name, known, n=1, cutoff=0.6)
     return f"did you mean '{close[0]}'? " if close else ""

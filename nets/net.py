@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
+from itertools import islice
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError, Subject, did_you_mean
@@ -27,6 +28,7 @@ from firable.nets.formula import Formula, Holds, names_in
 Marking = int
 """The set of places with a token; bit i is place i of the net."""
 
+_PROBLEMS_MAX: Final = 100  # enough to read; a file of noise has millions
 _FORBIDDEN_IN_NAMES: Final = frozenset(" \t\r\n()[]{},:#&*!|>'\"%@`\\")
 
 
@@ -194,7 +196,7 @@ class Net:
     description: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        problems = list(_problems(self))
+        problems = list(islice(_problems(self), _PROBLEMS_MAX))
         if problems:
             raise InputError(problems)
 
@@ -429,7 +431,9 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
                 yield Diagnostic(
                     code,
                     f"'{name}' in `{key}` of '{transition.name}' is a transition",
-                    "the source of a gate is a place or a signal" if is_gate else "an arc joins a place and a transition",
+                    "the source of a gate is a place or a signal"
+                    if is_gate
+                    else "an arc joins a place and a transition",
                     subject,
                 )
             elif name in signals and not is_gate:
@@ -447,14 +451,18 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
         if gate.signal not in signals:
             yield _unknown("F2003", "signal", gate.signal, sorted(signals), subject)
         if gate in seen_gates:
-            yield Diagnostic("F2007", f"the gate '{gate.signal}' of '{transition.name}' stands twice", "write it once", subject)
+            yield Diagnostic(
+                "F2007", f"the gate '{gate.signal}' of '{transition.name}' stands twice", "write it once", subject
+            )
         seen_gates.add(gate)
 
 
 def _unknown(code: str, kind: str, name: str, known: list[str], subject: Subject) -> Diagnostic:
     local = [full for full in known if full.rpartition(".")[2] == name]
     suggestion = f"did you mean '{local[0]}'? " if local else did_you_mean(name, known)
-    return Diagnostic(code, f"there is no {kind} '{name}'", f"{suggestion}Declare it first, or correct the name.".strip(), subject)
+    return Diagnostic(
+        code, f"there is no {kind} '{name}'", f"{suggestion}Declare it first, or correct the name.".strip(), subject
+    )
 
 
 def _numbers(net: Net) -> Iterator[Diagnostic]:
@@ -478,7 +486,9 @@ def _arbiters(net: Net) -> Iterator[Diagnostic]:
     for arbiter in net.arbiters:
         subject: Subject = ("arbiters", arbiter.name, "among")
         if len(set(arbiter.among)) < 2:
-            yield Diagnostic("F2013", f"'{arbiter.name}' has nothing to decide", "name at least two transitions", subject)
+            yield Diagnostic(
+                "F2013", f"'{arbiter.name}' has nothing to decide", "name at least two transitions", subject
+            )
         if arbiter.by is not ArbitrationRule.ORDER and len(set(arbiter.among)) < len(arbiter.among):
             yield Diagnostic(
                 "F2013",

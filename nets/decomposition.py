@@ -1,0 +1,78 @@
+"""The decomposition of a net: subnets, coordinator table and arbitration groups, as data.
+
+`decompose` makes and proves it, bundles carry it, the executor plays it; so the record lies here and decides nothing.
+
+A subnet is itself a `Net` of one controller: the places and signals that it owns, its local transitions under their own
+names, and for each global transition its *part*: a transition with those inputs, outputs and gates that the controller
+owns. So Eq. (1) of a part is the factor of Eq. (7), and Eq. (2) the factor of Eq. (8), with no second firing rule.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from firable.nets.net import ArbitrationRule, Net
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What one participant contributes to a transition: the transition `name` of the subnet of `controller`."""
+
+    controller: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinated:
+    """A transition that the coordinator decides: its name in the central net and its parts, by controller number.
+
+    With more than one part it is global, a row of the coordinator table. With one part it is a local transition in the
+    conflict component of a global one (O2).
+    """
+
+    name: str
+    number: int | None
+    parts: tuple[Part, ...]
+    description: str = ""
+
+    @property
+    def is_global(self) -> bool:
+        """Whether more than one controller takes part."""
+        return len(self.parts) > 1
+
+
+@dataclass(frozen=True, slots=True)
+class ArbitrationGroup:
+    """A conflict component in the order of its arbiter, decided as one group.
+
+    `controller` is the local controller that decides a component that no global transition belongs to; None is the
+    coordinator. The order is that of `firable.semantics.arbitration.Group`: `sequence`, then `rest`.
+    """
+
+    name: str
+    sequence: tuple[str, ...]
+    rest: tuple[str, ...]
+    by: ArbitrationRule
+    controller: str | None = None
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """A net split over its controllers; `subnets` follow the order of the net's controllers."""
+
+    net: Net
+    subnets: tuple[Net, ...]
+    coordinated: tuple[Coordinated, ...]
+    groups: tuple[ArbitrationGroup, ...]
+
+    @property
+    def table(self) -> tuple[Coordinated, ...]:
+        """The coordinator table: the global transitions, in the order of the net."""
+        return tuple(row for row in self.coordinated if row.is_global)
+
+    def subnet(self, controller: str) -> Net:
+        """The subnet of a controller; `KeyError` where there is none."""
+        for subnet in self.subnets:
+            if subnet.name == controller:
+                return subnet
+        raise KeyError(controller)

@@ -1,0 +1,146 @@
+"""Verdicts: what is known about a property of a net, and what it rests on.
+
+A verdict is PROVED, VIOLATED or UNKNOWN, never a Boolean, so that "not decided" cannot be mistaken for either answer; it
+says by which method, at which cost, and carries its evidence: a firing sequence that the reference player replays, or
+the names of the files an independent checker reads. The record lies in this lowest room because `analysis` and
+`decompose` write it, bundles carry it, and the executor reads it without importing either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, Self
+
+
+class Status(StrEnum):
+    """How a property ended."""
+
+    PROVED = "proved"
+    VIOLATED = "violated"
+    UNKNOWN = "unknown"
+
+
+class Weight(StrEnum):
+    """What a verdict other than PROVED means for the whole: it fails it, warns, or only informs."""
+
+    REQUIRED = "required"
+    WARNING = "warning"
+    INFORMATION = "information"
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """A firing sequence from M0: each element is the set of transitions fired together.
+
+    A `cycle` that is not empty is fired for ever after the sequence. `marking` holds the places with a token where the
+    sequence (not the cycle) ends. `assignment` is a witness of another kind: values of the net's own names at one
+    instant that refute an obligation.
+    """
+
+    firings: tuple[tuple[str, ...], ...] = ()
+    cycle: tuple[tuple[str, ...], ...] = ()
+    marking: tuple[str, ...] = ()
+    assignment: tuple[tuple[str, bool], ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What a verdict took; `seconds` is measured, so it is neither compared nor bundled."""
+
+    markings: int | None = None
+    edges: int | None = None
+    seconds: float | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The verdict on the property `name`, which says `statement`.
+
+    `bound` says how far an UNKNOWN was looked at. `subjects` are the transitions or places concerned. `evidence` names
+    the files that an independent checker reads.
+    """
+
+    name: str
+    status: Status
+    statement: str
+    method: str
+    weight: Weight = Weight.REQUIRED
+    code: str = ""
+    hint: str = ""
+    bound: str = ""
+    subjects: tuple[str, ...] = ()
+    witness: Witness | None = None
+    evidence: tuple[str, ...] = ()
+    cost: Cost = Cost()
+
+    @property
+    def holds(self) -> bool:
+        """Whether the property is proved."""
+        return self.status is Status.PROVED
+
+    def to_json(self) -> dict[str, Any]:
+        """The verdict as JSON data, without measured times; what is empty is left out."""
+        data: dict[str, Any] = {
+            "name": self.name,
+            "status": self.status.value,
+            "statement": self.statement,
+            "method": self.method,
+            "weight": self.weight.value,
+        }
+        for key in ("code", "hint", "bound"):
+            if getattr(self, key):
+                data[key] = getattr(self, key)
+        for key in ("subjects", "evidence"):
+            if getattr(self, key):
+                data[key] = list(getattr(self, key))
+        if self.witness is not None:
+            data["witness"] = {
+                "firings": [list(fired) for fired in self.witness.firings],
+                "cycle": [list(fired) for fired in self.witness.cycle],
+                "marking": list(self.witness.marking),
+                "assignment": [[name, value] for name, value in self.witness.assignment],
+                "note": self.witness.note,
+            }
+        for key in ("markings", "edges"):
+            if getattr(self.cost, key) is not None:
+                data[key] = getattr(self.cost, key)
+        return data
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Self:
+        """Read a verdict back; `KeyError`, `TypeError` or `ValueError` where the data are none."""
+        witness = None
+        if "witness" in data:
+            raw = data["witness"]
+            witness = Witness(
+                tuple(tuple(fired) for fired in raw["firings"]),
+                tuple(tuple(fired) for fired in raw["cycle"]),
+                tuple(raw["marking"]),
+                tuple((str(name), bool(value)) for name, value in raw["assignment"]),
+                raw["note"],
+            )
+        return cls(
+            name=data["name"],
+            status=Status(data["status"]),
+            statement=data["statement"],
+            method=data["method"],
+            weight=Weight(data["weight"]),
+            code=data.get("code", ""),
+            hint=data.get("hint", ""),
+            bound=data.get("bound", ""),
+            subjects=tuple(data.get("subjects", ())),
+            witness=witness,
+            evidence=tuple(data.get("evidence", ())),
+            cost=Cost(data.get("markings"), data.get("edges")),
+        )
+
+
+def overall(verdicts: Iterable[Verdict]) -> Status:
+    """The status of all required verdicts together: unknown never passes, and a violation outweighs it."""
+    statuses = {verdict.status for verdict in verdicts if verdict.weight is Weight.REQUIRED}
+    if Status.VIOLATED in statuses:
+        return Status.VIOLATED
+    return Status.UNKNOWN if Status.UNKNOWN in statuses else Status.PROVED

@@ -1,0 +1,144 @@
+"""Arbitration: choosing, among enabled transitions, a maximal set without conflict.
+
+One arbiter decides a whole conflict component as one group: it goes through the component in its order of preference
+and grants every enabled transition that conflicts with none granted before, so that the granted set is always maximal.
+The paper's alternative, an arbiter for each place, loses maximality on chains and fires nothing on cycles;
+`per_place_choice` is that design, kept to show it.
+
+Three rules give the order of preference:
+
+- *priority*: always the order of `among`. A live transition can starve under it, which is a verdict of its own.
+- *rotation*: the order of `among`, turned so that the last winner of an input conflict stands last.
+- *order*: a specified sequence that may name a transition more than once (`[G6, G6, G2]`: twice G6 for once G2), read
+  from behind the entry that won the last input conflict. Rotation is the case in which each is named once.
+
+A transition wins an input conflict when it is granted while an enabled one that shares an input with it is not.
+Transitions of a component that its arbiter does not name come last, in the order of the file; so does everything in a
+component without an arbiter, which is decided by the order of the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.net import ArbitrationRule, Net
+from firable.semantics.conflict import Conflicts, conflicts
+from firable.semantics.player import FiringSet
+
+Turns = tuple[int, ...]
+"""For each group, where in its sequence the next preference begins: all that arbitration remembers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """One conflict component and the rule that decides it, by the indexes of transitions."""
+
+    name: str
+    sequence: tuple[int, ...]
+    rest: tuple[int, ...]
+    by: ArbitrationRule
+
+    def preference(self, turn: int) -> tuple[int, ...]:
+        """The members in order of preference, each once."""
+        return tuple(dict.fromkeys((*self.sequence[turn:], *self.sequence[:turn], *self.rest)))
+
+    def turn_after(self, winner: int, turn: int) -> int:
+        """The turn after `winner` won an input conflict."""
+        if self.by is ArbitrationRule.PRIORITY or winner not in self.sequence:
+            return turn
+        length = len(self.sequence)
+        place = next(i for i in range(length) if self.sequence[(turn + i) % length] == winner)
+        return (turn + place + 1) % length
+
+
+@dataclass(frozen=True)
+class Arbitration:
+    """The arbiters of a net: one group for each conflict component."""
+
+    conflicts: Conflicts
+    groups: tuple[Group, ...]
+
+    @classmethod
+    def of(cls, net: Net) -> Self:
+        """The groups of a net, by its `arbiters` and the order of its file.
+
+        Raises `InputError` (F2013) where an arbiter reaches over several components, or two share one.
+        """
+        relation = conflicts(net)
+        index = net.transition_index
+        named: dict[int, tuple[str, tuple[int, ...], ArbitrationRule]] = {}
+        problems = []
+        for arbiter in net.arbiters:
+            among = tuple(index[name] for name in arbiter.among)
+            reached = sorted({relation.component_of[t] for t in among})
+            if len(reached) > 1 or reached == [-1]:
+                lonely = [
+                    net.transitions[t].name
+                    for t in among
+                    if relation.component_of[t] != relation.component_of[among[0]]
+                ]
+                problems.append(
+                    Diagnostic(
+                        "F2013",
+                        f"'{arbiter.name}' decides among transitions that are not in conflict with each other",
+                        f"leave out {', '.join(lonely or arbiter.among)}, or check the arcs",
+                        ("arbiters", arbiter.name, "among"),
+                    )
+                )
+            elif reached[0] in named:
+                problems.append(
+                    Diagnostic(
+                        "F2013",
+                        f"'{arbiter.name}' and '{named[reached[0]][0]}' decide the same conflict component",
+                        "write one arbiter for both: conflicts pass on from one to the other",
+                        ("arbiters", arbiter.name),
+                    )
+                )
+            else:
+                named[reached[0]] = (arbiter.name, among, arbiter.by)
+        if problems:
+            raise InputError(problems)
+        groups = []
+        for c, members in enumerate(relation.components):
+            name, sequence, by = named.get(c, (f"conflict-{c + 1}", (), ArbitrationRule.PRIORITY))
+            rest = tuple(t for t in members if t not in sequence)
+            groups.append(Group(name, sequence, rest, by))
+        return cls(relation, tuple(groups))
+
+    @property
+    def first_turns(self) -> Turns:
+        """The turns before anything was decided."""
+        return (0,) * len(self.groups)
+
+    def decide(self, enabled: Iterable[int], turns: Turns) -> tuple[FiringSet, Turns]:
+        """The granted transitions, a maximal set without conflict of the enabled ones, and the turns after it."""
+        candidates = frozenset(enabled)
+        granted = {t for t in candidates if self.conflicts.component_of[t] < 0}
+        after = list(turns)
+        for g, group in enumerate(self.groups):
+            won: set[int] = set()
+            preference = [t for t in group.preference(turns[g]) if t in candidates]
+            for t in preference:
+                if not self.conflicts.rivals[t] & won:
+                    won.add(t)
+            for t in preference:
+                if t in won and self.conflicts.input_rivals[t] & (candidates - won):
+                    after[g] = group.turn_after(t, turns[g])
+            granted |= won
+        return tuple(sorted(granted)), tuple(after)
+
+
+def per_place_choice(orders: Mapping[str, Sequence[int]], enabled: Iterable[int]) -> FiringSet:
+    """What fires where every place has an arbiter of its own: the design that SEMANTICS rejects.
+
+    `orders` gives for each place the priority of the transitions at it. A transition fires if it is first among the
+    enabled ones at every place that lists it; on a cycle of preferences none is.
+    """
+    candidates = frozenset(enabled)
+    winners = {place: next((t for t in order if t in candidates), None) for place, order in orders.items()}
+    return tuple(
+        t for t in sorted(candidates) if all(winners[place] == t for place, order in orders.items() if t in order)
+    )
