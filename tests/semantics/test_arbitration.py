@@ -1,0 +1,88 @@
+"""Arbitration grants maximal sets, by the three rules."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Arbiter, ArbitrationRule, Net, Place, Transition
+from firable.semantics.arbitration import Arbitration, per_place_choice
+
+
+def chooser(among: tuple[str, ...], by: ArbitrationRule) -> Net:
+    """One place, three transitions that want its token."""
+    transitions = tuple(Transition(name, ("p",)) for name in "tuv")
+    return Net("n", (Place("p", marked=True),), transitions, arbiters=(Arbiter("a", among, by),))
+
+
+def winners(net: Net, rounds: int, enabled: tuple[int, ...] = (0, 1, 2)) -> str:
+    arbitration = Arbitration.of(net)
+    turns, won = arbitration.first_turns, ""
+    for _ in range(rounds):
+        granted, turns = arbitration.decide(enabled, turns)
+        won += "".join(net.transitions[t].name for t in granted)
+    return won
+
+
+def test_priority_always_grants_the_first() -> None:
+    assert winners(chooser(("v", "t"), ArbitrationRule.PRIORITY), 3) == "vvv"
+
+
+def test_rotation_turns_past_the_last_winner() -> None:
+    assert winners(chooser(("t", "u", "v"), ArbitrationRule.ROTATION), 7) == "tuvtuvt"
+
+
+def test_rotation_passes_over_who_is_not_enabled() -> None:
+    assert winners(chooser(("t", "u", "v"), ArbitrationRule.ROTATION), 4, (0, 2)) == "tvtv"
+
+
+def test_a_specified_order_may_name_one_twice() -> None:
+    assert winners(chooser(("t", "t", "u"), ArbitrationRule.ORDER), 6) == "ttuttu"
+
+
+def test_an_uncontested_grant_does_not_turn_the_rotation() -> None:
+    arbitration = Arbitration.of(chooser(("t", "u", "v"), ArbitrationRule.ROTATION))
+    assert arbitration.decide([0], arbitration.first_turns)[1] == arbitration.first_turns
+
+
+def test_an_arbiter_over_two_components_is_refused() -> None:
+    places = (Place("p"), Place("q"))
+    transitions = tuple(Transition(t, (p,)) for t, p in (("t", "p"), ("u", "p"), ("v", "q"), ("w", "q")))
+    net = Net("n", places, transitions, arbiters=(Arbiter("a", ("t", "v")),))
+    with pytest.raises(InputError, match="F2013"):
+        Arbitration.of(net)
+
+
+def test_two_arbiters_of_one_component_are_refused() -> None:
+    transitions = tuple(Transition(t, ("p",)) for t in "tuvw")
+    arbiters = (Arbiter("a", ("t", "u")), Arbiter("b", ("v", "w")))
+    with pytest.raises(InputError, match="F2013"):
+        Arbitration.of(Net("n", (Place("p"),), transitions, arbiters=arbiters))
+
+
+def test_an_arbiter_for_each_place_fires_nothing_on_a_cycle() -> None:
+    assert per_place_choice({"x": [0, 1], "y": [1, 2], "z": [2, 0]}, [0, 1, 2]) == ()
+    assert per_place_choice({"x": [0, 1], "y": [1, 2]}, [0, 1, 2]) == (0,)  # a chain loses the third
+
+
+arcs = st.frozensets(st.sampled_from("pqrs"), max_size=2).map(lambda names: tuple(sorted(names)))
+
+
+@given(st.lists(st.tuples(arcs, arcs), max_size=6), st.sampled_from(ArbitrationRule), st.data())
+def test_what_is_granted_is_conflict_free_and_maximal(
+    shapes: list[tuple[tuple[str, ...], tuple[str, ...]]], rule: ArbitrationRule, data: st.DataObject
+) -> None:
+    transitions = tuple(Transition(f"t{i}", *shape) for i, shape in enumerate(shapes))
+    net = Net("n", tuple(map(Place, "pqrs")), transitions)
+    arbiters = []
+    for component in Arbitration.of(net).conflicts.components:
+        among = data.draw(st.permutations([net.transitions[t].name for t in component]))
+        arbiters.append(Arbiter(f"a{component[0]}", tuple(among), rule))
+    arbitration = Arbitration.of(Net("n", net.places, net.transitions, arbiters=tuple(arbiters)))
+    turns = arbitration.first_turns
+    for _ in range(4):
+        enabled = data.draw(st.frozensets(st.sampled_from(range(len(shapes)))) if shapes else st.just(frozenset()))
+        granted, turns = arbitration.decide(enabled, turns)
+        assert set(granted) <= enabled
+        assert arbitration.conflicts.free(granted)
+        assert all(arbitration.conflicts.rivals[t] & set(granted) for t in enabled - set(granted))

@@ -1,0 +1,39 @@
+"""The complement of a place keeps the reachability graph, with one bit of every marking inverted."""
+
+import pytest
+from hypothesis import given
+from support.generate import nets
+
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Command, Net, Place, Transition
+from firable.semantics.complement import complement
+from firable.semantics.player import Player
+
+
+@given(nets())
+def test_the_graph_of_the_complement_is_the_graph_with_one_bit_inverted(net: Net) -> None:
+    other = complement(net, "c")
+    bit = net.marking(["c"])
+    inverted = {
+        marking ^ bit: [(label, successor ^ bit) for label, successor in edges]
+        for marking, edges in Player(net).reachable().items()
+    }
+    assert Player(other).reachable() == inverted
+
+
+@given(nets())
+def test_the_complement_of_the_complement_is_the_net(net: Net) -> None:
+    twice = complement(complement(net, "c"), "not_c", new_name="c")
+    assert Player(twice).reachable() == Player(net).reachable()
+    assert twice.places == net.places
+
+
+def test_a_place_that_sends_a_command_has_no_complement() -> None:
+    net = Net("n", (Place("p", command=Command("M", "RUN")),), (Transition("t", (), ("p",)),))
+    with pytest.raises(InputError, match="F2020"):
+        complement(net, "p")
+
+
+def test_an_unknown_place_has_no_complement() -> None:
+    with pytest.raises(InputError, match="F2002"):
+        complement(Net("n"), "p")

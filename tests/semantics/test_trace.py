@@ -1,0 +1,138 @@
+"""Traces are read back as written, and replayed against the net."""
+
+import io
+
+import pytest
+
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Command, ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.semantics.trace import (
+    CommandSent,
+    Discipline,
+    End,
+    Event,
+    Fired,
+    Header,
+    Noted,
+    SignalChanged,
+    Trace,
+    parse_trace,
+    replay,
+)
+
+NET = Net(
+    "drill",
+    places=(Place("idle", marked=True), Place("busy", command=Command("D", "RUN"), completion="done")),
+    transitions=(
+        Transition("start", ("idle",), ("busy",)),
+        Transition("stop", ("busy",), ("idle",), external=(ExternalGate("done"),)),
+    ),
+    signals=(Signal("done", kind=SignalKind.COMPLETION),),
+)
+
+RUN: tuple[Event, ...] = (
+    Fired(0.0, ("start",)),
+    CommandSent(0.0, "busy"),
+    SignalChanged(1.5, "done", True),
+    Noted(1.6, "operator", {"wish": "none"}),
+    Fired(1.75, ("stop",)),
+)
+
+
+def trace(*events: Event, marking: tuple[str, ...] = ("idle",)) -> Trace:
+    return Trace(Header("drill", signals=True, commands=True), events, End(2.0, marking))
+
+
+def text_of(item: Trace) -> str:
+    stream = io.StringIO()
+    item.write(stream)
+    return stream.getvalue()
+
+
+def deviation(item: Trace) -> str:
+    with pytest.raises(InputError) as caught:
+        replay(NET, item)
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.code == "F5004"
+    assert diagnostic.span is not None
+    return f"{diagnostic.span.line}: {diagnostic.message}"
+
+
+def test_a_trace_is_read_back_as_written() -> None:
+    read = parse_trace(text_of(trace(*RUN)))
+    assert (read.header, read.events, read.end) == (trace().header, RUN, trace().end)
+
+
+def test_a_run_of_the_net_replays() -> None:
+    result = replay(NET, trace(*RUN))
+    assert (NET.names(result.marking), result.firings, result.commands, result.complete) == (("idle",), 2, 1, True)
+
+
+def test_a_firing_that_is_not_firable_is_no_event_of_the_net() -> None:
+    assert deviation(trace(RUN[0], RUN[1], Fired(1.0, ("start",)))) == "4: 'start' is not firable"
+
+
+def test_a_firing_through_a_closed_gate_is_no_event_of_the_net() -> None:
+    assert "external gate is closed" in deviation(trace(RUN[0], RUN[1], RUN[4]))
+
+
+def test_a_command_that_is_never_sent_is_noticed_when_the_token_leaves() -> None:
+    assert "before its command was sent" in deviation(trace(RUN[0], RUN[2], RUN[4]))
+
+
+def test_a_command_that_is_never_sent_is_noticed_at_the_end() -> None:
+    assert "never sent" in deviation(trace(RUN[0], marking=("busy",)))
+
+
+def test_a_command_sent_twice_is_noticed() -> None:
+    assert deviation(trace(RUN[0], RUN[1], RUN[1])) == "4: a command of 'busy' that is not due"
+
+
+def test_a_final_marking_that_was_not_reached_is_noticed() -> None:
+    assert "another marking" in deviation(trace(*RUN, marking=("busy",)))
+
+
+def test_a_trace_of_another_net_is_refused() -> None:
+    assert "trace is of the net 'mill'" in deviation(Trace(Header("mill"), ()))
+
+
+def test_two_firings_at_once_are_no_interleaving() -> None:
+    assert "several transitions" in deviation(trace(Fired(0.0, ("start", "stop"))))
+
+
+def test_a_step_that_leaves_out_an_enabled_transition_is_not_maximal() -> None:
+    net = Net(
+        "two",
+        places=(Place("a", marked=True), Place("b", marked=True)),
+        transitions=(Transition("t", ("a",)), Transition("u", ("b",))),
+    )
+    whole = Trace.of_firings(net, [("t", "u")], Discipline.STEP)
+    assert replay(net, whole).marking == 0
+    with pytest.raises(InputError, match="not a maximal step"):
+        replay(net, Trace.of_firings(net, [("t",), ("u",)], Discipline.STEP))
+
+
+def test_a_trace_that_was_cut_off_replays_as_incomplete() -> None:
+    lines = text_of(trace(*RUN)).splitlines(keepends=True)
+    cut = "".join(lines[:-1]) + lines[-1][:9]
+    assert not replay(NET, parse_trace(cut)).complete
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["nothing", "[]", '{"at": 1}', '{"at": 0, "fired": []}', '{"at": 0, "signal": "done", "value": 2}', "[" * 100_000],
+)
+def test_a_malformed_line_is_named(line: str) -> None:
+    header = text_of(trace()).splitlines()[0]
+    with pytest.raises(InputError, match=r"<trace>:2:1: error\[F5005\]"):
+        parse_trace(f"{header}\n{line}\n")
+
+
+def test_a_file_that_does_not_begin_with_a_header_is_no_trace() -> None:
+    with pytest.raises(InputError, match="not the header"):
+        parse_trace('{"at": 0, "fired": ["t"]}\n')
+
+
+def test_an_empty_trace_file_is_refused() -> None:
+    with pytest.raises(InputError, match="F1002"):
+        parse_trace("")
