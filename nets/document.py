@@ -1,0 +1,171 @@
+"""The shape of a `*.firable.yaml` file, as pydantic models: the one definition behind the reader and the JSON Schema.
+
+The models say which keys exist and what kind of value each takes, nothing more: whether a name is declared, an arc
+double or an owner missing is the business of `Net`, which holds the rules for every way a net is made. Short forms (one
+name for a list of one name, nothing for an empty mapping) are made long by validators that tell the schema what they
+accept. The alternative, a hand-written schema beside a hand-written reader, has two truths.
+
+To add a key: a field here, its use in `text` and in `printing`, its row in the refusal tests.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+_DIGITS: Final = re.compile(r"0|[1-9][0-9]{0,8}")
+
+
+def _as_list(value: object) -> object:
+    return [] if value is None else [value] if isinstance(value, str) else value
+
+
+def _as_integer(value: object) -> object:
+    # The reader resolves no numbers, so that a name such as `007` stays as it is written.
+    return int(value) if isinstance(value, str) and _DIGITS.fullmatch(value) else value
+
+
+def _as_formula(value: object) -> object:
+    return str(value).lower() if isinstance(value, bool) else value
+
+
+def _as_pair(value: object) -> object:
+    if isinstance(value, list) and len(value) == 2:
+        return {"from": value[0], "to": value[1]}
+    return value
+
+
+Name = Annotated[str, Field(min_length=1)]
+Names = Annotated[list[Name], BeforeValidator(_as_list, json_schema_input_type=Name | list[Name] | None)]
+Text = str
+Integer = Annotated[int, BeforeValidator(_as_integer, json_schema_input_type=int)]
+FormulaText = Annotated[str, BeforeValidator(_as_formula, json_schema_input_type=str | bool)]
+
+
+class _Document(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, populate_by_name=False)
+
+
+class CommandDocument(BaseModel):
+    """The output signal of a place: machine, command, and any further keys as parameters of the command."""
+
+    model_config = ConfigDict(extra="allow", strict=True, frozen=True)
+    __pydantic_extra__: dict[str, str]
+
+    machine: Name
+    command: Name
+
+
+class PlaceDocument(_Document):
+    """A place; nothing after its name is a place without a command."""
+
+    send: CommandDocument | None = Field(default=None, description="The command sent when a token enters.")
+    until: Name | None = Field(default=None, description="The completion signal that lets the token out.")
+    description: Text = ""
+
+
+Places = dict[Name, PlaceDocument | None]
+
+
+class ControllerDocument(_Document):
+    """A controller: what is nested in it is owned by it."""
+
+    coordinator: bool = Field(default=False, description="Whether it coordinates the others.")
+    description: Text = ""
+    start: Names = Field(default=[], description="The places that hold a token at first.")
+    inputs: Names = Field(default=[], description="The sensors, signals that no command clears.")
+    places: Places | None = None
+
+
+class TransitionDocument(_Document):
+    """A transition; `if` and `unless` name places (internal gates) or signals (external gates)."""
+
+    number: Integer | None = Field(default=None, ge=0, description="The number in the coordinator table.")
+    inputs: Names = Field(default=[], alias="from")
+    outputs: Names = Field(default=[], alias="to")
+    permissive: Names = Field(default=[], alias="if")
+    inhibitive: Names = Field(default=[], alias="unless")
+    description: Text = ""
+
+
+class ArbiterDocument(_Document):
+    """How the conflict between the transitions `among` is decided."""
+
+    among: Names
+    by: Literal["priority", "order", "rotation"] = "priority"
+
+
+class LeadsToDocument(_Document):
+    """Whenever `from` holds, `to` holds then or later."""
+
+    source: FormulaText = Field(alias="from")
+    target: FormulaText = Field(alias="to")
+    fairness: Literal["none", "weak", "strong"] = "weak"
+
+
+PATTERNS: Final = ("never", "always", "reachable", "leads_to", "always_possible")
+
+
+class PropertyDocument(_Document):
+    """One temporal pattern."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        strict=True,
+        frozen=True,
+        json_schema_extra={"oneOf": [{"required": [pattern]} for pattern in PATTERNS]},
+    )
+
+    never: FormulaText | None = None
+    always: FormulaText | None = None
+    reachable: FormulaText | None = None
+    leads_to: (
+        Annotated[
+            LeadsToDocument,
+            BeforeValidator(
+                _as_pair,
+                json_schema_input_type=LeadsToDocument
+                | Annotated[list[FormulaText], Field(min_length=2, max_length=2)],
+            ),
+        ]
+        | None
+    ) = None
+    always_possible: FormulaText | None = None
+
+    @model_validator(mode="after")
+    def _one_pattern(self) -> PropertyDocument:
+        count = sum(getattr(self, pattern) is not None for pattern in PATTERNS)
+        if count != 1:
+            raise ValueError(f"one of {', '.join(PATTERNS)} is wanted, {count or 'none'} given")
+        return self
+
+
+class NetDocument(_Document):
+    """A whole file."""
+
+    firable: Annotated[Literal[1], BeforeValidator(_as_integer, json_schema_input_type=Literal[1])] = Field(
+        description="The version of the format."
+    )
+    cell: Name = Field(description="The name of the net.")
+    description: Text = ""
+    controllers: dict[Name, ControllerDocument | None] | None = None
+    start: Names = Field(default=[], description="The places without an owner that hold a token at first.")
+    inputs: Names = Field(default=[], description="The sensors without an owner.")
+    places: Places | None = Field(default=None, description="The places without an owner.")
+    transitions: dict[Name, TransitionDocument | None] | None = None
+    arbiters: dict[Name, ArbiterDocument] | None = None
+    properties: dict[Name, PropertyDocument] | None = None
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of the format, for editors and other readers.
+
+    >>> json_schema()["title"]
+    'firable net file'
+    """
+    schema = NetDocument.model_json_schema(by_alias=True, mode="validation")
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    schema["title"] = "firable net file"
+    return schema

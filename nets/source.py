@@ -1,0 +1,103 @@
+"""The text of an input file, read with bounds, and the spans of diagnostics in it.
+
+A reader is given a file by a person, so the file may be anything: a directory, a photograph, 100 MB of noise. Size is
+asked of the file system before a byte is read, so that noise is refused at once; the bytes must be UTF-8 without NUL.
+All readers (text, PNML) go through here, so each of these mistakes has one code and one wording.
+"""
+
+from __future__ import annotations
+
+import stat
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+from firable.nets.diagnostics import Diagnostic, InputError, Span
+
+EXCERPT_CHARACTERS_MAX: Final = 100
+
+
+@dataclass(frozen=True)
+class Source:
+    """A text and the name of the file that it came from."""
+
+    file: str
+    text: str
+
+    @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """The lines of the text, divided as YAML and XML divide them."""
+        return tuple(self.text.replace("\r\n", "\n").replace("\r", "\n").split("\n"))
+
+    def span(self, line: int, column: int, length: int = 1) -> Span:
+        """The span at a line and column (both from 1), with its excerpt."""
+        text = self.lines[line - 1] if 0 < line <= len(self.lines) else ""
+        start = 1
+        if len(text) > EXCERPT_CHARACTERS_MAX:
+            first = max(0, min(column - 1 - EXCERPT_CHARACTERS_MAX // 3, len(text) - EXCERPT_CHARACTERS_MAX))
+            last = first + EXCERPT_CHARACTERS_MAX
+            window = ("…" if first else "") + text[first:last] + ("…" if last < len(text) else "")
+            start = first if first else 1
+            text = window
+        return Span(self.file, line, column, printable(text), max(1, length), start)
+
+    def refuse(self, code: str, message: str, hint: str, line: int = 1, column: int = 1, length: int = 1) -> InputError:
+        """The error with one diagnostic at a place of this text."""
+        return InputError([Diagnostic(code, message, hint, span=self.span(line, column, length))])
+
+
+def printable(text: str) -> str:
+    """The text with a middle dot for each character that a terminal would obey or hide; as many characters.
+
+    >>> printable("a\\tb\\x1b[31m")
+    'a b·[31m'
+    """
+    return "".join(c if c.isprintable() else " " if c == "\t" else "·" for c in text)
+
+
+def quoted(text: str) -> str:
+    """The text in quotes for a message, on one line and not too long."""
+    return f"'{printable(text if len(text) <= 60 else text[:59] + '…')}'"
+
+
+def read_source(path: str | Path, size_bytes_max: int) -> Source:
+    """Read a UTF-8 text file of at most `size_bytes_max` bytes.
+
+    Raises `InputError`: F1001 where there is no such file or it may not be read, F1003 where it is too large, F1004
+    where it is not text.
+    """
+    path = Path(path)
+    name = str(path)
+
+    def refuse(code: str, message: str, hint: str) -> InputError:
+        return InputError([Diagnostic(code, f"{printable(name)}: {message}", hint, span=Span(printable(name), 1, 1))])
+
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise refuse("F1001", "this is a directory", "name a file in it")
+        if not stat.S_ISREG(status.st_mode):
+            raise refuse("F1001", "this is not a regular file", "name a file that can be read twice")
+        if status.st_size > size_bytes_max:
+            raise refuse(
+                "F1003",
+                f"{status.st_size:,} bytes are more than a net of this format can need ({size_bytes_max:,})",
+                "is this the right file?",
+            )
+        with path.open("rb") as stream:
+            data = stream.read(size_bytes_max + 1)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise refuse("F1001", f"cannot be read: {reason}", "check the path and the permissions") from None
+    if len(data) > size_bytes_max:
+        raise refuse("F1003", "the file grew beyond the limit while it was read", "is something writing to it?")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise refuse(
+            "F1004", f"not UTF-8 text: byte {error.start} is 0x{data[error.start]:02x}", "save the file as UTF-8 text"
+        ) from None
+    if "\0" in text:
+        raise refuse("F1004", f"not text: byte {data.index(0)} is NUL", "save the file as UTF-8 text")
+    return Source(name, text)

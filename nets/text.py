@@ -1,0 +1,235 @@
+"""Reading the net file, `*.firable.yaml`: text, tree with positions, document, `Net`.
+
+Four stages, each of which reports all that it finds and stops the ones after it, so that one mistake is reported
+once and not as its twenty consequences:
+
+1. `source`: bytes to text, within bounds;
+2. `yaml_tree`: text to a tree of strings that knows where each stands; ambiguous YAML is refused;
+3. `document`: the tree's data against the pydantic models; the paths of the errors lead back into the tree;
+4. here: names made full (`free` in `robot` is `robot.free`), gates told apart, formulas parsed, and the rules of
+   `Net` itself, whose diagnostics name subjects that lead back into the tree as well.
+
+Which gate is internal and which external follows from the name: a declared signal or a place. `until` declares the
+completion signal of a place's command and puts its gate on each transition that takes the token out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from pydantic import ValidationError
+
+from firable.nets import document as doc
+from firable.nets.diagnostics import Diagnostic, InputError, Subject
+from firable.nets.document_errors import document_problems, version_problem
+from firable.nets.formula import Formula, FormulaError, parse_formula
+from firable.nets.net import (
+    Arbiter,
+    ArbitrationRule,
+    Command,
+    Controller,
+    ExternalGate,
+    Fairness,
+    Net,
+    Place,
+    Property,
+    PropertyKind,
+    Signal,
+    SignalKind,
+    Transition,
+)
+from firable.nets.source import Source, read_source
+from firable.nets.text_positions import Positions
+from firable.nets.yaml_tree import Node, data, parse_tree
+
+SIZE_BYTES_MAX: Final = 16 * 1024 * 1024
+
+
+def read_net(path: str | Path) -> Net:
+    """Read a net file.
+
+    Raises `InputError` with the position of every problem: F1001-F1012 for the text, F2001-F2019 for the net.
+    """
+    return _parse(read_source(path, SIZE_BYTES_MAX))
+
+
+def parse_net(text: str, file: str = "<text>") -> Net:
+    """Read a net from text; `file` is the name in diagnostics.
+
+    Raises `InputError` as `read_net` does.
+
+    >>> parse_net("firable: 1\\ncell: demo\\nplaces: {p: , q: }\\nstart: p\\ntransitions: {t: {from: p, to: q}}").name
+    'demo'
+    """
+    source = Source(file, text)
+    if len(text) > SIZE_BYTES_MAX:
+        raise source.refuse("F1003", f"more than {SIZE_BYTES_MAX:,} characters", "is this the right text?")
+    return _parse(source)
+
+
+def _parse(source: Source) -> Net:
+    tree = parse_tree(source)
+    if problem := version_problem(source, tree):
+        raise InputError([problem])
+    try:
+        document = doc.NetDocument.model_validate(data(tree))
+    except ValidationError as error:
+        raise InputError(document_problems(source, tree, error)) from None
+    return _Reading(source, tree, document).net()
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """A controller, or the top level where nothing has an owner."""
+
+    owner: str | None
+    path: tuple[str, ...]
+    start: list[str]
+    inputs: list[str]
+    places: dict[str, doc.PlaceDocument | None]
+
+    def full(self, local: str) -> str:
+        return local if self.owner is None else f"{self.owner}.{local}"
+
+
+class _Reading:
+    """One document on its way to a `Net`."""
+
+    def __init__(self, source: Source, tree: Node, document: doc.NetDocument) -> None:
+        self.document = document
+        self.positions = Positions(source, tree)
+        self.problems: list[Diagnostic] = []
+        controllers = ((name, body or doc.ControllerDocument()) for name, body in (document.controllers or {}).items())
+        self.scopes = [
+            *(_Scope(name, ("controllers", name), c.start, c.inputs, c.places or {}) for name, c in controllers),
+            _Scope(None, (), document.start, document.inputs, document.places or {}),
+        ]
+
+    def net(self) -> Net:
+        document = self.document
+        places = tuple(place for scope in self.scopes for place in self.places(scope))
+        signals = tuple(signal for scope in self.scopes for signal in self.signals(scope))
+        transitions = tuple(self.transitions(places, signals))
+        properties = tuple(self.properties())
+        controllers = tuple(
+            Controller(name, body.coordinator, body.description) if body else Controller(name)
+            for name, body in (document.controllers or {}).items()
+        )
+        arbiters = tuple(
+            Arbiter(name, tuple(body.among), ArbitrationRule(body.by))
+            for name, body in (document.arbiters or {}).items()
+        )
+        try:
+            net = Net(
+                document.cell, places, transitions, signals, controllers, arbiters, properties, document.description
+            )
+        except InputError as error:
+            raise InputError(self.positions.place(self.problems + list(error.diagnostics))) from None
+        if self.problems:
+            raise InputError(self.positions.place(self.problems))
+        return net
+
+    def places(self, scope: _Scope) -> Iterator[Place]:
+        marked: set[str] = set()
+        for local in scope.start:
+            subject: Subject = (*scope.path, "start", local)
+            if local not in scope.places:
+                self.problems.append(_unknown_start(scope, local, subject))
+            elif local in marked:
+                self.problems.append(
+                    Diagnostic(
+                        "F2006", f"'{local}' stands twice in `start`", "a place holds one token at most", subject
+                    )
+                )
+            marked.add(local)
+        for local, body in scope.places.items():
+            place = body or doc.PlaceDocument()
+            send = place.send
+            yield Place(
+                scope.full(local),
+                scope.owner,
+                local in marked,
+                Command(send.machine, send.command, tuple((send.model_extra or {}).items())) if send else None,
+                scope.full(place.until) if place.until else None,
+                place.description,
+            )
+
+    def signals(self, scope: _Scope) -> Iterator[Signal]:
+        for local in scope.inputs:
+            yield Signal(scope.full(local), scope.owner)
+        completions = dict.fromkeys(place.until for place in scope.places.values() if place and place.until)
+        for local in completions:
+            # A name that is a sensor too is left to `Net`, which says so (F2018).
+            if local not in scope.inputs:
+                yield Signal(scope.full(local), scope.owner, SignalKind.COMPLETION)
+
+    def transitions(self, places: tuple[Place, ...], signals: tuple[Signal, ...]) -> Iterator[Transition]:
+        external = {signal.name for signal in signals}
+        completion = {place.name: place.completion for place in places}
+        for name, body in (self.document.transitions or {}).items():
+            transition = body or doc.TransitionDocument()
+            for both in sorted(set(transition.inputs) & set(transition.outputs)):
+                self.problems.append(
+                    Diagnostic(
+                        "F2009",
+                        f"'{both}' is both in `from` and in `to` of '{name}', which can then never fire",
+                        f"write `if: {both}` to read the place without taking the token",
+                        ("transitions", name, "to", both),
+                    )
+                )
+            implied = dict.fromkeys(
+                gate for source in transition.inputs if (gate := completion.get(source)) is not None
+            )
+            opening = [*implied, *(gate for gate in transition.permissive if gate in external and gate not in implied)]
+            yield Transition(
+                name,
+                tuple(transition.inputs),
+                tuple(transition.outputs),
+                tuple(gate for gate in transition.permissive if gate not in external),
+                tuple(gate for gate in transition.inhibitive if gate not in external),
+                (
+                    *(ExternalGate(gate) for gate in opening),
+                    *(ExternalGate(gate, wanted=False) for gate in transition.inhibitive if gate in external),
+                ),
+                transition.number,
+                transition.description,
+            )
+
+    def properties(self) -> Iterator[Property]:
+        for name, body in (self.document.properties or {}).items():
+            if body.leads_to is not None:
+                source = self.formula(body.leads_to.source, ("properties", name, "leads_to", "from"))
+                target = self.formula(body.leads_to.target, ("properties", name, "leads_to", "to"))
+                if source and target:
+                    yield Property(name, PropertyKind.LEADS_TO, source, target, Fairness(body.leads_to.fairness))
+                continue
+            for pattern in doc.PATTERNS:
+                text = getattr(body, pattern)
+                if text is not None and (formula := self.formula(text, ("properties", name, pattern))):
+                    yield Property(name, PropertyKind(pattern), formula)
+
+    def formula(self, text: str, subject: Subject) -> Formula | None:
+        try:
+            return parse_formula(text)
+        except FormulaError as error:
+            problem = Diagnostic(
+                "F1012",
+                f"not a formula: {error.message}",
+                "write places joined by and, or, not, -> and brackets",
+                subject,
+            )
+            self.problems.append(replace(problem, span=self.positions.in_formula(subject, error.column)))
+            return None
+
+
+def _unknown_start(scope: _Scope, local: str, subject: Subject) -> Diagnostic:
+    from firable.nets.diagnostics import did_you_mean
+
+    if scope.owner and local.removeprefix(f"{scope.owner}.") in scope.places:
+        hint = f"inside '{scope.owner}' names are local: write '{local.removeprefix(f'{scope.owner}.')}'"
+    else:
+        hint = did_you_mean(local, list(scope.places)) + "`start` names places of the same `places`"
+    return Diagnostic("F2002", f"there is no place '{scope.full(local)}' to start in", hint, subject)

@@ -1,0 +1,182 @@
+"""From the subjects of diagnostics back to the places of the text.
+
+`Net` names what a problem is about by a path such as `("transitions", "G1", "from", "conveyor.cvx")`, in the full names
+of the net. The text nests, shortens and lists. This table is made from the tree, once and only when there is something
+to report; where a subject has no place of its own, that of its longest known prefix is taken.
+
+One wrong name used in twenty transitions is one mistake: diagnostics that repeat the same finding are joined, and the
+first one tells on which lines the others are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from functools import cached_property
+from typing import Final
+
+from firable.nets.diagnostics import Diagnostic, Span, Subject
+from firable.nets.source import Source
+from firable.nets.yaml_tree import Mapping, Node, Scalar, Sequence, node_span, nodes_along
+
+DIAGNOSTICS_MAX: Final = 20
+
+_SECOND: Final = frozenset({"F2001", "F2006", "F2007"})
+"""What is about the second of two equal names."""
+
+_UNKNOWN: Final = frozenset({"F2002", "F2003", "F2004"})
+
+
+class Positions:
+    """Where the subjects of one net file stand in its text."""
+
+    def __init__(self, source: Source, tree: Node) -> None:
+        self.source = source
+        self.tree = tree
+
+    def place(self, problems: Iterable[Diagnostic]) -> list[Diagnostic]:
+        """The diagnostics with their spans, in the order of the text, joined and bounded."""
+        placed = [problem if problem.span else replace(problem, span=self.span(problem)) for problem in problems]
+        placed.sort(key=lambda problem: (problem.span.line, problem.span.column) if problem.span else (0, 0))
+        return bounded(_joined(placed))
+
+    def span(self, problem: Diagnostic) -> Span:
+        """The span of the subject, or of its longest prefix that has one."""
+        first, second = self._table
+        subject = problem.subject
+        if problem.code in _SECOND and subject in second:
+            return second[subject]
+        while subject:
+            if subject in first:
+                return first[subject]
+            subject = subject[:-1]
+        return node_span(self.source, self.tree)
+
+    def in_formula(self, subject: Subject, column: int) -> Span:
+        """The span of a character (from 0) of the formula whose text is the value at this path."""
+        path: tuple[str | int, ...] = subject
+        found = list(nodes_along(self.tree, path))
+        if len(found) <= len(path) and isinstance(found[-1][1], Sequence):  # `leads_to: [p, q]`
+            found = list(nodes_along(self.tree, (*path[:-1], 0 if path[-1] == "from" else 1)))
+        node = found[-1][1]
+        return self._inside(node, column, 1) if isinstance(node, Scalar) else node_span(self.source, node)
+
+    def _inside(self, node: Scalar, column: int, length: int) -> Span:
+        """A part of a scalar, where the scalar stands in the text letter by letter; else all of it."""
+        line = self.source.lines[node.line - 1]
+        begin = node.column - 1 + (0 if node.plain else 1)
+        if line[begin : begin + len(node.text)] != node.text:
+            return node_span(self.source, node)
+        return self.source.span(node.line, begin + column + 1, length)
+
+    @cached_property
+    def _table(self) -> tuple[dict[Subject, Span], dict[Subject, Span]]:
+        first: dict[Subject, Span] = {}
+        second: dict[Subject, Span] = {}
+        for subject, found in self._walk():
+            span = found if isinstance(found, Span) else node_span(self.source, found)
+            if subject in first:
+                second.setdefault(subject, span)
+            else:
+                first[subject] = span
+        return first, second
+
+    def _walk(self) -> Iterator[tuple[Subject, Node | Span]]:
+        for name, key, controller in _entries(self.tree, "controllers"):
+            yield ("controllers", name), key
+            yield from self._scope(controller, ("controllers", name), f"{name}.")
+        yield from self._scope(self.tree, (), "")
+        for name, key, transition in _entries(self.tree, "transitions"):
+            yield ("transitions", name), key
+            for which in ("from", "to", "if", "unless"):
+                for item in _names(transition, which):
+                    yield ("transitions", name, which, item.text), item
+            if (number := _value(transition, "number")) is not None:
+                yield ("transitions", name, "number"), number
+        for name, key, arbiter in _entries(self.tree, "arbiters"):
+            yield ("arbiters", name), key
+            if (among := _value(arbiter, "among")) is not None:
+                yield ("arbiters", name, "among"), among
+            for item in _names(arbiter, "among"):
+                yield ("arbiters", name, "among", item.text), item
+        for name, key, body in _entries(self.tree, "properties"):
+            yield ("properties", name), key
+            for formula in _scalars(body):
+                # A formula names its places without quotes, between blanks and brackets.
+                for match in re.finditer(r"[^\s()]+", formula.text):
+                    span = self._inside(formula, match.start(), len(match.group()))
+                    yield ("properties", name, match.group()), span
+
+    def _scope(self, scope: Node, path: Subject, prefix: str) -> Iterator[tuple[Subject, Node | Span]]:
+        for item in _names(scope, "start"):
+            yield (*path, "start", item.text), item
+        for item in _names(scope, "inputs"):
+            yield ("signals", prefix + item.text), item
+        declared: set[str] = set()
+        for local, key, place in _entries(scope, "places"):
+            yield ("places", prefix + local), key
+            until = _value(place, "until")
+            if isinstance(until, Scalar):
+                yield ("places", prefix + local, "until"), until
+                if until.text not in declared:
+                    yield ("signals", prefix + until.text), until
+                declared.add(until.text)
+
+
+def bounded(problems: list[Diagnostic]) -> list[Diagnostic]:
+    """The first of the diagnostics; the last one of them tells how many are left out."""
+    if len(problems) <= DIAGNOSTICS_MAX:
+        return problems
+    shown, left = problems[:DIAGNOSTICS_MAX], len(problems) - DIAGNOSTICS_MAX
+    last = shown[-1]
+    hint = f"{last.hint} ({left:,} more problems are not shown)".strip()
+    return [*shown[:-1], replace(last, hint=hint)]
+
+
+def _joined(problems: list[Diagnostic]) -> list[Diagnostic]:
+    """One diagnostic for each unknown name, and no diagnostic twice."""
+    groups: dict[tuple[str, str], list[Diagnostic]] = {}
+    for problem in problems:
+        key = problem.message if problem.code in _UNKNOWN else f"{problem.message} {problem.span}"
+        groups.setdefault((problem.code, key), []).append(problem)
+    joined = []
+    for group in groups.values():
+        first = group[0]
+        lines = dict.fromkeys(problem.span.line for problem in group[1:] if problem.span)
+        if first.code in _UNKNOWN and lines:
+            shown = ", ".join(map(str, list(lines)[:5])) + (", ..." if len(lines) > 5 else "")
+            first = replace(first, message=f"{first.message} (also on line {shown})")
+        joined.append(first)
+    return joined
+
+
+def _value(node: Node, key: str) -> Node | None:
+    found = node.entries.get(key) if isinstance(node, Mapping) else None
+    return found[1] if found else None
+
+
+def _entries(node: Node, key: str) -> Iterator[tuple[str, Scalar, Node]]:
+    table = _value(node, key)
+    if isinstance(table, Mapping):
+        for name, (at, value) in table.entries.items():
+            yield name, at, value
+
+
+def _names(node: Node, key: str) -> Iterator[Scalar]:
+    value = _value(node, key)
+    for item in value.items if isinstance(value, Sequence) else [value]:
+        if isinstance(item, Scalar):
+            yield item
+
+
+def _scalars(node: Node) -> Iterator[Scalar]:
+    match node:
+        case Scalar():
+            yield node
+        case Sequence():
+            for item in node.items:
+                yield from _scalars(item)
+        case Mapping():
+            for _, value in node.entries.values():
+                yield from _scalars(value)
