@@ -1,6 +1,7 @@
 """The firing rule, one clause of SEMANTICS a test, and its evaluation in several algebras."""
 
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from support.generate import nets
 from firable.nets.net import ExternalGate, Marking, Net, Place, Signal, Transition
 from firable.semantics.algebra import BOOL, Bitwise
 from firable.semantics.firing import firable, next_token
-from firable.semantics.player import NotFirableError, Player
+from firable.semantics.player import NotFirableError, Player, holds_in
 
 
 def net_of(marked: str, empty: str, *transitions: Transition, signals: tuple[Signal, ...] = ()) -> Net:
@@ -101,10 +102,10 @@ def test_bool_word_and_column_algebras_agree(net: Net) -> None:
     everywhere = (1 << len(markings)) - 1
     words = Bitwise(true=everywhere, false=0)
     word_of = [sum((m >> p & 1) << m for m in markings) for p in range(len(net.places))]
-    columns = Bitwise(true=np.True_, false=np.False_)
+    columns: Bitwise[Any] = Bitwise(true=np.True_, false=np.False_)
     column_of = [np.array([bool(m >> p & 1) for m in markings]) for p in range(len(net.places))]
     for t in range(len(net.transitions)):
-        expected = [firable(BOOL, net, t, lambda p, m=m: bool(m >> p & 1)) for m in markings]
+        expected = [firable(BOOL, net, t, holds_in(m)) for m in markings]
         word = firable(words, net, t, word_of.__getitem__)
         assert [bool(word >> m & 1) for m in markings] == expected
         column = firable(columns, net, t, column_of.__getitem__)
@@ -117,7 +118,7 @@ def test_next_token_is_minus_inputs_plus_outputs(net: Net, marking: int) -> None
     for t in player.firable(marking):
         masks = net.masks[t]
         assert player.fire(marking, [t]) == marking & ~masks.inputs | masks.outputs
-        tokens = [next_token(BOOL, net, p, lambda q: bool(marking >> q & 1), {t}.__contains__) for p in range(5)]
+        tokens = [next_token(BOOL, net, p, holds_in(marking), {t}.__contains__) for p in range(5)]
         assert sum(1 << p for p, token in enumerate(tokens) if token) == player.fire(marking, [t])
 
 

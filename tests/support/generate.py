@@ -17,7 +17,14 @@ def nets(draw: st.DrawFn, *, most_transitions: int = 4, signals: bool = False) -
     """Five places, a few transitions with any sets of arcs and internal gates, and external gates if asked for."""
     marked = draw(sets_of_places)
     transitions = tuple(
-        Transition(f"t{i}", *(draw(sets_of_places) for _ in range(4)), draw(external_gates) if signals else ())
+        Transition(
+            f"t{i}",
+            inputs=draw(sets_of_places),
+            outputs=draw(sets_of_places),
+            permissive=draw(sets_of_places),
+            inhibitive=draw(sets_of_places),
+            external=draw(external_gates) if signals else (),
+        )
         for i in range(draw(st.integers(0, most_transitions)))
     )
     return Net("n", tuple(Place(p, marked=p in marked) for p in PLACES), transitions, (Signal("r"), Signal("s")))
