@@ -42,10 +42,10 @@ def version_problem(source: Source, tree: Node) -> Diagnostic | None:
         return Diagnostic("F1010", "this is not a net file: it has no keys", hint, span=node_span(source, tree))
     entry = tree.entries.get("firable")
     if entry is None:
-        close = did_you_mean("firable", list(tree.entries))
-        return Diagnostic(
-            "F1009", "the key 'firable' is missing", close + hint, span=source.span(tree.line, tree.column)
-        )
+        close = next((key for key in tree.entries if did_you_mean(key, ["firable"])), None)
+        span = node_span(source, tree.entries[close][0]) if close else source.span(tree.line, tree.column)
+        found = f": {quoted(close)} is not it" if close else ""
+        return Diagnostic("F1009", f"the key 'firable' is missing{found}", hint, span=span)
     value = entry[1]
     if not isinstance(value, Scalar) or value.text != "1":
         found = quoted(value.text) if isinstance(value, Scalar) else "this"
@@ -94,6 +94,10 @@ def _problem(source: Source, tree: Node, path: Path, kind: str, message: str, co
             "F1010", str(context.get("error", message)) + _inside(path), "write one pattern for each property",
             span=node_span(source, key or node),
         )  # fmt: skip
+    if path[-1:] == ("[key]",):
+        return Diagnostic(
+            "F2012", "an empty name", "write a name before the colon", span=node_span(source, key or node)
+        )
     empty = isinstance(node, Scalar) and node.plain and not node.text
     at = key if empty and key is not None else node
     return Diagnostic(

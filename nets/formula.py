@@ -92,6 +92,10 @@ class FormulaError(ValueError):
 
 _TOKEN: Final = re.compile(r"\s*(?:(?P<symbol>->|[()])|(?P<name>[^\s()]+?(?=\s|[()]|->|$)))")
 _KEYWORDS: Final = frozenset({"and", "or", "not"})
+NESTING_MAX: Final = 100
+
+CONSTANT_ATOMS: Final = frozenset({"true", "false", "start", "deadlock"})
+"""Words that are atoms by themselves, so a place of that name cannot be named in a formula."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +124,7 @@ class _Parser:
         self.tokens = _tokens(text)
         self.position = 0
         self.end = len(text)
+        self.depth = 0
 
     def peek(self) -> str | None:
         return self.tokens[self.position].text if self.position < len(self.tokens) else None
@@ -141,11 +146,20 @@ class _Parser:
             raise FormulaError(f"expected {wanted!r}, found {'the end' if found is None else repr(found)}", column)
         self.position += 1
 
+    def deeper(self, levels: int) -> None:
+        """Count nesting: what walks over a formula calls itself for each level, so levels are bounded here."""
+        self.depth += levels
+        if self.depth > NESTING_MAX:
+            raise FormulaError(f"more than {NESTING_MAX} levels of brackets, 'not' and '->'", self.column())
+
     def implication(self) -> Formula:
         left = self.disjunction()
         if self.peek() == "->":
             self.take()
-            return Or((Not(left), self.implication()))
+            self.deeper(1)
+            right = self.implication()
+            self.deeper(-1)
+            return Or((Not(left), right))
         return left
 
     def disjunction(self) -> Formula:
@@ -167,8 +181,10 @@ class _Parser:
         negations = 0
         while self.peek() == "not":
             self.take()
+            self.deeper(1)
             negations += 1
         formula = self.atom()
+        self.deeper(-negations)
         for _ in range(negations):
             formula = Not(formula)
         return formula
@@ -178,7 +194,9 @@ class _Parser:
         token = self.take()
         match token:
             case "(":
+                self.deeper(1)
                 inner = self.implication()
+                self.deeper(-1)
                 self.expect(")")
                 return inner
             case "true" | "false":
@@ -213,10 +231,7 @@ def parse_formula(text: str) -> Formula:
     firable.nets.formula.FormulaError: the formula ends too early
     """
     parser = _Parser(text)
-    try:
-        formula = parser.implication()
-    except RecursionError:
-        raise FormulaError("the formula nests too deeply", parser.column()) from None
+    formula = parser.implication()
     if parser.peek() is not None:
         raise FormulaError(f"unexpected {parser.peek()!r}", parser.column())
     return formula

@@ -23,7 +23,7 @@ from itertools import islice
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError, Subject, did_you_mean
-from firable.nets.formula import Formula, Holds, names_in
+from firable.nets.formula import CONSTANT_ATOMS, Formula, Holds, names_in
 
 Marking = int
 """The set of places with a token; bit i is place i of the net."""
@@ -318,7 +318,12 @@ def _duplicate_names(net: Net) -> Iterator[Diagnostic]:
         seen: set[str] = set()
         for name in names:
             singular = {"properties": "property"}.get(kind, kind[:-1])
-            if not name or _FORBIDDEN_IN_NAMES & set(name) or name in {"and", "or", "not", "->"}:
+            if (
+                not name
+                or _FORBIDDEN_IN_NAMES & set(name)
+                or not name.isprintable()
+                or name in {"and", "or", "not", "->"}
+            ):
                 yield Diagnostic(
                     "F2012",
                     f"{name!r} is not a name for a {singular}",
@@ -381,7 +386,15 @@ def _completions(net: Net) -> Iterator[Diagnostic]:
             yield Diagnostic(
                 "F2018",
                 f"'{signal.name}' is declared as a sensor, and `until` makes it a completion signal",
-                "a completion is a bit that the driver forms and clears: take it out of `inputs`, or write `if` at the transition",
+                "a completion is a bit that the driver forms and clears: take it out of `inputs`, "
+                "or write `if` at the transition",
+                subject,
+            )
+        elif signal.owner != place.owner:
+            yield Diagnostic(
+                "F2019",
+                f"'{place.name}' and its completion signal '{signal.name}' have different owners",
+                "the controller that sends the command is the one that is told of its completion",
                 subject,
             )
         if place.command is None:
@@ -443,8 +456,10 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
                     "a signal can be a gate: write it under `if` or `unless`",
                     subject,
                 )
-            elif not is_gate or name not in signals:
+            elif not is_gate:
                 yield _unknown("F2002", "place", name, sorted(places), subject)
+            elif name not in signals:
+                yield _unknown("F2002", "place or signal", name, sorted(places | signals), subject)
     seen_gates: set[ExternalGate] = set()
     for gate in transition.external:
         subject = ("transitions", transition.name, "if" if gate.wanted else "unless", gate.signal)
@@ -511,6 +526,13 @@ def _arbiters(net: Net) -> Iterator[Diagnostic]:
 def _properties(net: Net) -> Iterator[Diagnostic]:
     places = {place.name for place in net.places}
     transitions = {transition.name for transition in net.transitions}
+    for name in sorted(CONSTANT_ATOMS & places) if net.properties else ():
+        yield Diagnostic(
+            "F2012",
+            f"the place '{name}' has a name that means something else in the formulas of `properties`",
+            "rename the place",
+            ("places", name),
+        )
     for prop in net.properties:
         if (prop.then is None) == (prop.kind is PropertyKind.LEADS_TO):
             raise ValueError(f"'{prop.name}': exactly `leads_to` has a second formula")

@@ -174,7 +174,7 @@ class _Builder:
             case yaml.AliasEvent():
                 raise self.source.refuse(
                     "F1007",
-                    f"{quoted('*' + event.anchor)} repeats another part of the file",
+                    f"{quoted(f'*{event.anchor}')} repeats another part of the file",
                     "write the part out: an anchor hides that one line changes another",
                     line,
                     column,
@@ -199,7 +199,7 @@ class _Builder:
         if event.anchor is not None:
             raise self.source.refuse(
                 "F1007",
-                f"{quoted('&' + event.anchor)} is an anchor",
+                f"{quoted(f'&{event.anchor}')} is an anchor",
                 "delete it and write the part out where it is used",
                 line,
                 column,
