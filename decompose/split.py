@@ -1,0 +1,197 @@
+"""Splitting a net by ownership: one subnet for each controller, and the coordinator's table.
+
+Participants(t) are the owners of I(t), O(t), the sources of Gp(t) and Gi(t), and the signals of X(t). One participant
+makes a transition local, more make it global: it is cut into *parts*, one for each participant, with those inputs,
+outputs and gates that the participant owns. A participant that owns only a gate has a part that moves no token; it
+votes and locks (O3). Nothing is decided here but names: ownership is in the net, so the cut is a function of it and
+`join` undoes it.
+
+The paper's alternative, parts listed by hand in the coordinator's table, has to be kept equal to the net; here the
+table is derived, and for the paper's own cell the derived table is the published one.
+
+Decided by the coordinator are the global transitions and every local one in the conflict component of a global one
+(O2): two deciders of one conflict would each choose a winner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import count
+
+from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.net import Controller, Net, Transition
+from firable.semantics.arbitration import Arbitration
+
+
+def participants(net: Net, transition: Transition) -> tuple[str, ...]:
+    """The controllers that take part in a transition, in the order of the net; those of unowned things are left out.
+
+    >>> from firable.nets.net import Controller, Net, Place, Transition
+    >>> places = (Place("a.p", "a", marked=True), Place("b.q", "b"))
+    >>> net = Net("n", places, (Transition("t", ("a.p",), ("b.q",)),), controllers=(Controller("a"), Controller("b")))
+    >>> participants(net, net.transition("t"))
+    ('a', 'b')
+    """
+    places = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
+    owners = {net.place(place).owner for place in places}
+    owners |= {net.signal(gate.signal).owner for gate in transition.external}
+    return tuple(controller.name for controller in net.controllers if controller.name in owners)
+
+
+def unowned(net: Net) -> tuple[str, ...]:
+    """The transitions without any participant: no controller would fire them."""
+    return tuple(transition.name for transition in net.transitions if not participants(net, transition))
+
+
+def part_name(controller: int, number: int) -> str:
+    """The name of the part of global transition `number` in the controller at this position of the net.
+
+    >>> part_name(0, 2), part_name(3, 2)
+    ('t0-2', 't3-23')
+    """
+    return f"t{controller}-{number}{controller or ''}"
+
+
+def split(net: Net) -> Decomposition:
+    """Split a net over its controllers.
+
+    Subnets bear the names of their controllers and hold their places, signals and transitions in the order of the net.
+    Arbiters become groups; arbiters and properties stay with the central net. A global transition without a number gets
+    the next free one. Raises `InputError` with every reason: F2011 for a place or signal without an owner, F4001
+    for whatever else cannot be split, F2013 for an arbiter that fits no conflict component.
+    """
+    problems = list(_problems(net))
+    if problems:
+        raise InputError(problems)
+    taking_part = {transition.name: participants(net, transition) for transition in net.transitions}
+    numbers = _numbers(net, [name for name, owners in taking_part.items() if len(owners) > 1])
+    positions = {controller.name: c for c, controller in enumerate(net.controllers)}
+
+    parts: dict[str, tuple[Part, ...]] = {}
+    for name, owners in taking_part.items():
+        if len(owners) == 1:
+            parts[name] = (Part(owners[0], name),)
+        else:
+            parts[name] = tuple(Part(owner, part_name(positions[owner], numbers[name])) for owner in owners)
+    if clashes := list(_clashes(parts)):
+        raise InputError(clashes)
+
+    arbitration = Arbitration.of(net)
+    decided = {name for name, its in parts.items() if len(its) > 1}
+    groups = []
+    for group, members in zip(arbitration.groups, arbitration.conflicts.components, strict=True):
+        names = [net.transitions[t].name for t in members]
+        is_coordinated = any(len(parts[name]) > 1 for name in names)
+        if is_coordinated:
+            decided.update(names)
+        groups.append(
+            ArbitrationGroup(
+                group.name,
+                tuple(net.transitions[t].name for t in group.sequence),
+                tuple(net.transitions[t].name for t in group.rest),
+                group.by,
+                # Local transitions in conflict share a place, so they are all of its owner.
+                None if is_coordinated else parts[names[0]][0].controller,
+            )
+        )
+    coordinated = tuple(
+        Coordinated(t.name, numbers.get(t.name, t.number), parts[t.name], t.description)
+        for t in net.transitions
+        if t.name in decided
+    )
+    subnets = tuple(_subnet(net, controller, parts) for controller in net.controllers)
+    return Decomposition(net, subnets, coordinated, tuple(groups))
+
+
+def _problems(net: Net) -> Iterator[Diagnostic]:
+    """Why the net cannot be split, before any name is given."""
+    for kind, items in (("places", net.places), ("signals", net.signals)):
+        for item in items:
+            if item.owner is None:
+                yield Diagnostic(
+                    "F2011",
+                    f"'{item.name}' has no owner, so no controller would keep it",
+                    "nest it under one of the `controllers`",
+                    (kind, item.name),
+                )
+    for name in unowned(net):
+        transition = net.transition(name)
+        if (
+            transition.inputs
+            or transition.outputs
+            or transition.permissive
+            or transition.inhibitive
+            or transition.external
+        ):
+            continue  # what it is joined to has no owner, which is already said
+        yield Diagnostic(
+            "F4001",
+            f"'{name}' has no place and no gate, so it belongs to no controller",
+            "give it an arc or a gate, or delete it",
+            ("transitions", name),
+        )
+    for transition in net.transitions:
+        if transition.number is not None and transition.number < 0:
+            yield Diagnostic(
+                "F4001",
+                f"'{transition.name}' has the negative number {transition.number}",
+                "number the rows of the coordinator table from 1",
+                ("transitions", transition.name, "number"),
+            )
+
+
+def _numbers(net: Net, names: Sequence[str]) -> dict[str, int]:
+    """The number of each of these transitions: its own, or the next that no transition of the net bears."""
+    taken = {transition.number for transition in net.transitions if transition.number is not None}
+    free = (number for number in count(1) if number not in taken)
+    numbers = {}
+    for name in names:
+        number = net.transition(name).number
+        numbers[name] = next(free) if number is None else number
+    return numbers
+
+
+def _clashes(parts: dict[str, tuple[Part, ...]]) -> Iterator[Diagnostic]:
+    """Local transitions that bear the name of a part; a place cannot, for the name of an owned one has a dot."""
+    made = {part.name: name for name, its in parts.items() if len(its) > 1 for part in its}
+    for name, its in parts.items():
+        if len(its) == 1 and name in made:
+            yield Diagnostic(
+                "F4001",
+                f"'{name}' is also the name of a part of '{made[name]}'",
+                "rename it: names such as t1-21 are made from the numbers of the global transitions",
+                ("transitions", name),
+            )
+
+
+def _subnet(net: Net, controller: Controller, parts: dict[str, tuple[Part, ...]]) -> Net:
+    owner = controller.name
+    places = {place.name for place in net.places if place.owner == owner}
+    signals = {signal.name for signal in net.signals if signal.owner == owner}
+    names = {name: part.name for name, its in parts.items() for part in its if part.controller == owner}
+
+    def own(names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(name for name in names if name in places)
+
+    return Net(
+        owner,
+        tuple(place for place in net.places if place.name in places),
+        tuple(
+            Transition(
+                names[t.name],
+                own(t.inputs),
+                own(t.outputs),
+                own(t.permissive),
+                own(t.inhibitive),
+                tuple(gate for gate in t.external if gate.signal in signals),
+                t.number if len(parts[t.name]) == 1 else None,
+                t.description,
+            )
+            for t in net.transitions
+            if t.name in names
+        ),
+        tuple(signal for signal in net.signals if signal.name in signals),
+        (controller,),
+        description=controller.description,
+    )

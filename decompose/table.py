@@ -1,0 +1,31 @@
+"""The coordinator table as text, laid out as the paper publishes it.
+
+One row for each global transition: its name, its parts by controller, what it does. The parts alone say which
+controllers must agree, so the table is what an engineer compares with the paper or with the last release.
+"""
+
+from __future__ import annotations
+
+from firable.nets.decomposition import Decomposition
+
+_GAP = 3
+
+
+def table_text(decomposition: Decomposition) -> str:
+    """The coordinator table, a line for each global transition, each with its line end; empty where there is none.
+
+    >>> from firable.decompose.split import split
+    >>> from firable.nets.net import Controller, Net, Place, Transition
+    >>> places = (Place("a.p", "a", marked=True), Place("b.q", "b"))
+    >>> hand_over = Transition("G1", ("a.p",), ("b.q",), number=1, description="hand over")
+    >>> net = Net("n", places, (hand_over,), controllers=(Controller("a"), Controller("b")))
+    >>> print(table_text(split(net)), end="")
+    G1: t0-1, t1-11   hand over
+    """
+    rows = [(row.name, ", ".join(part.name for part in row.parts), row.description) for row in decomposition.table]
+    width_name = max((len(name) for name, _, _ in rows), default=0) + 1
+    width_parts = max((len(parts) for _, parts, _ in rows), default=0) + _GAP
+    return "".join(
+        f"{name + ':':<{width_name}} {parts:<{width_parts}}{description}".rstrip() + "\n"
+        for name, parts, description in rows
+    )

@@ -1,0 +1,167 @@
+"""The split by ownership, the coordinator table, and the join that undoes the split."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from firable.decompose.join import join
+from firable.decompose.split import participants, split, unowned
+from firable.decompose.table import table_text
+from firable.nets.decomposition import Decomposition, Part
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Arbiter, Command, Controller, ExternalGate, Net, Place, Signal, Transition
+
+Nets = Callable[[str], Net]
+
+PUBLISHED = """\
+G1: t0-1, t3-13                 start of carrying in
+G2: t0-2, t1-21, t2-22, t3-23   start of loading from CV1
+G3: t1-71, t3-73                end of grasp on CV1
+G4: t1-81, t2-82                end of putting on MC
+G5: t0-3, t1-31, t2-32          end of loading into MC
+G6: t0-4, t1-41, t2-42, t3-43   start of unloading from MC
+G7: t1-91, t2-92                end of grasp on MC
+G8: t0-5, t1-51, t3-53          end of putting on CV2
+G9: t0-6, t3-63                 end of carrying out
+"""
+
+ALL_NETS = [
+    *("cell1", "cell1_mc_late", "cell1_mc_late_cap", "cell2_separate", "cell2_shared", "conceptual1", "fig2a", "fig2b"),
+    *("fig4_parallel", "local_conflict", "local_gate", "local_output_conflict", "no_trouble", "read_before_order"),
+    *("remote_gate", "ring"),
+]
+
+
+def as_numbered(net: Net, decomposition: Decomposition) -> Net:
+    numbers = {row.name: row.number for row in decomposition.coordinated}
+    return replace(net, transitions=tuple(replace(t, number=numbers.get(t.name, t.number)) for t in net.transitions))
+
+
+def codes(net: Net) -> list[tuple[str, tuple[str, ...]]]:
+    with pytest.raises(InputError) as refusal:
+        split(net)
+    assert all(diagnostic.hint for diagnostic in refusal.value.diagnostics)
+    return [(diagnostic.code, diagnostic.subject) for diagnostic in refusal.value.diagnostics]
+
+
+def test_coordinator_table_of_the_cell_is_the_published_one(reference_net: Nets) -> None:
+    assert table_text(split(reference_net("cell1"))) == PUBLISHED
+
+
+def test_net_without_global_transitions_has_an_empty_table(reference_net: Nets) -> None:
+    assert table_text(split(reference_net("fig4_parallel"))) == ""
+
+
+@pytest.mark.parametrize("name", ALL_NETS)
+def test_join_undoes_the_split(reference_net: Nets, name: str) -> None:
+    net = reference_net(name)
+    decomposition = split(net)
+    assert join(decomposition) == as_numbered(net, decomposition)
+
+
+def test_subnet_holds_what_its_controller_owns_in_the_order_of_the_net(reference_net: Nets) -> None:
+    net = reference_net("cell1")
+    robot = split(net).subnet("c1")
+    assert [place.name for place in robot.places] == [p.name for p in net.places if p.owner == "c1"]
+    assert [t.name for t in robot.transitions] == [
+        *("t1-21", "t1-71", "t1-81", "t1-31", "t1-41", "t1-91", "t1-51"),
+        *("t1-a", "t1-b", "t1-c", "t1-d"),
+    ]
+    part = robot.transition("t1-71")
+    assert (part.inputs, part.outputs) == (("c1.R_grasp_CV1",), ("c1.R_to_MC_full",))
+    assert part.external == (ExternalGate("c1.r.touch"),)
+    assert robot.place("c1.R_put_MC").command == Command("R", "PUT", (("at", "MC"),))
+    assert [controller.name for controller in robot.controllers] == ["c1"]
+
+
+def test_controller_that_owns_only_a_gate_takes_part_without_moving_a_token(reference_net: Nets) -> None:
+    net = reference_net("remote_gate")
+    decomposition = split(net)
+    assert participants(net, net.transition("l")) == ("c1", "c2")
+    assert [row.parts for row in decomposition.table] == [
+        (Part("c1", "t1-11"), Part("c2", "t2-12")),
+        (Part("c1", "t1-21"), Part("c2", "t2-22")),
+    ]
+    voter = decomposition.subnet("c2").transition("t2-12")
+    assert (voter.inputs, voter.outputs, voter.inhibitive) == ((), (), ("c2.y",))
+
+
+def test_signal_owner_takes_part() -> None:
+    net = Net(
+        "n",
+        (Place("a.p", "a", marked=True),),
+        (Transition("t", ("a.p",), external=(ExternalGate("b.s", wanted=False),)),),
+        (Signal("b.s", "b"),),
+        (Controller("a"), Controller("b")),
+    )
+    decomposition = split(net)
+    assert decomposition.table[0].parts == (Part("a", "t0-1"), Part("b", "t1-11"))
+    assert decomposition.subnet("b").transition("t1-11").external == (ExternalGate("b.s", wanted=False),)
+
+
+def test_local_rival_of_a_global_transition_is_decided_by_the_coordinator(reference_net: Nets) -> None:
+    decomposition = split(reference_net("local_conflict"))
+    assert [(row.name, row.is_global, row.parts) for row in decomposition.coordinated] == [
+        ("G", True, (Part("c1", "t1-11"), Part("c2", "t2-12"))),
+        ("l", False, (Part("c1", "l"),)),
+    ]
+    assert [row.name for row in decomposition.table] == ["G"]
+    (group,) = decomposition.groups
+    assert (group.sequence, group.rest, group.controller) == ((), ("G", "l"), None)
+
+
+def test_conflict_among_local_transitions_is_decided_by_their_controller() -> None:
+    net = Net(
+        "n",
+        (Place("a.p", "a", marked=True), Place("a.x", "a"), Place("a.y", "a")),
+        (Transition("t", ("a.p",), ("a.x",)), Transition("u", ("a.p",), ("a.y",))),
+        controllers=(Controller("a"), Controller("b")),
+        arbiters=(Arbiter("next", ("u", "t")),),
+    )
+    decomposition = split(net)
+    assert decomposition.coordinated == ()
+    (group,) = decomposition.groups
+    assert (group.name, group.sequence, group.rest, group.controller) == ("next", ("u", "t"), (), "a")
+    assert decomposition.subnet("b").transitions == ()
+
+
+def test_unnumbered_global_transitions_get_the_next_free_numbers_in_order() -> None:
+    def across(name: str, number: int | None) -> Transition:
+        return Transition(name, (f"a.{name}",), (f"b.{name}",), number=number)
+
+    names = {"g": None, "h": 1, "i": None, "j": 3, "k": None}
+    places = tuple(Place(f"{owner}.{name}", owner) for name in names for owner in ("a", "b"))
+    local = Transition("l", ("a.g",), number=2)
+    net = Net("n", places, (*map(across, names, names.values()), local), (), (Controller("a"), Controller("b")))
+    decomposition = split(net)
+    assert [(row.name, row.number) for row in decomposition.table] == [("g", 4), ("h", 1), ("i", 5), ("j", 3), ("k", 6)]
+    assert decomposition.table[0].parts == (Part("a", "t0-4"), Part("b", "t1-41"))
+
+
+def test_everything_without_an_owner_is_reported_at_once() -> None:
+    net = Net("n", (Place("p"),), (Transition("t", ("p",)), Transition("u")), (Signal("s"),))
+    assert unowned(net) == ("t", "u")
+    assert codes(net) == [
+        ("F2011", ("places", "p")),
+        ("F2011", ("signals", "s")),
+        ("F4001", ("transitions", "u")),
+    ]
+
+
+def test_local_transition_with_the_name_of_a_part_is_refused() -> None:
+    places = (Place("a.p", "a", marked=True), Place("b.q", "b"))
+    crossing = Transition("G", ("a.p",), ("b.q",))
+    controllers = (Controller("a"), Controller("b"))
+    named = Net("n", places, (crossing, Transition("t1-11", ("b.q",))), controllers=controllers)
+    assert codes(named) == [("F4001", ("transitions", "t1-11"))]
+    # The name of the whole is not kept in the subnets, so a global transition may bear it.
+    whole = Net("n", places, (replace(crossing, name="t1-11"),), controllers=controllers)
+    assert split(whole).table[0].parts[1] == Part("b", "t1-11")
+
+
+def test_negative_number_is_refused() -> None:
+    places = (Place("a.p", "a", marked=True), Place("b.q", "b"))
+    crossing = Transition("G", ("a.p",), ("b.q",), number=-1)
+    net = Net("n", places, (crossing,), controllers=(Controller("a"), Controller("b")))
+    assert codes(net) == [("F4001", ("transitions", "G", "number"))]
