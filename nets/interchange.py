@@ -1,0 +1,270 @@
+"""A net as JSON, for programs: the form in which bundles carry nets, and over which a net is hashed.
+
+Canonical (one net has one JSON text), complete (every field of `Net`, also empty ones) and strict (an unknown or
+missing key is refused): what a bundle's hash covers must be all that the executor acts on. The executor reads this
+form and so needs no YAML, no positions and none of the conveniences of the text format. Formulas are text in the
+grammar of `formula`, which keeps the form free of a second syntax.
+
+Rejected: pickling the dataclasses (runs code on reading) and hashing the YAML text (a comment would void a proof).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.formula import Formula, FormulaError, format_formula, parse_formula
+from firable.nets.net import (
+    Arbiter,
+    ArbitrationRule,
+    Command,
+    Controller,
+    ExternalGate,
+    Fairness,
+    Net,
+    Place,
+    Property,
+    PropertyKind,
+    Signal,
+    SignalKind,
+    Transition,
+)
+
+FORMAT: Final = "firable-net/1"
+
+
+def net_to_json(net: Net) -> dict[str, Any]:
+    """The net as JSON values.
+
+    >>> net_to_json(Net("empty"))["places"]
+    []
+    """
+    return {
+        "format": FORMAT,
+        "name": net.name,
+        "description": net.description,
+        "controllers": [
+            {"name": c.name, "coordinator": c.coordinator, "description": c.description} for c in net.controllers
+        ],
+        "places": [
+            {
+                "name": place.name,
+                "owner": place.owner,
+                "marked": place.marked,
+                "command": None
+                if place.command is None
+                else {
+                    "machine": place.command.machine,
+                    "command": place.command.command,
+                    "parameters": [list(pair) for pair in place.command.parameters],
+                },
+                "completion": place.completion,
+                "description": place.description,
+            }
+            for place in net.places
+        ],
+        "signals": [{"name": s.name, "owner": s.owner, "kind": str(s.kind)} for s in net.signals],
+        "transitions": [
+            {
+                "name": t.name,
+                "inputs": list(t.inputs),
+                "outputs": list(t.outputs),
+                "permissive": list(t.permissive),
+                "inhibitive": list(t.inhibitive),
+                "external": [{"signal": gate.signal, "wanted": gate.wanted} for gate in t.external],
+                "number": t.number,
+                "description": t.description,
+            }
+            for t in net.transitions
+        ],
+        "arbiters": [{"name": a.name, "among": list(a.among), "by": str(a.by)} for a in net.arbiters],
+        "properties": [
+            {
+                "name": p.name,
+                "kind": str(p.kind),
+                "formula": format_formula(p.formula),
+                "then": None if p.then is None else format_formula(p.then),
+                "fairness": str(p.fairness),
+            }
+            for p in net.properties
+        ],
+    }
+
+
+def net_from_json(data: Mapping[str, Any]) -> Net:
+    """The net that `net_to_json` wrote.
+
+    Raises `InputError`: F1015 where the values have not exactly the form of `net_to_json`, F1012 for a formula, and
+    the codes of `Net`.
+    """
+    try:
+        record = _NetRecord.model_validate(data)
+    except ValidationError as error:
+        raise InputError(
+            Diagnostic(
+                "F1015",
+                f"not a net in JSON: {'.'.join(str(step) for step in one['loc']) or 'the whole'}: {one['msg']}",
+                f"the form is that of `net_to_json`, {FORMAT}",
+            )
+            for one in error.errors(include_url=False, include_input=False)[:20]
+        ) from None
+    parts = (
+        record.name,
+        tuple(
+            Place(
+                p.name,
+                p.owner,
+                p.marked,
+                Command(p.command.machine, p.command.command, tuple(p.command.parameters)) if p.command else None,
+                p.completion,
+                p.description,
+            )
+            for p in record.places
+        ),
+        tuple(
+            Transition(
+                t.name,
+                tuple(t.inputs),
+                tuple(t.outputs),
+                tuple(t.permissive),
+                tuple(t.inhibitive),
+                tuple(ExternalGate(gate.signal, gate.wanted) for gate in t.external),
+                t.number,
+                t.description,
+            )
+            for t in record.transitions
+        ),
+        tuple(Signal(s.name, s.owner, SignalKind(s.kind)) for s in record.signals),
+        tuple(Controller(c.name, c.coordinator, c.description) for c in record.controllers),
+        tuple(Arbiter(a.name, tuple(a.among), ArbitrationRule(a.by)) for a in record.arbiters),
+        tuple(_property(p) for p in record.properties),
+        record.description,
+    )
+    try:
+        return Net(*parts)
+    except ValueError as error:  # a contradiction that no text can express, such as a completion that gates nothing
+        raise InputError([Diagnostic("F1015", f"not a net in JSON: {error}", "take it from `net_to_json`")]) from None
+
+
+def canonical_json(value: Any) -> bytes:
+    """The one JSON text of these values: sorted keys, no blanks, ASCII.
+
+    >>> canonical_json({"b": 1, "a": "ü"})
+    b'{"a":"\\\\u00fc","b":1}'
+    """
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False).encode("ascii")
+
+
+def net_digest(net: Net) -> str:
+    """The SHA-256 of the net's canonical JSON without descriptions, in hexadecimal.
+
+    A corrected description voids no proof; the order of places, transitions and arcs does count.
+    """
+    return hashlib.sha256(canonical_json(_without_descriptions(net_to_json(net)))).hexdigest()
+
+
+def _without_descriptions(data: dict[str, Any]) -> dict[str, Any]:
+    return {
+        key: [{k: v for k, v in item.items() if k != "description"} for item in value]
+        if isinstance(value, list)
+        else value
+        for key, value in data.items()
+        if key != "description"
+    }
+
+
+def _property(record: _PropertyRecord) -> Property:
+    if (record.then is None) == (record.kind == "leads_to"):
+        raise InputError(
+            [Diagnostic("F1015", f"the property '{record.name}' wants 'then' exactly where it is a leads_to", "")]
+        )
+    formula = _formula(record.name, record.formula)
+    then = None if record.then is None else _formula(record.name, record.then)
+    return Property(record.name, PropertyKind(record.kind), formula, then, Fairness(record.fairness))
+
+
+def _formula(name: str, text: str) -> Formula:
+    try:
+        return parse_formula(text)
+    except FormulaError as error:
+        raise InputError(
+            [Diagnostic("F1012", f"the property '{name}' is not a formula: {error.message}", "", ("properties", name))]
+        ) from None
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class _ControllerRecord(_Record):
+    name: str
+    coordinator: bool
+    description: str
+
+
+class _CommandRecord(_Record):
+    machine: str
+    command: str
+    parameters: list[Annotated[tuple[str, str], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v)]]
+
+
+class _PlaceRecord(_Record):
+    name: str
+    owner: str | None
+    marked: bool
+    command: _CommandRecord | None
+    completion: str | None
+    description: str
+
+
+class _SignalRecord(_Record):
+    name: str
+    owner: str | None
+    kind: Literal["completion", "sensor"]
+
+
+class _GateRecord(_Record):
+    signal: str
+    wanted: bool
+
+
+class _TransitionRecord(_Record):
+    name: str
+    inputs: list[str]
+    outputs: list[str]
+    permissive: list[str]
+    inhibitive: list[str]
+    external: list[_GateRecord]
+    number: int | None
+    description: str
+
+
+class _ArbiterRecord(_Record):
+    name: str
+    among: list[str]
+    by: Literal["priority", "order", "rotation"]
+
+
+class _PropertyRecord(_Record):
+    name: str
+    kind: Literal["never", "always", "reachable", "leads_to", "always_possible"]
+    formula: str
+    then: str | None
+    fairness: Literal["none", "weak", "strong"]
+
+
+class _NetRecord(_Record):
+    format: Literal["firable-net/1"]
+    name: str
+    description: str
+    controllers: list[_ControllerRecord]
+    places: list[_PlaceRecord]
+    signals: list[_SignalRecord]
+    transitions: list[_TransitionRecord]
+    arbiters: list[_ArbiterRecord]
+    properties: list[_PropertyRecord]
