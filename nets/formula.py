@@ -150,7 +150,7 @@ class _Parser:
         """Count nesting: what walks over a formula calls itself for each level, so levels are bounded here."""
         self.depth += levels
         if self.depth > NESTING_MAX:
-            raise FormulaError(f"more than {NESTING_MAX} levels of brackets, 'not' and '->'", self.column())
+            raise FormulaError(f"nests too deeply, more than {NESTING_MAX} levels", self.column())
 
     def implication(self) -> Formula:
         left = self.disjunction()

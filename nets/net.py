@@ -390,13 +390,6 @@ def _completions(net: Net) -> Iterator[Diagnostic]:
                 "or write `if` at the transition",
                 subject,
             )
-        elif signal.owner != place.owner:
-            yield Diagnostic(
-                "F2019",
-                f"'{place.name}' and its completion signal '{signal.name}' have different owners",
-                "the controller that sends the command is the one that is told of its completion",
-                subject,
-            )
         if place.command is None:
             yield Diagnostic(
                 "F2014",
