@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-_DIGITS: Final = re.compile(r"0|[1-9][0-9]{0,8}")
+_DIGITS: Final = re.compile(r"0|-?[1-9][0-9]{0,17}")
 
 
 def _as_list(value: object) -> object:
@@ -148,7 +148,7 @@ class NetDocument(_Document):
     firable: Annotated[Literal[1], BeforeValidator(_as_integer, json_schema_input_type=Literal[1])] = Field(
         description="The version of the format."
     )
-    cell: Name = Field(description="The name of the net.")
+    cell: Text = Field(description="The name of the net.")
     description: Text = ""
     controllers: dict[Name, ControllerDocument | None] | None = None
     start: Names = Field(default=[], description="The places without an owner that hold a token at first.")

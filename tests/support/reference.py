@@ -78,7 +78,7 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
                 problems.append(
                     Diagnostic(
                         "F2010",
-                        f"a gate of '{name}' has the place '{gate['src']}' and the signal '{gate['ext']}' as its source",
+                        f"a gate of '{name}' has two sources, '{gate['src']}' and '{gate['ext']}'",
                         "write two gates",
                         ("transitions", name),
                     )

@@ -1,0 +1,244 @@
+"""Printing a net as a net file.
+
+The printed text is read back before it is handed out, and must give the same net: so nothing is dropped in silence, and
+what the file format has no words for (a self-loop, a completion signal that no place waits for) is an error with a
+code. The order of a file groups places and signals by their controller; `in_file_order` is that normal form, and a
+net that was read from a file has it already.
+
+Quoting is generous: a word that any YAML reader could take for a number, a Boolean or null is put in double quotes.
+The alternative, `yaml.dump`, prints neither short entries on one line nor aligned with what an engineer would write.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import Final
+
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.formula import format_formula
+from firable.nets.net import (
+    Command,
+    ExternalGate,
+    Fairness,
+    Net,
+    Place,
+    Property,
+    PropertyKind,
+    Signal,
+    SignalKind,
+    Transition,
+)
+from firable.nets.text import parse_net
+from firable.nets.yaml_tree import is_ambiguous
+
+WIDTH_CHARACTERS: Final = 120
+
+_PLAIN: Final = re.compile(r"[A-Za-z_][\w.()>-]*(?: [\w.()>-]+)*", re.ASCII)
+_ESCAPES: Final = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+
+
+def format_net(net: Net) -> str:
+    """Print a net so that `parse_net` reads `in_file_order(net)` back.
+
+    Raises `InputError`: F2009 for a self-loop and F2020 for anything else that the format cannot say.
+
+    >>> from firable.nets.net import Place, Transition
+    >>> print(format_net(Net("demo", (Place("p", marked=True), Place("q")), (Transition("t", ("p",), ("q",)),))))
+    firable: 1
+    cell: demo
+    <BLANKLINE>
+    start: p
+    places:
+      p:
+      q:
+    <BLANKLINE>
+    transitions:
+      t: {from: p, to: q}
+    <BLANKLINE>
+    """
+    text = "\n".join(_lines(net)) + "\n"
+    try:
+        back = parse_net(text, net.name)
+    except InputError as error:
+        if loops := [replace(problem, span=None) for problem in error.diagnostics if problem.code == "F2009"]:
+            raise InputError(loops) from None
+        raise _cannot_say(f"it would be refused: {error.diagnostics[0].message}") from None
+    if back != in_file_order(net) or back.description != net.description:
+        raise _cannot_say("it would be read as another net")
+    return text
+
+
+def _cannot_say(reason: str) -> InputError:
+    hint = "only what the format of the net file has keys for can be printed"
+    return InputError([Diagnostic("F2020", f"the net cannot be written as a net file: {reason}", hint)])
+
+
+def in_file_order(net: Net) -> Net:
+    """The same net with places and signals grouped by controller, and external gates as a file implies them.
+
+    Only the order of the indexes changes.
+    """
+    owners = [*(controller.name for controller in net.controllers), None]
+    return replace(
+        net,
+        places=tuple(place for owner in owners for place in net.places if place.owner == owner),
+        signals=tuple(signal for owner in owners for signal in _signals_in_order(net, owner)),
+        transitions=tuple(_gates_in_order(net, transition) for transition in net.transitions),
+    )
+
+
+def _signals_in_order(net: Net, owner: str | None) -> Iterator[Signal]:
+    own = [signal for signal in net.signals if signal.owner == owner]
+    yield from (signal for signal in own if signal.kind is SignalKind.SENSOR)
+    first: dict[str, int] = {}
+    for place in net.places:
+        if place.owner == owner and place.completion:
+            first.setdefault(place.completion, len(first))
+    completions = (signal for signal in own if signal.kind is SignalKind.COMPLETION)
+    yield from sorted(completions, key=lambda signal: first.get(signal.name, len(first)))
+
+
+def _gates_in_order(net: Net, transition: Transition) -> Transition:
+    implied = _implied(net, transition)
+    rest = [gate for gate in transition.external if gate not in implied]
+    return replace(
+        transition,
+        external=(*implied, *sorted(rest, key=lambda gate: not gate.wanted)),
+    )
+
+
+def _implied(net: Net, transition: Transition) -> dict[ExternalGate, None]:
+    """The gates that `until` puts on the transition, in the order of its inputs."""
+    completions = (net.place(name).completion for name in transition.inputs)
+    return dict.fromkeys(ExternalGate(signal) for signal in completions if signal is not None)
+
+
+def _lines(net: Net) -> Iterator[str]:
+    yield "firable: 1"
+    yield f"cell: {_text(net.name)}"
+    if net.description:
+        yield f"description: {_text(net.description)}"
+    places: dict[str | None, list[Place]] = {}
+    for place in net.places:
+        places.setdefault(place.owner, []).append(place)
+    inputs: dict[str | None, list[Signal]] = {}
+    for signal in net.signals:
+        if signal.kind is SignalKind.SENSOR:
+            inputs.setdefault(signal.owner, []).append(signal)
+    if net.controllers:
+        yield ""
+        yield "controllers:"
+    for controller in net.controllers:
+        name = controller.name
+        yield f"  {_text(name)}:"
+        if controller.coordinator:
+            yield "    coordinator: true"
+        if controller.description:
+            yield f"    description: {_text(controller.description)}"
+        yield from _scope(places.get(name, []), inputs.get(name, []), f"{name}.", "    ")
+    if unowned := list(_scope(places.get(None, []), inputs.get(None, []), "", "")):
+        yield ""
+        yield from unowned
+    yield from _table("transitions", ((t.name, _transition(net, t)) for t in net.transitions))
+    yield from _table(
+        "arbiters",
+        ((a.name, [("among", _list(a.among)), ("by", str(a.by))]) for a in net.arbiters),
+    )
+    yield from _table("properties", ((p.name, _property(p)) for p in net.properties))
+
+
+def _scope(places: list[Place], inputs: list[Signal], prefix: str, indent: str) -> Iterator[str]:
+    local: Callable[[str], str] = lambda name: name.removeprefix(prefix)  # noqa: E731
+    if marked := [local(place.name) for place in places if place.marked]:
+        yield f"{indent}start: {_names(marked)}"
+    if inputs:
+        yield f"{indent}inputs: {_names([local(signal.name) for signal in inputs])}"
+    if places:
+        yield f"{indent}places:"
+    for place in places:
+        entries: list[tuple[str, str]] = []
+        if place.command:
+            entries.append(("send", _command(place.command)))
+        if place.completion:
+            entries.append(("until", _text(local(place.completion))))
+        if place.description:
+            entries.append(("description", _text(place.description)))
+        yield from _entry(local(place.name), entries, indent + "  ")
+
+
+def _command(command: Command) -> str:
+    pairs = (("machine", command.machine), ("command", command.command), *command.parameters)
+    return _flow((_text(key), _text(value)) for key, value in pairs)
+
+
+def _transition(net: Net, transition: Transition) -> list[tuple[str, str]]:
+    implied = _implied(net, transition)
+    gates = [gate for gate in transition.external if gate not in implied]
+    opening = [*transition.permissive, *(gate.signal for gate in gates if gate.wanted)]
+    closing = [*transition.inhibitive, *(gate.signal for gate in gates if not gate.wanted)]
+    names = (("from", transition.inputs), ("to", transition.outputs), ("if", opening), ("unless", closing))
+    return [
+        *([] if transition.number is None else [("number", str(transition.number))]),
+        *([("description", _text(transition.description))] if transition.description else []),
+        *((key, _names(list(of))) for key, of in names if of),
+    ]
+
+
+def _property(prop: Property) -> list[tuple[str, str]]:
+    if prop.kind is not PropertyKind.LEADS_TO or prop.then is None:
+        return [(str(prop.kind), _text(format_formula(prop.formula)))]
+    source, target = _text(format_formula(prop.formula)), _text(format_formula(prop.then))
+    if prop.fairness is Fairness.WEAK:
+        return [("leads_to", f"[{source}, {target}]")]
+    return [("leads_to", _flow((("from", source), ("to", target), ("fairness", str(prop.fairness)))))]
+
+
+def _table(key: str, rows: Iterable[tuple[str, list[tuple[str, str]]]]) -> Iterator[str]:
+    lines = [line for name, entries in rows for line in _entry(name, entries, "  ")]
+    if lines:
+        yield ""
+        yield f"{key}:"
+        yield from lines
+
+
+def _entry(name: str, entries: list[tuple[str, str]], indent: str) -> Iterator[str]:
+    """One named entry, on one line if it is short enough."""
+    head = f"{indent}{_text(name)}:"
+    line = f"{head} {_flow(entries)}"
+    if not entries:
+        yield head
+    elif len(line) <= WIDTH_CHARACTERS:
+        yield line
+    else:
+        yield head
+        yield from (f"{indent}  {key}: {value}" for key, value in entries)
+
+
+def _flow(entries: Iterable[tuple[str, str]]) -> str:
+    return f"{{{', '.join(f'{key}: {value}' for key, value in entries)}}}"
+
+
+def _names(names: list[str]) -> str:
+    return _text(names[0]) if len(names) == 1 else _list(names)
+
+
+def _list(names: Iterable[str]) -> str:
+    return f"[{', '.join(map(_text, names))}]"
+
+
+def _text(text: str) -> str:
+    """A scalar that every YAML reader takes for this text."""
+    if _PLAIN.fullmatch(text) and not is_ambiguous(text):
+        return text
+    return '"' + "".join(_escaped(character) for character in text) + '"'
+
+
+def _escaped(character: str) -> str:
+    if character in _ESCAPES:
+        return _ESCAPES[character]
+    if character.isprintable():
+        return character
+    code = ord(character)
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
