@@ -131,6 +131,17 @@ def _problems(net: Net) -> Iterator[Diagnostic]:
             "give it an arc or a gate, or delete it",
             ("transitions", name),
         )
+    for place in net.places:
+        if place.completion is None or place.owner is None:
+            continue
+        owner = net.signal(place.completion).owner
+        if owner not in {place.owner, None}:
+            yield Diagnostic(
+                "F4001",
+                f"'{place.name}' of '{place.owner}' waits until '{place.completion}', which '{owner}' owns",
+                "the controller that sends a command is the one that is told of its completion",
+                ("places", place.name, "until"),
+            )
     for transition in net.transitions:
         if transition.number is not None and transition.number < 0:
             yield Diagnostic(

@@ -44,6 +44,7 @@ CODES: Final[dict[str, str]] = {
     "F1014": "PNML that this toolkit cannot represent",
     "F1015": "not valid JSON",
     "F1016": "not carried over by the conversion",
+    "F1017": "the file cannot be written",
     # F2: the net
     "F2001": "duplicate name",
     "F2002": "unknown place",

@@ -1,18 +1,16 @@
 """The split by ownership, the coordinator table, and the join that undoes the split."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from support.reference import load_net
 
 from firable.decompose.join import join
 from firable.decompose.split import participants, split, unowned
 from firable.decompose.table import table_text
 from firable.nets.decomposition import Decomposition, Part
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Arbiter, Command, Controller, ExternalGate, Net, Place, Signal, Transition
-
-Nets = Callable[[str], Net]
+from firable.nets.net import Arbiter, Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 
 PUBLISHED = """\
 G1: t0-1, t3-13                 start of carrying in
@@ -45,23 +43,23 @@ def codes(net: Net) -> list[tuple[str, tuple[str, ...]]]:
     return [(diagnostic.code, diagnostic.subject) for diagnostic in refusal.value.diagnostics]
 
 
-def test_coordinator_table_of_the_cell_is_the_published_one(reference_net: Nets) -> None:
-    assert table_text(split(reference_net("cell1"))) == PUBLISHED
+def test_coordinator_table_of_the_cell_is_the_published_one() -> None:
+    assert table_text(split(load_net("cell1"))) == PUBLISHED
 
 
-def test_net_without_global_transitions_has_an_empty_table(reference_net: Nets) -> None:
-    assert table_text(split(reference_net("fig4_parallel"))) == ""
+def test_net_without_global_transitions_has_an_empty_table() -> None:
+    assert table_text(split(load_net("fig4_parallel"))) == ""
 
 
 @pytest.mark.parametrize("name", ALL_NETS)
-def test_join_undoes_the_split(reference_net: Nets, name: str) -> None:
-    net = reference_net(name)
+def test_join_undoes_the_split(name: str) -> None:
+    net = load_net(name)
     decomposition = split(net)
     assert join(decomposition) == as_numbered(net, decomposition)
 
 
-def test_subnet_holds_what_its_controller_owns_in_the_order_of_the_net(reference_net: Nets) -> None:
-    net = reference_net("cell1")
+def test_subnet_holds_what_its_controller_owns_in_the_order_of_the_net() -> None:
+    net = load_net("cell1")
     robot = split(net).subnet("c1")
     assert [place.name for place in robot.places] == [p.name for p in net.places if p.owner == "c1"]
     assert [t.name for t in robot.transitions] == [
@@ -75,15 +73,15 @@ def test_subnet_holds_what_its_controller_owns_in_the_order_of_the_net(reference
     assert [controller.name for controller in robot.controllers] == ["c1"]
 
 
-def test_controller_that_owns_only_a_gate_takes_part_without_moving_a_token(reference_net: Nets) -> None:
-    net = reference_net("remote_gate")
+def test_controller_that_owns_only_a_gate_takes_part_without_moving_a_token() -> None:
+    net = load_net("remote_gate")
     decomposition = split(net)
     assert participants(net, net.transition("l")) == ("c1", "c2")
     assert [row.parts for row in decomposition.table] == [
-        (Part("c1", "t1-11"), Part("c2", "t2-12")),
-        (Part("c1", "t1-21"), Part("c2", "t2-22")),
+        (Part("c1", "t0-1"), Part("c2", "t1-11")),
+        (Part("c1", "t0-2"), Part("c2", "t1-21")),
     ]
-    voter = decomposition.subnet("c2").transition("t2-12")
+    voter = decomposition.subnet("c2").transition("t1-11")
     assert (voter.inputs, voter.outputs, voter.inhibitive) == ((), (), ("c2.y",))
 
 
@@ -100,10 +98,10 @@ def test_signal_owner_takes_part() -> None:
     assert decomposition.subnet("b").transition("t1-11").external == (ExternalGate("b.s", wanted=False),)
 
 
-def test_local_rival_of_a_global_transition_is_decided_by_the_coordinator(reference_net: Nets) -> None:
-    decomposition = split(reference_net("local_conflict"))
+def test_local_rival_of_a_global_transition_is_decided_by_the_coordinator() -> None:
+    decomposition = split(load_net("local_conflict"))
     assert [(row.name, row.is_global, row.parts) for row in decomposition.coordinated] == [
-        ("G", True, (Part("c1", "t1-11"), Part("c2", "t2-12"))),
+        ("G", True, (Part("c1", "t0-1"), Part("c2", "t1-11"))),
         ("l", False, (Part("c1", "l"),)),
     ]
     assert [row.name for row in decomposition.table] == ["G"]
@@ -158,6 +156,17 @@ def test_local_transition_with_the_name_of_a_part_is_refused() -> None:
     # The name of the whole is not kept in the subnets, so a global transition may bear it.
     whole = Net("n", places, (replace(crossing, name="t1-11"),), controllers=controllers)
     assert split(whole).table[0].parts[1] == Part("b", "t1-11")
+
+
+def test_completion_signal_of_another_controller_is_refused() -> None:
+    net = Net(
+        "n",
+        (Place("a.p", "a", command=Command("M", "GO"), completion="b.done"),),
+        (Transition("t", ("a.p",), external=(ExternalGate("b.done"),)),),
+        (Signal("b.done", "b", SignalKind.COMPLETION),),
+        (Controller("a"), Controller("b")),
+    )
+    assert codes(net) == [("F4001", ("places", "a.p", "until"))]
 
 
 def test_negative_number_is_refused() -> None:

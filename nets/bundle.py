@@ -1,0 +1,298 @@
+"""The bundle: one file with a net, its subnets and coordinator table, the verdicts on them, and their evidence.
+
+A bundle is what runs on hardware, so it has to carry its right to run. `manifest.json` holds the SHA-256 of every
+other file and a digest over itself; `verdicts.json` names the digests of exactly the net, subnets and table that were
+judged, so that verdicts cannot be kept while a subnet is exchanged. What a bundle *must* prove is not read from the
+verdicts but derived from the net (`unproved`).
+
+Reading rebuilds everything from its content, writes it again and compares: there is one spelling of a bundle, and a
+change of any byte is refused. That finds damage and edits by hand; it is no signature, since whoever can write a
+bundle can write its hashes. Pickle, or a folder of loose files, were rejected: the one runs code, the other is copied
+in part.
+
+The file is written beside its place and renamed into it, so that it is there whole or not at all.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import stat
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, NoReturn
+from urllib.parse import quote
+
+from firable.nets.archive import ArchiveError, pack, unpack
+from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
+from firable.nets.diagnostics import Diagnostic, InputError, Span
+from firable.nets.interchange import canonical_json, net_from_json, net_to_json
+from firable.nets.net import ArbitrationRule, Net
+from firable.nets.source import printable
+from firable.nets.verdict import Verdict
+
+VERSION: Final = 1
+SIZE_BYTES_MAX: Final = 256 * 1024 * 1024
+_HINT: Final = "make the bundle anew with `firable bundle`"
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A decomposition, the verdicts on it, and the text of each file of evidence by its name."""
+
+    decomposition: Decomposition
+    verdicts: tuple[Verdict, ...]
+    evidence: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def net(self) -> Net:
+        """The central net."""
+        return self.decomposition.net
+
+    @cached_property
+    def members(self) -> Mapping[str, bytes]:
+        """The files of the bundle by name, but for the manifest."""
+        judged = {
+            "net.json": canonical_json(net_to_json(self.net)),
+            "table.json": canonical_json(_table(self.decomposition)),
+            **{
+                f"subnets/{file_stem(subnet.name)}.json": canonical_json(net_to_json(subnet))
+                for subnet in self.decomposition.subnets
+            },
+        }
+        verdicts = {
+            "of": {name: _sha256(data) for name, data in sorted(judged.items())},
+            "verdicts": [verdict.to_json() for verdict in self.verdicts],
+        }
+        evidence = {f"evidence/{name}": text.encode() for name, text in self.evidence.items()}
+        return {**judged, "verdicts.json": canonical_json(verdicts), **evidence}
+
+    @cached_property
+    def digest(self) -> str:
+        """The SHA-256 over the names and hashes of all files: the identity of the bundle."""
+        return _sha256(canonical_json(self._manifest))
+
+    @property
+    def _manifest(self) -> dict[str, Any]:
+        hashes = {name: _sha256(data) for name, data in sorted(self.members.items())}
+        return {"firable_bundle": VERSION, "cell": self.net.name, "members": hashes}
+
+    def to_bytes(self) -> bytes:
+        """The bundle as the bytes of its file; raises `InputError` F4003 where it is too large for one."""
+        manifest = canonical_json({**self._manifest, "digest": self.digest})
+        try:
+            archive = pack({**self.members, "manifest.json": manifest})
+        except ArchiveError as error:
+            raise InputError([Diagnostic("F4003", str(error), "split the cell into smaller ones")]) from None
+        if len(archive) > SIZE_BYTES_MAX:
+            message = f"the bundle has {len(archive):,} bytes, more than may be read ({SIZE_BYTES_MAX:,})"
+            raise InputError([Diagnostic("F4003", message, "split the cell into smaller ones")])
+        return archive
+
+    @classmethod
+    def from_bytes(cls, archive: bytes, file: str = "<bundle>") -> Bundle:
+        """Read a bundle back; raises `InputError` F5001 for any bytes that `to_bytes` does not make."""
+        try:
+            bundle = _bundle(unpack(archive))
+        except _DamageError as damage:
+            _refuse(file, str(damage))
+        except ArchiveError as error:
+            _refuse(file, str(error))
+        except (InputError, KeyError, TypeError, ValueError, AttributeError, RecursionError):
+            _refuse(file, "its content is not that of a bundle")
+        if bundle.to_bytes() != archive:
+            _refuse(file, "its content is not as it was written")
+        return bundle
+
+
+class _DamageError(Exception):
+    """The members are not those of a bundle, and why."""
+
+
+def file_stem(name: str) -> str:
+    """A name of the net as part of a file name, which no `/` or `..` in it can lead elsewhere.
+
+    >>> file_stem("robot/1"), file_stem("..")
+    ('robot%2F1', '%2E%2E')
+    """
+    spelled = quote(name, safe="")
+    return spelled.replace(".", "%2E") if not spelled.strip(".") else spelled
+
+
+def _sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def _table(decomposition: Decomposition) -> dict[str, Any]:
+    return {
+        "coordinated": [
+            {
+                "name": row.name,
+                "number": row.number,
+                "parts": [[part.controller, part.name] for part in row.parts],
+                "description": row.description,
+            }
+            for row in decomposition.coordinated
+        ],
+        "groups": [
+            {
+                "name": group.name,
+                "sequence": list(group.sequence),
+                "rest": list(group.rest),
+                "by": group.by.value,
+                "controller": group.controller,
+            }
+            for group in decomposition.groups
+        ],
+    }
+
+
+def _bundle(members: Mapping[str, bytes]) -> Bundle:
+    """The bundle that the members hold, once all their hashes agree."""
+    files = {name: data for name, data in members.items() if name != "manifest.json"}
+    if "manifest.json" not in members:
+        raise _DamageError("it has no manifest")
+    manifest = json.loads(members["manifest.json"])
+    if manifest["firable_bundle"] != VERSION:
+        raise _DamageError(f"version {manifest['firable_bundle']} of the format is not known")
+    if set(manifest["members"]) != set(files):
+        raise _DamageError("files were added to it or taken out")
+    for name, data in sorted(files.items()):
+        if manifest["members"][name] != _sha256(data):
+            raise _DamageError(f"'{name}' has been changed")
+
+    net = net_from_json(json.loads(files["net.json"]))
+    table = json.loads(files["table.json"])
+    decomposition = Decomposition(
+        net,
+        tuple(net_from_json(json.loads(files[f"subnets/{file_stem(c.name)}.json"])) for c in net.controllers),
+        tuple(
+            Coordinated(row["name"], row["number"], tuple(Part(*part) for part in row["parts"]), row["description"])
+            for row in table["coordinated"]
+        ),
+        tuple(
+            ArbitrationGroup(
+                group["name"],
+                tuple(group["sequence"]),
+                tuple(group["rest"]),
+                ArbitrationRule(group["by"]),
+                group["controller"],
+            )
+            for group in table["groups"]
+        ),
+    )
+    judged = json.loads(files["verdicts.json"])
+    if changed := sorted(name for name, sha in judged["of"].items() if _sha256(files.get(name, b"")) != sha):
+        raise _DamageError(f"'{changed[0]}' is not the one that the verdicts are about")
+    evidence = {
+        name.removeprefix("evidence/"): data.decode() for name, data in files.items() if name.startswith("evidence/")
+    }
+    return Bundle(decomposition, tuple(map(Verdict.from_json, judged["verdicts"])), evidence)
+
+
+def _refuse(file: str, reason: str) -> NoReturn:
+    message = f"the bundle is damaged or has been changed: {reason}"
+    raise InputError([Diagnostic("F5001", message, _HINT, span=Span(printable(file), 1, 1))])
+
+
+def read_bundle(path: str | Path) -> Bundle:
+    """Read a bundle file.
+
+    Raises `InputError`: F1001 where it cannot be read, F1003 where it is too large for a bundle, F5001 where it is
+    damaged, changed, or none. Whether it may run is another question: `unproved`.
+    """
+    path = Path(path)
+    name = printable(str(path))
+
+    def refuse(code: str, message: str, hint: str) -> InputError:
+        return InputError([Diagnostic(code, f"{name}: {message}", hint, span=Span(name, 1, 1))])
+
+    try:
+        mode, size_bytes = path.stat().st_mode, path.stat().st_size
+        if not stat.S_ISREG(mode):
+            kind = "a directory" if stat.S_ISDIR(mode) else "no regular file"
+            raise refuse("F1001", f"this is {kind}", "name a bundle file")
+        if size_bytes > SIZE_BYTES_MAX:
+            raise refuse("F1003", f"{size_bytes:,} bytes are more than a bundle has", "is this the right file?")
+        with path.open("rb") as stream:
+            archive = stream.read(SIZE_BYTES_MAX + 1)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise refuse("F1001", f"{reason}", "name a bundle file") from None
+    return Bundle.from_bytes(archive, str(path))
+
+
+def write_bundle(path: str | Path, bundle: Bundle) -> None:
+    """Write a bundle file: whole, or not at all; a file that stands there is replaced.
+
+    Raises `InputError` F1017 where it cannot be written, F4003 where the bundle is too large.
+    """
+    path = Path(path)
+    archive = bundle.to_bytes()
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.unfinished")
+    try:
+        with unfinished.open("xb") as stream:
+            stream.write(archive)
+            stream.flush()
+            os.fsync(stream.fileno())
+        unfinished.replace(path)
+    except (OSError, ValueError) as error:
+        with suppress(OSError, ValueError):
+            unfinished.unlink()
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        message = f"{printable(str(path))}: {reason}"
+        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
+
+
+def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
+    """The names of the verdicts that must be PROVED before a net may run: derived from the net, not from what is there.
+
+    Contact-freeness and absence of deadlock, every property of the file, and of the decomposition Eq. (7) and (8) for
+    every transition, Eq. (9)-(10) for every place, ownership, M0, commands, and arbitration.
+    """
+    net = decomposition.net
+    yield from ("contact-free", "deadlock-free")
+    yield from (f"property.{prop.name}" for prop in net.properties)
+    yield from (f"{equation}.{t.name}" for t in net.transitions for equation in ("eq7", "eq8"))
+    yield from (f"eq9-10.{place.name}" for place in net.places)
+    yield from ("ownership", "initial-marking", "commands", "arbitration")
+    yield from (f"arbitration.{group.name}" for group in decomposition.groups)
+
+
+def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
+    """What keeps a bundle from running (F5002): nothing where every required verdict is PROVED, with its evidence."""
+    problems = []
+    by_name: dict[str, list[Verdict]] = {}
+    for verdict in bundle.verdicts:
+        by_name.setdefault(verdict.name, []).append(verdict)
+    for name in dict.fromkeys(required_verdicts(bundle.decomposition)):
+        if name not in by_name:
+            message = f"there is no verdict on '{name}'"
+            problems.append(Diagnostic("F5002", message, _HINT, ("verdicts", name)))
+        for verdict in by_name.get(name, ()):
+            subject = ("verdicts", name)
+            if not verdict.holds:
+                message = f"'{name}' is {verdict.status.value}, not proved: {verdict.statement}"
+                hint = verdict.hint or "`firable check` and `firable prove` show why"
+                problems.append(Diagnostic("F5002", message, hint, subject))
+            for file in verdict.evidence:
+                if file not in bundle.evidence:
+                    message = f"the evidence '{file}' for '{name}' is missing"
+                    problems.append(Diagnostic("F5002", message, _HINT, subject))
+    return (*problems, *_undecided_conflicts(bundle.decomposition))
+
+
+def _undecided_conflicts(decomposition: Decomposition) -> Iterator[Diagnostic]:
+    """Conflicts that no group of the table decides: then nothing was proved about them either."""
+    net = decomposition.net
+    group_of = {name: group.name for group in decomposition.groups for name in (*group.sequence, *group.rest)}
+    for p, place in enumerate(net.places):
+        for together in (net.consumers[p], net.producers[p]):
+            deciders = {group_of.get(net.transitions[t].name) for t in together}
+            if len(together) > 1 and (None in deciders or len(deciders) > 1):
+                message = f"the conflict at '{place.name}' is not decided by one arbitration group"
+                yield Diagnostic("F5002", message, _HINT, ("places", place.name))

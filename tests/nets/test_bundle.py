@@ -1,0 +1,241 @@
+"""Bundles: what is written is read back, any change is refused, and what is not proved may not run."""
+
+import hashlib
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+from firable.nets.archive import ArchiveError, pack, unpack
+from firable.nets.bundle import Bundle, file_stem, read_bundle, required_verdicts, unproved, write_bundle
+from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
+from firable.nets.diagnostics import InputError
+from firable.nets.formula import Holds
+from firable.nets.interchange import canonical_json
+from firable.nets.net import ArbitrationRule, Command, Controller, Net, Place, Property, PropertyKind, Transition
+from firable.nets.verdict import Status, Verdict, Weight
+
+A, B = Controller("a"), Controller("b")
+P, Q, R = (
+    Place("a.p", "a", marked=True),
+    Place("b.q", "b", command=Command("M", "GO", (("to", "é"),))),
+    Place("a.r", "a"),
+)
+NET = Net(
+    "tiny",
+    (P, Q, R),
+    (Transition("G", ("a.p",), ("b.q",), number=1), Transition("l", ("a.p",), ("a.r",))),
+    controllers=(A, B),
+    properties=(Property("apart", PropertyKind.NEVER, Holds("b.q")),),
+)
+DECOMPOSITION = Decomposition(
+    NET,
+    (
+        Net("a", (P, R), (Transition("t0-1", ("a.p",)), Transition("l", ("a.p",), ("a.r",))), controllers=(A,)),
+        Net("b", (Q,), (Transition("t1-11", (), ("b.q",)),), controllers=(B,)),
+    ),
+    (Coordinated("G", 1, (Part("a", "t0-1"), Part("b", "t1-11")), "over"), Coordinated("l", None, (Part("a", "l"),))),
+    (ArbitrationGroup("next", ("l", "G"), (), ArbitrationRule.PRIORITY),),
+)
+VERDICTS = tuple(
+    Verdict(name, Status.PROVED, "it holds", "by hand", evidence=("eq7-G.smt2",) if name == "eq7.G" else ())
+    for name in required_verdicts(DECOMPOSITION)
+)
+BUNDLE = Bundle(DECOMPOSITION, VERDICTS, {"eq7-G.smt2": "(check-sat)\n"})
+
+
+def refused(archive: bytes) -> bool:
+    with pytest.raises(InputError) as refusal:
+        Bundle.from_bytes(archive, "x.bundle")
+    (diagnostic,) = refusal.value.diagnostics
+    return diagnostic.code == "F5001" and bool(diagnostic.hint)
+
+
+def with_new_hashes(members: Mapping[str, bytes]) -> bytes:
+    """The archive of changed members, with a manifest that agrees with them."""
+    files = {name: data for name, data in members.items() if name != "manifest.json"}
+    manifest = json.loads(members["manifest.json"])
+    manifest["members"] = {name: hashlib.sha256(data).hexdigest() for name, data in files.items()}
+    del manifest["digest"]
+    manifest["digest"] = hashlib.sha256(canonical_json(manifest)).hexdigest()
+    return pack({**files, "manifest.json": canonical_json(manifest)})
+
+
+def test_bundle_is_read_back_as_it_was_written(tmp_path: Path) -> None:
+    write_bundle(tmp_path / "tiny.bundle", BUNDLE)
+    bundle = read_bundle(tmp_path / "tiny.bundle")
+    assert bundle == BUNDLE
+    assert bundle.digest == BUNDLE.digest
+    assert bundle.to_bytes() == BUNDLE.to_bytes()
+
+
+def test_any_zip_tool_opens_a_bundle() -> None:
+    with zipfile.ZipFile(BytesIO(BUNDLE.to_bytes())) as archive:
+        assert archive.testzip() is None
+        assert archive.namelist() == [
+            *("evidence/eq7-G.smt2", "manifest.json", "net.json", "subnets/a.json", "subnets/b.json"),
+            *("table.json", "verdicts.json"),
+        ]
+        assert archive.read("evidence/eq7-G.smt2") == b"(check-sat)\n"
+
+
+def test_manifest_holds_the_digest_and_the_hash_of_every_file() -> None:
+    members = unpack(BUNDLE.to_bytes())
+    manifest = json.loads(members.pop("manifest.json"))
+    assert manifest["digest"] == BUNDLE.digest
+    assert manifest["members"] == {name: hashlib.sha256(data).hexdigest() for name, data in members.items()}
+    assert manifest["cell"] == "tiny"
+
+
+def test_change_of_any_byte_is_refused() -> None:
+    archive = BUNDLE.to_bytes()
+    for i in range(len(archive)):
+        for flip in (1, 0x20, 0xFF):
+            assert refused(archive[:i] + bytes([archive[i] ^ flip]) + archive[i + 1 :]), i
+
+
+def test_change_of_any_byte_of_a_file_is_refused_though_the_archive_is_sound() -> None:
+    members = unpack(BUNDLE.to_bytes())
+    for name, data in members.items():
+        for i in range(len(data)):
+            assert refused(pack({**members, name: data[:i] + bytes([data[i] ^ 1]) + data[i + 1 :]})), (name, i)
+
+
+def test_cut_off_bundle_is_refused() -> None:
+    archive = BUNDLE.to_bytes()
+    assert all(refused(archive[:length]) for length in range(len(archive)))
+
+
+def test_bytes_before_and_behind_a_bundle_are_refused() -> None:
+    archive = BUNDLE.to_bytes()
+    assert refused(archive + b"\0")
+    assert refused(b"\0" + archive)
+    assert refused(archive + archive)
+
+
+def test_added_and_missing_files_are_refused() -> None:
+    members = unpack(BUNDLE.to_bytes())
+    assert refused(pack({**members, "evidence/other.smt2": b""}))
+    assert refused(with_new_hashes({**members, "other.txt": b""}))
+    assert refused(with_new_hashes({**members, "subnets/c.json": members["subnets/b.json"]}))
+    for name in members:
+        assert refused(pack({other: data for other, data in members.items() if other != name}))
+
+
+@pytest.mark.parametrize("name", ["net.json", "subnets/b.json", "table.json"])
+def test_verdicts_do_not_pass_on_to_another_net(name: str) -> None:
+    members = unpack(BUNDLE.to_bytes())
+    changed = members[name].replace(b'"marked":false', b'"marked":true').replace(b"over", b"OVER")
+    assert changed != members[name]
+    assert refused(with_new_hashes({**members, name: changed}))
+
+
+def test_other_spelling_of_the_same_content_is_refused() -> None:
+    members = unpack(BUNDLE.to_bytes())
+    assert Bundle.from_bytes(with_new_hashes(members)) == BUNDLE
+    spaced = json.dumps(json.loads(members["verdicts.json"]), sort_keys=True).encode()
+    assert refused(with_new_hashes({**members, "verdicts.json": spaced}))
+
+
+@pytest.mark.parametrize("data", [b"", b"[]", b"{}", b"\xff", b"[" * 100_000, b"null", b'{"firable_bundle":2}'])
+def test_manifest_of_another_kind_is_refused(data: bytes) -> None:
+    assert refused(pack({**unpack(BUNDLE.to_bytes()), "manifest.json": data}))
+
+
+def test_compressed_archive_is_refused_unopened() -> None:
+    bomb = BytesIO()
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("manifest.json", b"0" * 10_000_000)
+    assert refused(bomb.getvalue())
+
+
+def test_archive_refuses_names_that_lead_elsewhere_when_encoded_otherwise() -> None:
+    with pytest.raises(ArchiveError):
+        pack({"a\\b": b""})
+    with pytest.raises(ArchiveError):
+        pack({"a\nb": b""})
+    assert file_stem("../x") == "..%2Fx"
+
+
+def test_file_that_is_no_bundle_is_refused_by_code(tmp_path: Path) -> None:
+    (tmp_path / "text").write_text("firable: 1\n")
+    (tmp_path / "empty").touch()
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for name, code in [("text", "F5001"), ("empty", "F5001"), ("", "F1001"), ("none", "F1001"), ("pipe", "F1001")]:
+        with pytest.raises(InputError) as refusal:
+            read_bundle(tmp_path / name)
+        assert [d.code for d in refusal.value.diagnostics] == [code]
+
+
+def test_file_larger_than_any_bundle_is_refused_unread(tmp_path: Path) -> None:
+    with (tmp_path / "large").open("wb") as stream:
+        stream.truncate(1 << 40)
+    with pytest.raises(InputError, match="F1003"):
+        read_bundle(tmp_path / "large")
+
+
+def test_failed_write_leaves_the_old_bundle_and_no_litter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "tiny.bundle"
+    path.write_bytes(b"old")
+
+    def no_space(fd: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", no_space)
+    with pytest.raises(InputError, match="F1017"):
+        write_bundle(path, BUNDLE)
+    assert [file.name for file in tmp_path.iterdir()] == ["tiny.bundle"]
+    assert path.read_bytes() == b"old"
+
+
+def test_write_replaces_an_old_bundle_and_refuses_a_missing_folder(tmp_path: Path) -> None:
+    path = tmp_path / "tiny.bundle"
+    path.write_bytes(b"old")
+    write_bundle(path, BUNDLE)
+    assert read_bundle(path) == BUNDLE
+    with pytest.raises(InputError, match="F1017"):
+        write_bundle(tmp_path / "none" / "tiny.bundle", BUNDLE)
+
+
+def test_bundle_with_every_verdict_proved_may_run() -> None:
+    assert unproved(BUNDLE) == ()
+
+
+def test_required_verdicts_follow_from_the_net() -> None:
+    assert list(required_verdicts(DECOMPOSITION)) == [
+        *("contact-free", "deadlock-free", "property.apart"),
+        *("eq7.G", "eq8.G", "eq7.l", "eq8.l", "eq9-10.a.p", "eq9-10.b.q", "eq9-10.a.r"),
+        *("ownership", "initial-marking", "commands", "arbitration", "arbitration.next"),
+    ]
+
+
+@pytest.mark.parametrize("name", [*required_verdicts(DECOMPOSITION)])
+def test_each_required_verdict_must_be_there_and_proved(name: str) -> None:
+    missing = replace(BUNDLE, verdicts=tuple(v for v in VERDICTS if v.name != name))
+    assert [(d.code, d.subject) for d in unproved(missing)] == [("F5002", ("verdicts", name))]
+    for status in (Status.UNKNOWN, Status.VIOLATED):
+        # Whatever weight a verdict gives itself, the net requires it; and no second verdict outweighs it.
+        doubted = Verdict(name, status, "it holds", "by hand", Weight.INFORMATION)
+        others = tuple(v for v in VERDICTS if v.name != name)
+        for verdicts in ((*others, doubted), (*VERDICTS, doubted)):
+            assert [(d.code, d.subject) for d in unproved(replace(BUNDLE, verdicts=verdicts))] == [
+                ("F5002", ("verdicts", name))
+            ]
+
+
+def test_proof_without_its_evidence_is_none() -> None:
+    assert [d.code for d in unproved(replace(BUNDLE, evidence={}))] == ["F5002"]
+
+
+def test_conflict_that_no_group_decides_may_not_run() -> None:
+    without = replace(BUNDLE, decomposition=replace(DECOMPOSITION, groups=()))
+    assert [(d.code, d.subject) for d in unproved(without)] == [("F5002", ("places", "a.p"))]
+    apart = tuple(ArbitrationGroup(f"g{i}", (t,), (), ArbitrationRule.PRIORITY) for i, t in enumerate("Gl"))
+    found = unproved(replace(BUNDLE, decomposition=replace(DECOMPOSITION, groups=apart)))
+    assert ("places", "a.p") in {d.subject for d in found}
