@@ -25,9 +25,11 @@ from typing import Any, Final, NoReturn, TextIO
 
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.net import Marking, Net
+from firable.nets.source import read_source
 from firable.semantics.player import Player
 
 VERSION: Final = 1
+SIZE_BYTES_MAX: Final = 2**30
 
 
 class Discipline(StrEnum):
@@ -165,17 +167,9 @@ class Trace:
 
 
 def read_trace(path: Path | str) -> Trace:
-    """Read a trace file; raises `InputError` F5005 (F1001 where the file cannot be read) with the line."""
-    name = str(path)
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            [Diagnostic("F1001", f"{name}: {error.strerror}", "name a trace file", span=Span(name, 1, 1))]
-        ) from None
-    except UnicodeDecodeError:
-        raise InputError([Diagnostic("F1004", "not a text file", "name a trace file", span=Span(name, 1, 1))]) from None
-    return parse_trace(text, name)
+    """Read a trace file; raises `InputError` F5005 with the line, F1001-F1004 where it is no text file."""
+    source = read_source(path, SIZE_BYTES_MAX)
+    return parse_trace(source.text, source.file)
 
 
 def parse_trace(text: str, file: str = "<trace>") -> Trace:
