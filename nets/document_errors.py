@@ -74,12 +74,14 @@ def _problem(source: Source, tree: Node, path: Path, kind: str, message: str, co
     key, node = found[-1]
     if kind == "extra_forbidden":
         known = _keys_at(path[:-1])
-        at = key or node
+        hint = f"The keys here are {', '.join(known)}; check the indentation too"
+        if isinstance(node, Scalar) and node.plain and not node.text and len(found) > 1:
+            hint += ", and write a text with a comma in double quotes"
         return Diagnostic(
             "F1008",
             f"unknown key {quoted(str(path[-1]))}{_inside(path[:-1])}",
-            did_you_mean(str(path[-1]), known) + f"The keys here are {', '.join(known)}; check the indentation too",
-            span=node_span(source, at),
+            did_you_mean(str(path[-1]), known) + hint,
+            span=node_span(source, key or node),
         )
     if kind == "missing":
         owner = found[len(path) - 1] if len(found) >= len(path) else found[-1]
