@@ -1,0 +1,159 @@
+"""The explicit engine: the reachability graph of a net, explored by the Rust crate `analysis/engine`.
+
+A marking is an index: markings are numbered in the order of a breadth-first search from M0 (index 0), level by level,
+so a lower index is never farther from M0. As a value a marking is an `int` bit mask over the places. A set of
+markings is given as a list of indexes or as a bitmap, `bytes` with one byte for each marking (not 0: in the set), and is
+returned as a bitmap. A firing sequence is a list of fired sets, each a list of transitions (one under interleaving).
+
+What needs the whole graph raises `IncompleteGraph` where `complete` is false, so that nothing is concluded from a part. The
+rest (markings, contacts, deadlocks, paths) holds of the part explored.
+"""
+
+from typing import final
+
+class BudgetExceeded(RuntimeError):
+    """The answer needs more memory than the graph's `max_memory_bytes` leaves."""
+
+class IncompleteGraph(RuntimeError):
+    """The answer needs the whole reachability graph, and the exploration ended early."""
+
+def explore(
+    n_places: int,
+    transitions: list[tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]],
+    initial: list[int],
+    *,
+    step: bool = False,
+    max_markings: int,
+    max_memory_bytes: int,
+    max_seconds: float | None,
+) -> Graph:
+    """Explore the reachability graph from the marking `initial`, external gates free.
+
+    A transition is (inputs, outputs, permissive, inhibitive, external literals): places by index, literals as (signal, wanted
+    value). Under interleaving an edge fires one transition that is firable (Eq. 1) and whose literals do not contradict each other;
+    under `step` it fires a maximal set F of E(v), for some valuation v of the signals, in which a place has at most
+    one consumer and one producer; each F is one edge, the empty one is left out.
+
+    Running out of a budget, and Ctrl-C, give an incomplete graph with its `reason`. `max_memory_bytes` counts all that the
+    engine holds, copies while a table grows included; time is looked at every few thousand edges.
+
+    Raises `ValueError` for a place out of range or a negative time, `BudgetExceeded` where not even the net fits.
+
+    >>> graph = explore(2, [([0], [1], [], [], []), ([1], [0], [], [], [])], [0],
+    ...                 max_markings=100, max_memory_bytes=1_000_000, max_seconds=None)
+    >>> graph.n_markings, graph.n_edges, graph.complete
+    (2, 2, True)
+    """
+
+@final
+class Graph:
+    """A reachability graph. Markings are stored, edges are computed again when they are asked for."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether every reachable marking was found and expanded."""
+    @property
+    def reason(self) -> str | None:
+        """Why not: "markings", "memory", "time" or "interrupted"; None where complete."""
+    @property
+    def step(self) -> bool:
+        """Whether edges are synchronous steps."""
+    @property
+    def n_markings(self) -> int:
+        """How many markings were found."""
+    @property
+    def n_edges(self) -> int:
+        """How many edges were followed: pairs of a marking and what fires in it."""
+    @property
+    def n_levels(self) -> int:
+        """How many levels the breadth-first search began; one more than the longest shortest path, where complete."""
+    @property
+    def words(self) -> int:
+        """How many 64-bit words a marking takes."""
+    @property
+    def memory_bytes(self) -> int:
+        """Bytes held by the graph: markings, hash table, statistics and the compiled net."""
+    @property
+    def bytes_per_marking(self) -> float:
+        """`memory_bytes` by `n_markings`."""
+    @property
+    def seconds(self) -> float:
+        """How long the exploration took."""
+    def __len__(self) -> int: ...
+    def marking(self, index: int) -> int:
+        """The marking of an index, as a mask; `IndexError` where there is none."""
+    def markings_bytes(self) -> bytes:
+        """All markings end to end, `n_markings * words` little-endian 64-bit words (`numpy.frombuffer(..., "<u8")`)."""
+    def find(self, mask: int) -> int | None:
+        """The index of a marking, None where it was not found (which means unreachable only if `complete`)."""
+    def fired(self) -> list[int]:
+        """For each transition, the edges on which it fires."""
+    def deadlocks(self) -> list[int]:
+        """The markings, ascending, where no transition is firable and openable."""
+    def contacts(self) -> list[int]:
+        """For each transition, the number of markings in contact.
+
+        Inputs and internal gates are satisfied and some output place that is no input is full; external gates are ignored.
+        """
+    def contact_witness(self, t: int) -> int | None:
+        """The lowest marking in contact for a transition."""
+    def enabled(self, index: int) -> list[int]:
+        """The transitions that are firable at a marking and openable, ascending."""
+    def successors(self, index: int) -> list[tuple[list[int], int]]:
+        """The edges that leave a marking: what fires and the marking after.
+
+        In the order of the transitions (interleaving) or of the choices (step). In an incomplete graph, edges to markings
+        that were not found are left out.
+        """
+    def path_to(self, index: int) -> list[list[int]]:
+        """A shortest firing sequence from M0 to a marking; the same one every time."""
+    def path_between(
+        self, index: int, targets: list[int] | bytes, within: list[int] | bytes | None = None
+    ) -> tuple[list[list[int]], int] | None:
+        """A shortest firing sequence from a marking to one of `targets`, and the target reached; None where there is none.
+
+        Every marking before the last is in `within` (E[within U targets]). Empty where the marking is itself a target.
+        That there is none needs the whole graph.
+        """
+    def backward(self, targets: list[int] | bytes, within: list[int] | bytes | None = None) -> bytes:
+        """The bitmap of the markings from which some target can be reached, targets included (EF targets).
+
+        With `within`, every marking before the target is in it (E[within U targets]). Needs the whole graph.
+        """
+    def components(self, within: list[int] | bytes | None = None) -> Components:
+        """The strongly connected components of the graph, or of the part within a set. Needs the whole graph."""
+    def edges(self) -> tuple[bytes, bytes]:
+        """The edges as compressed rows: offsets (`n_markings + 1` "<u8") and targets (`n_edges` "<u4").
+
+        The row of a marking has the order of `successors`; under interleaving its k-th edge fires `enabled(index)[k]`.
+        Needs the whole graph.
+        """
+    def live(self) -> list[bool]:
+        """For each transition, whether from every marking it can fire again: it fires in every bottom component."""
+    def reversible(self) -> bool:
+        """Whether M0 can be reached from every marking. Needs the whole graph."""
+    def home(self) -> bool:
+        """Whether some marking can be reached from every marking: there is one bottom component."""
+    def home_markings(self) -> bytes:
+        """The bitmap of the home markings. Needs the whole graph."""
+    def effective_conflicts(self, pairs: list[tuple[int, int]]) -> list[int | None]:
+        """For each pair of transitions, the lowest marking at which both are firable by Eq. (1), or None.
+
+        Whether the two conflict in structure, and whether one valuation opens both, is the caller's question. None needs the
+        whole graph.
+        """
+
+@final
+class Components:
+    """Strongly connected components; edges lead from a higher component to a lower one, or stay."""
+
+    def __len__(self) -> int:
+        """How many components there are."""
+    def of(self) -> bytes:
+        """The component of each marking ("<u4"); 2^32 - 1 outside the set that was asked for."""
+    def sizes(self) -> bytes:
+        """The number of markings of each component ("<u4")."""
+    def bottom(self) -> bytes:
+        """One byte for each component: 1 where no edge (within the set) leaves it."""
+    def trivial(self) -> bytes:
+        """One byte for each component: 1 where it has no edge inside, so no run can stay in it."""

@@ -1,0 +1,595 @@
+//! Breadth-first exploration of the reachability graph, interleaving and synchronous step.
+//!
+//! Markings are numbered in the order in which they are found, level by level, so that an index is also a distance
+//! rank and every witness "lowest index" is a closest one. The queue is the array of markings itself. Up to 64
+//! markings of one level are taken together and turned into bit slices, one word for each place; a transition is then
+//! tested for all of them by one word operation for each place it touches, and contact and deadlock are read off the
+//! same words. Batches end at the end of a level: a batch across levels would number a successor of the later
+//! level before one of the earlier, and paths would no longer be shortest.
+//!
+//! Rejected: enabledness kept incrementally from the parent marking (it lost to bit slices everywhere it was measured);
+//! storing edges (they are recomputed faster than they are read back, and cost more than the markings); storing
+//! parents under interleaving (the rule runs backwards, see `net.rs`).
+
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use crate::budget::{Memory, Stop, Watch};
+use crate::marking::{Dynamic, Width, holds, linear_hash, slice};
+use crate::net::{Net, Rules};
+use crate::step::{Choice, Components, Factor, Steps};
+use crate::table::{Candidates, Table};
+use crate::with_width;
+
+/// Stands for "no marking" where an index is stored.
+pub const NONE: u32 = u32::MAX;
+
+/// The discipline and the budgets of an exploration.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Maximal sets of enabled transitions instead of one transition at a time.
+    pub step: bool,
+    /// Most markings that are stored.
+    pub markings: usize,
+    /// Most bytes that are held, transient copies included.
+    pub memory_bytes: usize,
+    /// Longest time.
+    pub time: Option<Duration>,
+}
+
+/// The part of the reachability graph that was explored; all of it where `stop` is none.
+#[derive(Debug)]
+pub struct Space {
+    /// The net.
+    pub net: Arc<Net>,
+    /// Whether edges are synchronous steps.
+    pub step: bool,
+    /// The markings and their index.
+    pub table: Table,
+    /// The index at which each level begins.
+    pub levels: Vec<u32>,
+    /// Edges that each transition takes part in.
+    pub fired: Vec<u64>,
+    /// How many edges.
+    pub edges: u64,
+    /// Markings in contact, for each transition.
+    pub contacts: Vec<u64>,
+    /// The first of them, or `NONE`.
+    pub contact_witness: Vec<u32>,
+    /// Markings where no transition is firable and openable, ascending.
+    pub deadlocks: Vec<u32>,
+    /// Under steps, the marking from which each was found first; empty under interleaving.
+    pub parents: Vec<u32>,
+    /// Components of the step relation.
+    pub components: Arc<Components>,
+    /// Why the exploration ended early.
+    pub stop: Option<Stop>,
+    /// What is held, and the most that may be held.
+    pub memory: Memory,
+    /// How long it took.
+    pub seconds: f64,
+}
+
+/// Up to 64 markings of one batch, sliced.
+struct Batch {
+    markings: Vec<u64>,
+    hashes: [u64; 64],
+    slices: Vec<u64>,
+    valid: u64,
+    count: usize,
+}
+
+impl Batch {
+    fn new(words: usize) -> Self {
+        Batch {
+            markings: Vec::with_capacity(64 * words),
+            hashes: [0; 64],
+            slices: vec![0; 64 * words],
+            valid: 0,
+            count: 0,
+        }
+    }
+
+    /// Loads markings that stand end to end in `self.markings`.
+    #[inline(always)]
+    fn cut<W: Width>(&mut self, width: W) {
+        let words = width.words();
+        self.count = self.markings.len() / words;
+        self.valid = if self.count == 64 { !0 } else { (1 << self.count) - 1 };
+        for (hash, marking) in self.hashes.iter_mut().zip(self.markings.chunks_exact(words)) {
+            *hash = linear_hash(width, marking);
+        }
+        slice(width, &self.markings, &mut self.slices);
+    }
+}
+
+impl Space {
+    /// Explores from M0 until all is found or a budget is used up.
+    pub fn explore(net: Net, limits: Limits, poll: &mut dyn FnMut() -> bool) -> Result<Self, Stop> {
+        let start = Instant::now();
+        let memory = Memory::new(limits.memory_bytes);
+        let count = net.transitions.len();
+        // The net itself, its statistics and the component table; a budget below that is no budget.
+        memory.claim(net.bytes() + count * (8 + 8 + 4 + 4))?;
+        let table = Table::new(net.words, &memory)?;
+        let components = Components::new(&net);
+        let mut space = Space {
+            step: limits.step,
+            table,
+            levels: Vec::new(),
+            fired: vec![0; count],
+            edges: 0,
+            contacts: vec![0; count],
+            contact_witness: vec![NONE; count],
+            deadlocks: Vec::new(),
+            parents: Vec::new(),
+            components: Arc::new(components),
+            stop: None,
+            memory,
+            seconds: 0.0,
+            net: Arc::new(net),
+        };
+        let mut watch = Watch::new(limits.time.and_then(|time| start.checked_add(time)), poll);
+        let max = limits.markings.clamp(1, NONE as usize);
+        let end = with_width!(space.net.words, width => space.run(width, max, &mut watch));
+        space.stop = end.err();
+        space.seconds = start.elapsed().as_secs_f64();
+        Ok(space)
+    }
+
+    /// How many markings were found.
+    pub fn len(&self) -> usize {
+        self.table.store.len()
+    }
+
+    /// Whether none was found, which never happens.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    fn run<W: Width>(&mut self, width: W, max: usize, watch: &mut Watch<'_>) -> Result<(), Stop> {
+        let initial = self.net.initial.clone();
+        self.table.insert(width, &initial, linear_hash(width, &initial), max, &self.memory)?;
+        if self.step {
+            self.memory.push(&mut self.parents, NONE)?;
+        }
+        self.memory.push(&mut self.levels, 0)?;
+        let net = Arc::clone(&self.net);
+        if self.step {
+            let components = Arc::clone(&self.components);
+            let mut steps = Steps::new(&net, &components);
+            let result = self.run_step(width, &net, &mut steps, max, watch);
+            steps.forget(&self.memory);
+            result
+        } else {
+            self.run_interleaving(width, &net, max, watch)
+        }
+    }
+
+    /// Ends a level when `next` has reached it; false when there is no other.
+    fn level_end(&mut self, next: usize, end: &mut usize) -> Result<bool, Stop> {
+        if next == *end {
+            *end = self.table.store.len();
+            if next == *end {
+                return Ok(false);
+            }
+            self.memory.push(&mut self.levels, next as u32)?;
+        }
+        Ok(true)
+    }
+
+    fn run_interleaving<W: Width>(
+        &mut self,
+        width: W,
+        net: &Net,
+        max: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
+        let words = width.words();
+        let mut batch = Batch::new(words);
+        let mut candidates = Candidates::new(words);
+        let (mut next, mut end) = (0, 1);
+        while self.level_end(next, &mut end)? {
+            let stop = end.min(next + 64);
+            batch.markings.clear();
+            self.table.store.copy_range(next, stop, &mut batch.markings);
+            batch.cut(width);
+            let mut alive = 0;
+            let before = self.edges;
+            for t in 0..net.transitions.len() {
+                let (base, blocked) = net.forward.test(t, &batch.slices, batch.valid);
+                if base == 0 {
+                    continue;
+                }
+                if base & blocked != 0 {
+                    self.note_contact(t, next, base & blocked);
+                }
+                let mut fire = base & !blocked & net.forward.edge(t);
+                if fire == 0 {
+                    continue;
+                }
+                alive |= fire;
+                let edges = u64::from(fire.count_ones());
+                self.fired[t] += edges;
+                self.edges += edges;
+                let flip = net.flip(t, words);
+                let flip_hash = net.flip_hashes[t];
+                while fire != 0 {
+                    let j = fire.trailing_zeros() as usize;
+                    fire &= fire - 1;
+                    let from = &batch.markings[j * words..(j + 1) * words];
+                    if candidates.push(width, from, flip, batch.hashes[j] ^ flip_hash) {
+                        self.table.insert_batch(width, &mut candidates, max, &self.memory)?;
+                    }
+                }
+            }
+            self.note_deadlocks(next, batch.valid & !alive)?;
+            self.table.insert_batch(width, &mut candidates, max, &self.memory)?;
+            watch.tick((stop - next) + (self.edges - before) as usize)?;
+            next = stop;
+        }
+        Ok(())
+    }
+
+    fn run_step<W: Width>(
+        &mut self,
+        width: W,
+        net: &Net,
+        steps: &mut Steps<'_>,
+        max: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
+        let words = width.words();
+        let mut batch = Batch::new(words);
+        let mut firable: Vec<Vec<u32>> = vec![Vec::new(); 64];
+        let (mut next, mut end) = (0, 1);
+        while self.level_end(next, &mut end)? {
+            let stop = end.min(next + 64);
+            batch.markings.clear();
+            self.table.store.copy_range(next, stop, &mut batch.markings);
+            batch.cut(width);
+            let mut alive = 0;
+            firable.iter_mut().for_each(Vec::clear);
+            for t in 0..net.transitions.len() {
+                let (base, blocked) = net.forward.test(t, &batch.slices, batch.valid);
+                if base & blocked != 0 {
+                    self.note_contact(t, next, base & blocked);
+                }
+                let mut fire = base & !blocked & net.forward.edge(t);
+                alive |= fire;
+                while fire != 0 {
+                    firable[fire.trailing_zeros() as usize].push(t as u32);
+                    fire &= fire - 1;
+                }
+            }
+            self.note_deadlocks(next, batch.valid & !alive)?;
+            for j in 0..batch.count {
+                let marking = &batch.markings[j * words..(j + 1) * words];
+                let factors = steps.factors(&firable[j], &self.memory, watch)?;
+                let (table, memory, parents) = (&mut self.table, &self.memory, &mut self.parents);
+                let mut edges = 0;
+                Steps::each(width, marking, batch.hashes[j], &factors, watch, &mut |_, after, hash| {
+                    if table.insert(width, after, hash, max, memory)? {
+                        memory.push(parents, (next + j) as u32)?;
+                    }
+                    edges += 1;
+                    Ok(())
+                })?;
+                self.edges += edges;
+                self.note_fired(&factors);
+                watch.tick(1)?;
+            }
+            next = stop;
+        }
+        Ok(())
+    }
+
+    /// Counts for each transition the combinations of choices that fire it.
+    fn note_fired(&mut self, factors: &[Rc<[Factor]>]) {
+        let all: u64 = factors.iter().flat_map(|part| part.iter()).map(|factor| factor.len() as u64).product();
+        for factor in factors.iter().flat_map(|part| part.iter()) {
+            for choice in factor {
+                for &t in &choice.fired {
+                    self.fired[t as usize] += all / factor.len() as u64;
+                }
+            }
+        }
+    }
+
+    #[cold]
+    fn note_contact(&mut self, t: usize, first: usize, contact: u64) {
+        self.contacts[t] += u64::from(contact.count_ones());
+        if self.contact_witness[t] == NONE {
+            self.contact_witness[t] = first as u32 + contact.trailing_zeros();
+        }
+    }
+
+    fn note_deadlocks(&mut self, first: usize, mut dead: u64) -> Result<(), Stop> {
+        while dead != 0 {
+            self.memory.push(&mut self.deadlocks, first as u32 + dead.trailing_zeros())?;
+            dead &= dead - 1;
+        }
+        Ok(())
+    }
+
+    /// The index of a marking, if it was found.
+    pub fn find(&self, marking: &[u64]) -> Option<u32> {
+        with_width!(self.net.words, width => self.table.find(width, marking, linear_hash(width, marking)))
+    }
+
+    /// The marking of an index.
+    pub fn marking(&self, index: usize) -> &[u64] {
+        self.table.store.get(Dynamic(self.net.words), index)
+    }
+
+    /// For each pair of transitions, the lowest index of a marking at which both are firable by Eq. (1).
+    pub fn firable_together(&self, pairs: &[(usize, usize)], watch: &mut Watch<'_>) -> Result<Vec<Option<u32>>, Stop> {
+        let mut found = vec![None; pairs.len()];
+        let mut asked = vec![false; self.net.transitions.len()];
+        for &(t, u) in pairs {
+            asked[t] = true;
+            asked[u] = true;
+        }
+        let mut firable = vec![0; self.net.transitions.len()];
+        let mut batch = Batch::new(self.net.words);
+        let mut missing = pairs.len();
+        let mut first = 0;
+        while first < self.len() && missing > 0 {
+            let stop = self.len().min(first + 64);
+            batch.markings.clear();
+            self.table.store.copy_range(first, stop, &mut batch.markings);
+            with_width!(self.net.words, width => batch.cut(width));
+            for t in (0..firable.len()).filter(|&t| asked[t]) {
+                let (base, blocked) = self.net.forward.test(t, &batch.slices, batch.valid);
+                firable[t] = base & !blocked & self.net.forward.sound(t);
+            }
+            for (found, &(t, u)) in found.iter_mut().zip(pairs).filter(|(found, _)| found.is_none()) {
+                let both = firable[t] & firable[u];
+                if both != 0 {
+                    *found = Some(first as u32 + both.trailing_zeros());
+                    missing -= 1;
+                }
+            }
+            watch.tick(stop - first)?;
+            first = stop;
+        }
+        Ok(found)
+    }
+
+    /// The transitions that a rule enables at one marking, by tests of single places.
+    pub fn enabled_by(&self, rules: &Rules, marking: &[u64], openable: bool) -> Vec<u32> {
+        (0..self.net.transitions.len())
+            .filter(|&t| rules.test_one(t, |p| holds(marking, p), openable))
+            .map(|t| t as u32)
+            .collect()
+    }
+}
+
+/// What fires on an edge.
+#[derive(Clone, Copy, Debug)]
+pub enum Fired<'a> {
+    /// One transition.
+    One(u32),
+    /// The choices of a step.
+    Step(&'a [&'a Choice]),
+}
+
+impl Fired<'_> {
+    /// The transitions, ascending.
+    pub fn transitions(self) -> Vec<u32> {
+        match self {
+            Fired::One(t) => vec![t],
+            Fired::Step(choices) => {
+                let mut all: Vec<u32> = choices.iter().flat_map(|choice| choice.fired.iter().copied()).collect();
+                all.sort_unstable();
+                all
+            }
+        }
+    }
+}
+
+/// The edges that leave markings, computed again from the rule.
+pub struct Edges<'a> {
+    space: &'a Space,
+    steps: Option<Steps<'a>>,
+    /// For each marking of the batch, the firable and openable transitions.
+    firable: Vec<Vec<u32>>,
+    batch: Batch,
+}
+
+impl<'a> Edges<'a> {
+    /// Edges of a space.
+    pub fn new(space: &'a Space) -> Self {
+        Edges {
+            space,
+            steps: space.step.then(|| Steps::new(&space.net, &space.components)),
+            firable: vec![Vec::new(); 64],
+            batch: Batch::new(space.net.words),
+        }
+    }
+
+    /// Loads up to 64 markings and finds what is firable and openable at each.
+    pub fn load(&mut self, sources: &[u32]) {
+        let space = self.space;
+        let batch = &mut self.batch;
+        batch.markings.clear();
+        for &source in sources {
+            batch.markings.extend_from_slice(space.marking(source as usize));
+        }
+        with_width!(space.net.words, width => batch.cut(width));
+        self.firable.iter_mut().for_each(Vec::clear);
+        for t in 0..space.net.transitions.len() {
+            let (base, blocked) = space.net.forward.test(t, &batch.slices, batch.valid);
+            let mut fire = base & !blocked & space.net.forward.edge(t);
+            while fire != 0 {
+                self.firable[fire.trailing_zeros() as usize].push(t as u32);
+                fire &= fire - 1;
+            }
+        }
+    }
+
+    /// What is firable and openable at marking `j` of the batch loaded last.
+    pub fn firable(&self, j: usize) -> &[u32] {
+        &self.firable[j]
+    }
+
+    /// Visits the edges of up to 64 markings in their order, those of one marking in the order of the transitions
+    /// (interleaving) or of the choices (step). Targets that were not found, of an incomplete graph, are left out.
+    pub fn visit(
+        &mut self,
+        sources: &[u32],
+        memory: &Memory,
+        watch: &mut Watch<'_>,
+        visit: &mut impl FnMut(u32, Fired<'_>, u32) -> Result<(), Stop>,
+    ) -> Result<(), Stop> {
+        self.load(sources);
+        with_width!(self.space.net.words, width => self.visit_loaded(width, sources, memory, watch, visit))
+    }
+
+    fn visit_loaded<W: Width>(
+        &mut self,
+        width: W,
+        sources: &[u32],
+        memory: &Memory,
+        watch: &mut Watch<'_>,
+        visit: &mut impl FnMut(u32, Fired<'_>, u32) -> Result<(), Stop>,
+    ) -> Result<(), Stop> {
+        let space = self.space;
+        let words = width.words();
+        let mut after = vec![0; words];
+        for (j, &source) in sources.iter().enumerate() {
+            let marking = &self.batch.markings[j * words..(j + 1) * words];
+            let hash = self.batch.hashes[j];
+            match &mut self.steps {
+                Some(steps) => {
+                    let factors = steps.factors(&self.firable[j], memory, watch)?;
+                    Steps::each(width, marking, hash, &factors, watch, &mut |chosen, after, hash| match space
+                        .table
+                        .find(width, after, hash)
+                    {
+                        Some(target) => visit(source, Fired::Step(chosen), target),
+                        None => Ok(()),
+                    })?;
+                }
+                None => {
+                    for &t in &self.firable[j] {
+                        let flip = space.net.flip(t as usize, words);
+                        for k in 0..words {
+                            after[k] = marking[k] ^ flip[k];
+                        }
+                        let hash = hash ^ space.net.flip_hashes[t as usize];
+                        if let Some(target) = space.table.find(width, &after, hash) {
+                            visit(source, Fired::One(t), target)?;
+                        }
+                    }
+                    watch.tick(1 + self.firable[j].len())?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives back what solved components took.
+    pub fn finish(mut self, memory: &Memory) {
+        if let Some(steps) = &mut self.steps {
+            steps.forget(memory);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::net::Transition;
+
+    /// `n` machines of two places each, `pad` unused places before them.
+    pub(crate) fn machines(n: u32, pad: u32) -> Net {
+        let transitions = (0..n)
+            .flat_map(|i| {
+                let (idle, busy) = (pad + 2 * i, pad + 2 * i + 1);
+                [Transition::new(&[idle], &[busy], &[], &[], &[]), Transition::new(&[busy], &[idle], &[], &[], &[])]
+            })
+            .collect();
+        let initial: Vec<u32> = (0..n).map(|i| pad + 2 * i).collect();
+        Net::new((pad + 2 * n) as usize, transitions, &initial).expect("well formed")
+    }
+
+    pub(crate) fn explore(net: Net, step: bool) -> Space {
+        let limits = Limits { step, markings: 1 << 20, memory_bytes: 1 << 28, time: None };
+        Space::explore(net, limits, &mut || false).expect("fits")
+    }
+
+    #[test]
+    fn independent_machines_multiply_at_every_width() {
+        for pad in [0, 50, 60, 130, 200, 300, 500, 1000] {
+            let space = explore(machines(10, pad), false);
+            assert_eq!((space.len(), space.edges, space.stop), (1024, 10240, None));
+            assert_eq!(space.levels, [0, 1, 11, 56, 176, 386, 638, 848, 968, 1013, 1023]);
+            assert!(space.deadlocks.is_empty());
+            assert_eq!(space.fired, [512; 20]);
+        }
+    }
+
+    #[test]
+    fn machines_without_gates_step_in_unison() {
+        let space = explore(machines(10, 0), true);
+        assert_eq!((space.len(), space.edges), (2, 2));
+        assert_eq!(space.fired, [1; 20]);
+    }
+
+    #[test]
+    fn each_budget_stops_with_its_reason() {
+        let run = |limits| Space::explore(machines(16, 0), limits, &mut || true).expect("begins");
+        let all = Limits { step: false, markings: 1 << 20, memory_bytes: 1 << 28, time: None };
+        assert_eq!(run(Limits { markings: 100, ..all }).stop, Some(Stop::Markings));
+        assert_eq!(run(Limits { markings: 100, ..all }).len(), 100);
+        assert_eq!(run(Limits { memory_bytes: 100_000, ..all }).stop, Some(Stop::Memory));
+        assert_eq!(run(Limits { time: Some(Duration::ZERO), ..all }).stop, Some(Stop::Time));
+        assert_eq!(run(all).stop, Some(Stop::Interrupted));
+    }
+
+    #[test]
+    fn a_budget_below_the_net_is_refused() {
+        let limits = Limits { step: false, markings: 10, memory_bytes: 10, time: None };
+        assert_eq!(Space::explore(machines(2, 0), limits, &mut || false).err(), Some(Stop::Memory));
+    }
+
+    #[test]
+    fn a_full_output_place_is_contact_and_blocks() {
+        let net = Net::new(2, vec![Transition::new(&[0], &[1], &[], &[], &[])], &[0, 1]).expect("well formed");
+        let space = explore(net, false);
+        assert_eq!((space.len(), space.edges, space.deadlocks.as_slice()), (1, 0, [0].as_slice()));
+        assert_eq!((space.contacts[0], space.contact_witness[0]), (1, 0));
+    }
+
+    #[test]
+    fn a_self_loop_never_fires_and_is_no_contact() {
+        let net = Net::new(1, vec![Transition::new(&[0], &[0], &[], &[], &[])], &[0]).expect("well formed");
+        let space = explore(net, false);
+        assert_eq!((space.len(), space.edges, space.contacts[0]), (1, 0, 0));
+    }
+
+    #[test]
+    fn edges_computed_again_are_those_explored() {
+        for step in [false, true] {
+            let space = explore(machines(7, 60), step);
+            let memory = Memory::new(1 << 20);
+            let mut poll = || false;
+            let mut watch = Watch::new(None, &mut poll);
+            let mut edges = Edges::new(&space);
+            let mut count = 0;
+            let sources: Vec<u32> = (0..space.len() as u32).collect();
+            for part in sources.chunks(64) {
+                edges
+                    .visit(part, &memory, &mut watch, &mut |_, _, _| {
+                        count += 1;
+                        Ok(())
+                    })
+                    .expect("fits");
+            }
+            edges.finish(&memory);
+            assert_eq!((count, memory.used()), (space.edges, 0));
+        }
+    }
+}

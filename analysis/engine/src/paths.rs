@@ -1,0 +1,233 @@
+//! Firing sequences and backward reach, from the markings alone.
+//!
+//! A shortest sequence from M0 is found backwards under interleaving: the rule is run in reverse and a predecessor on
+//! the level before is taken, so a path costs its length times the number of transitions. Under steps the parent
+//! was stored. Between two markings it is a breadth-first search. Backward reach (which markings can still get
+//! there: doomed markings are the complement) runs the rule in reverse, 64 markings at a time, and so needs no edges;
+//! under steps, where the rule has no simple reverse, it turns the stored edges round (`scc.rs`).
+
+use crate::budget::{Memory, Stop, Watch};
+use crate::explore::{Edges, NONE, Space};
+use crate::marking::{Width, linear_hash, slice};
+use crate::scc::Csr;
+use crate::with_width;
+
+/// A firing sequence: the set fired at each edge, a single transition under interleaving.
+pub type Sequence = Vec<Vec<u32>>;
+
+/// The fired set of some edge between two markings, the first in the order of edges.
+fn fired_between(space: &Space, from: u32, to: u32, memory: &Memory, watch: &mut Watch<'_>) -> Result<Vec<u32>, Stop> {
+    let mut edges = Edges::new(space);
+    let mut found = None;
+    edges.visit(&[from], memory, watch, &mut |_, fired, target| {
+        if target == to && found.is_none() {
+            found = Some(fired.transitions());
+        }
+        Ok(())
+    })?;
+    edges.finish(memory);
+    Ok(found.unwrap_or_default())
+}
+
+/// The fired sets along a path of markings.
+fn sequence(space: &Space, path: &[u32], memory: &Memory, watch: &mut Watch<'_>) -> Result<Sequence, Stop> {
+    path.windows(2).map(|pair| fired_between(space, pair[0], pair[1], memory, watch)).collect()
+}
+
+/// A shortest firing sequence from M0.
+pub fn path_to(space: &Space, index: u32, watch: &mut Watch<'_>) -> Result<Sequence, Stop> {
+    let memory = space.memory.clone();
+    let mut path = vec![index];
+    let mut at = index;
+    while at != 0 {
+        at = if space.step { space.parents[at as usize] } else { predecessor(space, at) };
+        path.push(at);
+    }
+    path.reverse();
+    sequence(space, &path, &memory, watch)
+}
+
+/// A predecessor on the level before; by the order of exploration every marking but M0 has one.
+fn predecessor(space: &Space, index: u32) -> u32 {
+    let level = space.levels.partition_point(|&start| start <= index) - 1;
+    let here = space.levels[level];
+    let words = space.net.words;
+    let marking = space.marking(index as usize);
+    let mut before = vec![0; words];
+    let mut best = NONE;
+    for t in space.enabled_by(&space.net.backward, marking, true) {
+        let flip = space.net.flip(t as usize, words);
+        for k in 0..words {
+            before[k] = marking[k] ^ flip[k];
+        }
+        if let Some(found) = space.find(&before).filter(|&found| found < here) {
+            best = best.min(found);
+        }
+    }
+    assert_ne!(best, NONE, "a marking beyond M0 was found by firing from the level before");
+    best
+}
+
+/// A shortest sequence from a marking to one of `targets` (one byte for each marking), and the index reached; every
+/// marking before the last is in `within`. Empty where `from` is itself a target.
+pub fn path_between(
+    space: &Space,
+    from: u32,
+    targets: &[u8],
+    within: Option<&[u8]>,
+    watch: &mut Watch<'_>,
+) -> Result<Option<(Sequence, u32)>, Stop> {
+    let memory = space.memory.clone();
+    if targets[from as usize] != 0 {
+        return Ok(Some((Vec::new(), from)));
+    }
+    let inside = |index: u32| within.is_none_or(|within| within[index as usize] != 0);
+    if !inside(from) {
+        return Ok(None);
+    }
+    let mut parents = memory.filled(NONE, space.len())?;
+    parents[from as usize] = from;
+    let mut queue = Vec::new();
+    memory.push(&mut queue, from)?;
+    let mut edges = Edges::new(space);
+    let mut reached = None;
+    let mut next = 0;
+    while next < queue.len() && reached.is_none() {
+        let source = queue[next];
+        next += 1;
+        edges.visit(&[source], &memory, watch, &mut |source, _, target| {
+            if parents[target as usize] == NONE {
+                parents[target as usize] = source;
+                if targets[target as usize] != 0 {
+                    reached = reached.or(Some(target));
+                } else if inside(target) {
+                    memory.push(&mut queue, target)?;
+                }
+            }
+            Ok(())
+        })?;
+    }
+    let Some(reached) = reached else { return Ok(None) };
+    let mut path = vec![reached];
+    let mut at = reached;
+    while at != from {
+        at = parents[at as usize];
+        path.push(at);
+    }
+    path.reverse();
+    Ok(Some((sequence(space, &path, &memory, watch)?, reached)))
+}
+
+/// The markings from which a target can be reached, one byte each, targets included; every marking on the way before
+/// the target is in `within`.
+pub fn backward(space: &Space, targets: &[u8], within: Option<&[u8]>, watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
+    let memory = space.memory.clone();
+    let mut reach = memory.filled(0u8, space.len())?;
+    let mut stack = Vec::new();
+    for (index, _) in targets.iter().enumerate().filter(|&(_, &target)| target != 0) {
+        reach[index] = 1;
+        memory.push(&mut stack, index as u32)?;
+    }
+    if space.step {
+        let edges = Csr::new(space, None, &memory, watch)?.reversed(&memory, watch)?;
+        while let Some(index) = stack.pop() {
+            let sources = edges.targets(index);
+            for &source in sources {
+                if reach[source as usize] == 0 && within.is_none_or(|within| within[source as usize] != 0) {
+                    reach[source as usize] = 1;
+                    memory.push(&mut stack, source)?;
+                }
+            }
+            watch.tick(1 + sources.len())?;
+        }
+    } else {
+        with_width!(space.net.words, width => {
+            backward_interleaving(width, space, within, &mut reach, &mut stack, &memory, watch)
+        })?;
+    }
+    Ok(reach)
+}
+
+fn backward_interleaving<W: Width>(
+    width: W,
+    space: &Space,
+    within: Option<&[u8]>,
+    reach: &mut [u8],
+    stack: &mut Vec<u32>,
+    memory: &Memory,
+    watch: &mut Watch<'_>,
+) -> Result<(), Stop> {
+    let words = width.words();
+    let net = &*space.net;
+    let mut markings = Vec::with_capacity(64 * words);
+    let mut slices = vec![0; 64 * words];
+    let mut before = vec![0; words];
+    while !stack.is_empty() {
+        let rest = stack.len().saturating_sub(64);
+        markings.clear();
+        for &index in &stack[rest..] {
+            markings.extend_from_slice(space.table.store.get(width, index as usize));
+        }
+        let count = stack.len() - rest;
+        stack.truncate(rest);
+        slice(width, &markings, &mut slices);
+        let valid = if count == 64 { !0 } else { (1 << count) - 1 };
+        for t in 0..net.transitions.len() {
+            let (base, _) = net.backward.test(t, &slices, valid);
+            let mut fire = base & net.backward.edge(t);
+            while fire != 0 {
+                let j = fire.trailing_zeros() as usize;
+                fire &= fire - 1;
+                for ((to, from), flip) in before.iter_mut().zip(&markings[j * words..]).zip(net.flip(t, words)) {
+                    *to = from ^ flip;
+                }
+                let Some(source) = space.table.find(width, &before, linear_hash(width, &before)) else { continue };
+                if reach[source as usize] == 0 && within.is_none_or(|within| within[source as usize] != 0) {
+                    reach[source as usize] = 1;
+                    memory.push(stack, source)?;
+                }
+                watch.tick(1)?;
+            }
+        }
+        watch.tick(count)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explore::Limits;
+    use crate::net::{Net, Transition};
+
+    /// 0 -> 1 -> 2 -> 0 and 1 -> 3 (a dead end), as one token.
+    fn lasso(step: bool) -> Space {
+        let arc = |from, to| Transition::new(&[from], &[to], &[], &[], &[]);
+        let net = Net::new(4, vec![arc(0, 1), arc(1, 2), arc(2, 0), arc(1, 3)], &[0]).expect("well formed");
+        let limits = Limits { step, markings: 100, memory_bytes: 1 << 20, time: None };
+        Space::explore(net, limits, &mut || false).expect("fits")
+    }
+
+    #[test]
+    fn paths_are_shortest_and_backward_reach_excludes_the_dead_end() {
+        for step in [false, true] {
+            let space = lasso(step);
+            let mut poll = || false;
+            let mut watch = Watch::new(None, &mut poll);
+            let dead = space.deadlocks[0];
+            assert_eq!(path_to(&space, dead, &mut watch), Ok(vec![vec![0], vec![3]]));
+            let two = space.find(&[0b100]).expect("reachable");
+            let mut targets = vec![0; 4];
+            targets[dead as usize] = 1;
+            let path = path_between(&space, two, &targets, None, &mut watch);
+            assert_eq!(path, Ok(Some((vec![vec![2], vec![0], vec![3]], dead))));
+            let mut within = vec![1; 4];
+            within[0] = 0;
+            assert_eq!(path_between(&space, two, &targets, Some(&within), &mut watch), Ok(None));
+            let mut start = vec![0; 4];
+            start[0] = 1;
+            let reach = backward(&space, &start, None, &mut watch).expect("fits");
+            assert_eq!((reach.iter().map(|&b| u32::from(b)).sum::<u32>(), reach[dead as usize]), (3, 0));
+        }
+    }
+}

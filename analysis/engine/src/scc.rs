@@ -1,0 +1,316 @@
+//! Strongly connected components of the reachability graph, and what follows from the bottom ones.
+//!
+//! A bottom component is one that no edge leaves; every run can be led into one and none gets out. So a transition is live
+//! exactly if it fires in every bottom component, a home marking exists exactly if there is one bottom component
+//! (and then its markings are the home markings), and the net is reversible exactly if all markings are one component.
+//!
+//! Under interleaving the common case needs no edges: if M0 is reached backwards from everywhere, there is one component.
+//! Otherwise edges are stored as compressed rows (4 bytes each, 8 a marking) within the memory budget, and
+//! components are found by Pearce's one-array form of Tarjan's algorithm ("A space-efficient algorithm for finding strongly
+//! connected components", 2016), with its own stack. Forward-backward splitting without edges was rejected: its cost
+//! grows with the number of components, and an acyclic graph has as many as markings.
+
+use crate::budget::{Memory, Stop, Watch};
+use crate::explore::{Edges, Space};
+use crate::paths;
+
+/// Successors as compressed rows.
+#[derive(Debug)]
+pub struct Csr {
+    /// Where the row of each marking begins; one more than there are markings.
+    pub offsets: Vec<u64>,
+    /// Targets, row by row, in the order of the edges.
+    pub targets: Vec<u32>,
+}
+
+impl Csr {
+    /// Stores the edges that stay within a set of markings (one byte each), or all.
+    pub fn new(space: &Space, within: Option<&[u8]>, memory: &Memory, watch: &mut Watch<'_>) -> Result<Self, Stop> {
+        let count = space.len();
+        let inside = |index: u32| within.is_none_or(|within| within[index as usize] != 0);
+        let mut offsets = memory.filled(0u64, count + 1)?;
+        // Of the whole graph the number of edges is known, so nothing is claimed twice.
+        let mut targets: Vec<u32> = Vec::new();
+        if within.is_none() {
+            let edges = usize::try_from(space.edges).map_err(|_| Stop::Memory)?;
+            memory.claim(edges.checked_mul(4).ok_or(Stop::Memory)?)?;
+            targets.try_reserve_exact(edges).map_err(|_| Stop::Memory)?;
+        }
+        let mut edges = Edges::new(space);
+        let mut sources = Vec::with_capacity(64);
+        for first in (0..count).step_by(64) {
+            sources.clear();
+            sources.extend((first as u32..count.min(first + 64) as u32).filter(|&source| inside(source)));
+            edges.visit(&sources, memory, watch, &mut |source, _, target| {
+                if inside(target) {
+                    offsets[source as usize + 1] += 1;
+                    memory.push(&mut targets, target)?;
+                }
+                Ok(())
+            })?;
+        }
+        edges.finish(memory);
+        for index in 0..count {
+            offsets[index + 1] += offsets[index];
+        }
+        Ok(Csr { offsets, targets })
+    }
+
+    /// The successors of a marking.
+    pub fn targets(&self, index: u32) -> &[u32] {
+        &self.targets[self.offsets[index as usize] as usize..self.offsets[index as usize + 1] as usize]
+    }
+
+    /// The same edges by their target.
+    pub fn reversed(self, memory: &Memory, watch: &mut Watch<'_>) -> Result<Csr, Stop> {
+        let count = self.offsets.len() - 1;
+        let mut offsets = memory.filled(0u64, count + 2)?;
+        let mut sources = memory.filled(0u32, self.targets.len())?;
+        for &target in &self.targets {
+            offsets[target as usize + 2] += 1;
+        }
+        for index in 0..=count {
+            offsets[index + 1] += offsets[index];
+        }
+        for source in 0..count as u32 {
+            let row = self.targets(source);
+            for &target in row {
+                let at = &mut offsets[target as usize + 1];
+                sources[*at as usize] = source;
+                *at += 1;
+            }
+            watch.tick(1 + row.len())?;
+        }
+        offsets.pop();
+        Ok(Csr { offsets, targets: sources })
+    }
+}
+
+/// The strongly connected components, numbered so that edges lead from higher to lower numbers or stay.
+#[derive(Debug)]
+pub struct Scc {
+    /// The component of each marking; `NONE` outside the set asked for.
+    pub of: Vec<u32>,
+    /// How many markings each component has.
+    pub sizes: Vec<u32>,
+    /// One for each component that no edge (within the set) leaves.
+    pub bottom: Vec<u8>,
+    /// One for each component without an edge inside: a single marking without an edge to itself.
+    pub trivial: Vec<u8>,
+}
+
+impl Scc {
+    /// The components of the graph, or of its part within a set of markings.
+    pub fn new(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> Result<Self, Stop> {
+        if !space.step && within.is_none() && reversible(space, watch)? {
+            let memory = space.memory.clone();
+            return Ok(Scc {
+                of: memory.filled(0, space.len())?,
+                sizes: vec![space.len() as u32],
+                bottom: vec![1],
+                trivial: vec![u8::from(space.edges == 0)],
+            });
+        }
+        let memory = space.memory.clone();
+        let edges = Csr::new(space, within, &memory, watch)?;
+        Scc::of_edges(&edges, within, &memory, watch)
+    }
+
+    fn of_edges(edges: &Csr, within: Option<&[u8]>, memory: &Memory, watch: &mut Watch<'_>) -> Result<Self, Stop> {
+        let (of, count) = pearce(edges, within, memory, watch)?;
+        let mut sizes = memory.filled(0u32, count)?;
+        let mut bottom = memory.filled(1u8, count)?;
+        let mut trivial = memory.filled(1u8, count)?;
+        for (index, &component) in of.iter().enumerate().filter(|&(_, &component)| component != crate::explore::NONE) {
+            let component = component as usize;
+            sizes[component] += 1;
+            for &target in edges.targets(index as u32) {
+                if of[target as usize] as usize == component {
+                    trivial[component] = 0;
+                } else {
+                    bottom[component] = 0;
+                }
+            }
+        }
+        Ok(Scc { of, sizes, bottom, trivial })
+    }
+}
+
+/// Pearce's algorithm: one array is at once the order of discovery, the low link and the component.
+///
+/// Components are numbered downwards from the number of markings and never meet the orders, which are renumbered from
+/// the bottom as components are completed; at the end they are turned round, so the first completed is 0.
+fn pearce(
+    edges: &Csr,
+    within: Option<&[u8]>,
+    memory: &Memory,
+    watch: &mut Watch<'_>,
+) -> Result<(Vec<u32>, usize), Stop> {
+    let count = edges.offsets.len() - 1;
+    let top = count as u32 + 1;
+    let mut rank = memory.filled(0u32, count)?;
+    let mut order = 1;
+    let mut component = top;
+    // Markings whose component is still open, and the markings on the way from the root with the edge to follow next.
+    let mut open: Vec<u32> = Vec::new();
+    let mut way: Vec<(u32, bool, u64)> = Vec::new();
+    for root in 0..count as u32 {
+        if rank[root as usize] != 0 || within.is_some_and(|within| within[root as usize] == 0) {
+            continue;
+        }
+        rank[root as usize] = order;
+        order += 1;
+        memory.push(&mut way, (root, true, edges.offsets[root as usize]))?;
+        while let Some(&mut (at, ref mut is_root, ref mut edge)) = way.last_mut() {
+            if *edge < edges.offsets[at as usize + 1] {
+                let target = edges.targets[*edge as usize];
+                if rank[target as usize] == 0 {
+                    // The edge is followed once more when the target is done: then its rank is compared.
+                    rank[target as usize] = order;
+                    order += 1;
+                    memory.push(&mut way, (target, true, edges.offsets[target as usize]))?;
+                    continue;
+                }
+                if rank[target as usize] < rank[at as usize] {
+                    rank[at as usize] = rank[target as usize];
+                    *is_root = false;
+                }
+                *edge += 1;
+                continue;
+            }
+            let complete = *is_root;
+            way.pop();
+            watch.tick(1)?;
+            if complete {
+                order -= 1;
+                while let Some(&last) = open.last() {
+                    if rank[at as usize] > rank[last as usize] {
+                        break;
+                    }
+                    open.pop();
+                    rank[last as usize] = component;
+                    order -= 1;
+                }
+                rank[at as usize] = component;
+                component -= 1;
+            } else {
+                memory.push(&mut open, at)?;
+            }
+        }
+    }
+    for rank in &mut rank {
+        *rank = if *rank == 0 { crate::explore::NONE } else { top - *rank };
+    }
+    memory.drop_vec(open);
+    memory.drop_vec(way);
+    Ok((rank, (top - component) as usize))
+}
+
+/// Whether M0 can be reached from everywhere.
+pub fn reversible(space: &Space, watch: &mut Watch<'_>) -> Result<bool, Stop> {
+    if space.step {
+        return Ok(Scc::new(space, None, watch)?.sizes.len() == 1);
+    }
+    let memory = space.memory.clone();
+    let mut initial = memory.filled(0u8, space.len())?;
+    initial[0] = 1;
+    Ok(paths::backward(space, &initial, None, watch)?.iter().all(|&reached| reached != 0))
+}
+
+/// For each transition, whether it fires in every bottom component.
+///
+/// A transition that is firable and openable fires on some edge under steps too: some valuation opens it, and any
+/// single transition extends to a maximal set.
+pub fn live(space: &Space, scc: &Scc, watch: &mut Watch<'_>) -> Result<Vec<bool>, Stop> {
+    let transitions = space.net.transitions.len();
+    if scc.bottom.iter().zip(&scc.trivial).any(|(&bottom, &trivial)| bottom != 0 && trivial != 0) {
+        return Ok(vec![false; transitions]);
+    }
+    let memory = space.memory.clone();
+    let words = transitions.div_ceil(64);
+    let mut number = memory.filled(0u32, scc.bottom.len())?;
+    let mut bottoms = 0;
+    for (number, _) in number.iter_mut().zip(&scc.bottom).filter(|&(_, &bottom)| bottom != 0) {
+        *number = bottoms;
+        bottoms += 1;
+    }
+    let mut fires = memory.filled(0u64, bottoms as usize * words)?;
+    let mut edges = Edges::new(space);
+    let mut members = Vec::with_capacity(64);
+    for first in (0..space.len()).step_by(64) {
+        members.clear();
+        let batch = first..space.len().min(first + 64);
+        members.extend(batch.filter(|&index| scc.bottom[scc.of[index] as usize] != 0).map(|index| index as u32));
+        edges.load(&members);
+        for (j, &member) in members.iter().enumerate() {
+            let row = number[scc.of[member as usize] as usize] as usize * words;
+            for &t in edges.firable(j) {
+                fires[row + t as usize / 64] |= 1 << (t % 64);
+            }
+        }
+        watch.tick(64)?;
+    }
+    Ok((0..transitions)
+        .map(|t| (0..bottoms as usize).all(|row| fires[row * words + t / 64] >> (t % 64) & 1 == 1))
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn components(edges: &[&[u32]]) -> Scc {
+        let memory = Memory::new(1 << 20);
+        let mut poll = || false;
+        let mut watch = Watch::new(None, &mut poll);
+        let mut csr = Csr { offsets: vec![0], targets: Vec::new() };
+        for row in edges {
+            csr.targets.extend_from_slice(row);
+            csr.offsets.push(csr.targets.len() as u64);
+        }
+        Scc::of_edges(&csr, None, &memory, &mut watch).expect("fits")
+    }
+
+    #[test]
+    fn two_cycles_joined_by_an_edge_are_two_components() {
+        let scc = components(&[&[1], &[0, 2], &[3], &[2]]);
+        assert_eq!(scc.of, [1, 1, 0, 0]);
+        assert_eq!((scc.sizes, scc.bottom, scc.trivial), (vec![2, 2], vec![1, 0], vec![0, 0]));
+    }
+
+    #[test]
+    fn a_loop_makes_a_single_marking_nontrivial() {
+        let scc = components(&[&[0, 1], &[]]);
+        assert_eq!((scc.of, scc.bottom, scc.trivial), (vec![1, 0], vec![1, 0], vec![1, 0]));
+    }
+
+    #[test]
+    fn components_agree_with_mutual_reachability_on_all_graphs_of_four_markings() {
+        for bits in 0..1u32 << 16 {
+            let rows: Vec<Vec<u32>> =
+                (0..4).map(|i| (0..4).filter(|j| bits >> (4 * i + j) & 1 == 1).collect()).collect();
+            let mut reach = [[false; 4]; 4];
+            for i in 0..4 {
+                reach[i][i] = true;
+                for &j in &rows[i] {
+                    reach[i][j as usize] = true;
+                }
+            }
+            for k in 0..4 {
+                for i in 0..4 {
+                    for j in 0..4 {
+                        reach[i][j] |= reach[i][k] && reach[k][j];
+                    }
+                }
+            }
+            let scc = components(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>());
+            for i in 0..4 {
+                for j in 0..4 {
+                    assert_eq!(scc.of[i] == scc.of[j], reach[i][j] && reach[j][i], "{rows:?}");
+                }
+                let leaves = (0..4).any(|j| reach[i][j] && !reach[j][i]);
+                assert_eq!(scc.bottom[scc.of[i] as usize] == 0, leaves, "{rows:?}");
+            }
+        }
+    }
+}
