@@ -1,0 +1,120 @@
+"""What controllers and their coordinator say to each other, and what the protocol machines do besides talking.
+
+The protocol is the voting of the paper with the obligations of SEMANTICS, "Decomposition":
+
+1. Each controller tells which of its parts are enabled (`Report`, also attached to votes and acknowledgements). This is
+   a *hint*: it only says when asking is worth while, and nothing is ever fired on it.
+2. Where the hints of all participants say yes, the coordinator opens a *round* over the transitions of one arbitration
+   group and asks their participants for promises (`VoteRequest`). A vote answers for each part; each yes is a promise
+   (O1).
+3. Of the transitions with all votes yes, the arbiter of the group chooses one (O2). The decision, commit or abort, goes
+   to all who were asked, is applied once, and is repeated until acknowledged (O5). It releases the promises.
+
+Rejected: promises given unasked, as soon as a part is enabled. Two parts of one controller in conflict could then
+hold each other's transitions up for ever, each promised where the other is needed.
+
+`closed_below` lets a controller forget: every round with a smaller number is decided and acknowledged by all, so
+that whatever still arrives of it is an old copy. `seen` tells which report has arrived, so that only lost ones are
+repeated. Messages may be lost, delayed, doubled and overtaken; none is trusted for more than its round.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Readiness:
+    """The coordinated transitions whose parts are enabled in a controller now; a larger sequence number is newer."""
+
+    sequence: int
+    transitions: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A controller's readiness has changed."""
+
+    controller: str
+    readiness: Readiness
+
+
+@dataclass(frozen=True, slots=True)
+class VoteRequest:
+    """The coordinator asks a controller to promise its parts of these transitions, as far as they are enabled."""
+
+    controller: str
+    round: int
+    transitions: tuple[str, ...]
+    closed_below: int
+    seen: int
+
+
+@dataclass(frozen=True, slots=True)
+class Vote:
+    """The answer: yes (a promise) for the parts of `promised`, no for the others asked for."""
+
+    controller: str
+    round: int
+    promised: frozenset[str]
+    readiness: Readiness
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """The round is decided: `committed` fires, or nothing does where it is None; all promises of the round end."""
+
+    controller: str
+    round: int
+    committed: str | None
+    closed_below: int
+    seen: int
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledgement:
+    """The controller has applied the decision of the round."""
+
+    controller: str
+    round: int
+    readiness: Readiness
+
+
+ToController = VoteRequest | Decision
+"""Messages from the coordinator; `controller` is the receiver."""
+
+ToCoordinator = Report | Vote | Acknowledgement
+"""Messages to the coordinator; `controller` is the sender."""
+
+Message = ToController | ToCoordinator
+
+
+@dataclass(frozen=True, slots=True)
+class Firing:
+    """A transition of the central net fires now: a local one in its controller, another at the coordinator's commit."""
+
+    transition: str
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """A controller takes a new value of a signal into its process image; from now on gates read it."""
+
+    signal: str
+    value: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Sending:
+    """The command of `place` goes to its machine; `entry` counts the commands that share its completion signal."""
+
+    place: str
+    entry: int
+
+
+Effect = Message | Firing | Taken | Sending
+"""What a protocol machine wants done, in this order."""
+
+
+class ProtocolError(RuntimeError):
+    """A machine was told something that the protocol excludes: a fault of the program, never of its user."""

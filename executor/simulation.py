@@ -1,0 +1,181 @@
+"""Deterministic simulation of the protocol: the machines that run the cell, on a bad network, from one seed.
+
+Messages are delivered in any order, after any time, and if asked for lost or doubled; controllers run at any speed;
+signals change whenever they like. All of it is drawn from one seeded source, so a seed is a run. Checked in every run:
+
+- the joint trace is a trace of the central net (the caller replays it), with the marking that the controllers are in;
+- no progress is lost: once the network is quiet, something fires if anything is enabled.
+
+The machines are passed in as classes, so that a test can plant a fault in one and see that this module finds it. The
+alternative, unit tests of single messages, only finds the orders of messages that somebody has thought of.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from firable.executor.controller import LocalController
+from firable.executor.coordinator import Coordinator
+from firable.executor.messages import (
+    Acknowledgement,
+    Decision,
+    Effect,
+    Firing,
+    Message,
+    Report,
+    Sending,
+    Taken,
+    Vote,
+    VoteRequest,
+)
+from firable.executor.token_player import TokenPlayer
+from firable.nets.decomposition import Decomposition
+from firable.nets.net import Marking, SignalKind
+from firable.semantics.trace import CommandSent, End, Event, Fired, Header, SignalChanged, Trace
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """How bad the network is: the probabilities that a delivery is lost, and that it is not the last of its message."""
+
+    loss: float = 0.0
+    duplication: float = 0.0
+
+
+class ProgressLostError(AssertionError):
+    """A transition is enabled for good, the network is quiet, and nothing fires."""
+
+
+class Simulation:
+    """One run of the machines of a decomposition; a second run from the same seed is the same."""
+
+    def __init__(
+        self,
+        decomposition: Decomposition,
+        seed: int,
+        network: Network = Network(),
+        coordinator: Callable[[Decomposition], Coordinator] = Coordinator,
+        controller: Callable[[Decomposition, str], LocalController] = LocalController,
+    ) -> None:
+        self.net = decomposition.net
+        self.random = random.Random(seed)
+        self.network = network
+        self.coordinator = coordinator(decomposition)
+        self.controllers = {subnet.name: controller(decomposition, subnet.name) for subnet in decomposition.subnets}
+        self.owner_of = {signal.name: subnet.name for subnet in decomposition.subnets for signal in subnet.signals}
+        self.sensors = [signal.name for signal in self.net.signals if signal.kind is SignalKind.SENSOR]
+        self.values = dict.fromkeys(self.sensors, False)
+        self.in_flight: list[Message] = []
+        self.completing: list[tuple[str, int]] = []
+        self.events: list[Event] = []
+        self.messages = 0
+
+    def run(self, steps: int) -> Trace:
+        """Let `steps` random things happen, then let the network fall quiet, and return the joint trace.
+
+        Raises `ProgressLostError`, and `ProtocolError` where a machine notices that it was told something impossible.
+        """
+        for name in self.controllers:
+            self._perform(self.controllers[name].report())
+        for _ in range(steps):
+            self._something()
+        self._quieten(fire=False)
+        self._check_progress()
+        self._quieten(fire=False)
+        marking = self.net.names(self.marking)
+        header = Header(self.net.name, signals=True, commands=True)
+        return Trace(header, tuple(self.events), End(float(len(self.events)), marking, "simulated"))
+
+    @property
+    def marking(self) -> Marking:
+        """The joint marking of the controllers."""
+        return self.net.marking(
+            place for controller in self.controllers.values() for place in controller.subnet.names(controller.marking)
+        )
+
+    def enabled(self) -> tuple[str, ...]:
+        """The transitions of the central net that are enabled under the joint marking and process image."""
+        images = (controller for controller in self.controllers.values())
+        names = [s.name for c in images for s in c.subnet.signals if c.word & c.player.signal_bit(s.name)]
+        player = TokenPlayer.of(self.net)
+        word = self.marking | sum(player.signal_bit(name) for name in names)
+        return tuple(c.name for c in player.transitions.values() if c.enabled(word))
+
+    def _something(self) -> None:
+        choice = self.random.random()
+        if choice < 0.55 and self.in_flight:
+            self._deliver()
+        elif choice < 0.80:
+            self._turn(self.random.choice(list(self.controllers.values())))
+        elif choice < 0.87 and self.completing:
+            signal, entry = self.completing.pop(self.random.randrange(len(self.completing)))
+            self._perform(self.controllers[self.owner_of[signal]].read(signal, value=True, entry=entry))
+        elif choice < 0.96 and self.sensors:
+            signal = self.random.choice(self.sensors)
+            self.values[signal] = not self.values[signal]
+            self._perform(self.controllers[self.owner_of[signal]].read(signal, self.values[signal]))
+        elif choice >= 0.96:
+            self._perform(self.coordinator.resend())
+            for controller in self.controllers.values():
+                self._perform(controller.resend())
+
+    def _turn(self, controller: LocalController) -> None:
+        if self.random.random() < 0.5:
+            self._perform(controller.fire())
+        self._perform(controller.report())
+
+    def _deliver(self) -> None:
+        message = self.in_flight.pop(self.random.randrange(len(self.in_flight)))
+        if self.random.random() < self.network.duplication:
+            self.in_flight.append(message)
+        if self.random.random() >= self.network.loss:
+            self._receive(message)
+
+    def _receive(self, message: Message) -> None:
+        self.messages += 1
+        if isinstance(message, VoteRequest | Decision):
+            self._perform(self.controllers[message.controller].receive(message))
+        else:
+            self._perform(self.coordinator.receive(message))
+
+    def _perform(self, effects: list[Effect]) -> None:
+        at = float(len(self.events))
+        for effect in effects:
+            match effect:
+                case Firing(transition):
+                    self.events.append(Fired(at, (transition,)))
+                case Taken(signal, value):
+                    self.events.append(SignalChanged(at, signal, value))
+                case Sending(place, entry):
+                    self.events.append(CommandSent(at, place))
+                    if completion := self.net.place(place).completion:
+                        self.completing.append((completion, entry))
+                case VoteRequest() | Decision() | Report() | Vote() | Acknowledgement():
+                    self.in_flight.append(effect)
+
+    def _quieten(self, *, fire: bool) -> None:
+        """Deliver everything in order and repeat what is unanswered until nothing is; with `fire`, until one fires."""
+        self._perform(self.coordinator.permit(None if fire else 0))
+        before = self._firings()
+        for _ in range(1000):
+            for controller in self.controllers.values():
+                self._perform([*(controller.fire() if fire else []), *controller.report(), *controller.resend()])
+            self._perform(self.coordinator.resend())
+            while self.in_flight:
+                self._receive(self.in_flight.pop(0))
+                if fire and self._firings() > before:
+                    return
+            if self.coordinator.idle and not (fire and self._firings() > before):
+                return
+
+    def _firings(self) -> int:
+        return sum(isinstance(event, Fired) for event in self.events)
+
+    def _check_progress(self) -> None:
+        enabled, before = self.enabled(), self._firings()
+        if enabled:
+            self._quieten(fire=True)
+            if self._firings() == before:
+                raise ProgressLostError(f"{', '.join(enabled)} enabled in {', '.join(self.net.names(self.marking))}")

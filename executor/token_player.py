@@ -1,0 +1,144 @@
+"""The token player: Eq. (1)-(2) of one net compiled to two masks a transition, for the machine that fires.
+
+Places and signals of a net share one integer, the *word*: bit i is place i, bit n + j is signal j of a net of n places.
+A transition is enabled iff all bits of `needs` are set and none of `forbids`; it fires by clearing and setting bits.
+The completion signal of a command is cleared in the same act in which the token enters the place (SEMANTICS,
+"Completion gates"), so for the protocol a completion is one more thing that a transition writes, and a gate one more
+that it reads.
+
+This is a compiled copy of the rule, not the rule: `firable.semantics.firing` is, and the tests hold the copy to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Self
+
+from firable.nets.decomposition import ArbitrationGroup
+from firable.nets.net import Marking, Net
+from firable.semantics.arbitration import Arbitration, Group, Turns
+from firable.semantics.conflict import conflicts
+
+Word = int
+"""A marking and a valuation of the signals, as bits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """One transition over words."""
+
+    name: str
+    needs: Word
+    forbids: Word
+    takes: Word
+    puts: Word
+    clears: Word
+
+    @property
+    def writes(self) -> Word:
+        """The places that change and the completion signals that are cleared."""
+        return self.takes | self.puts | self.clears
+
+    @property
+    def reads(self) -> Word:
+        """The sources of gates, internal and external, and everything written."""
+        return self.needs | self.forbids | self.clears
+
+    def enabled(self, word: Word) -> bool:
+        """Eq. (1) and (2): firable, and every external gate open."""
+        return word & self.needs == self.needs and not word & self.forbids
+
+    def firable(self, word: Word, places: Word) -> bool:
+        """Eq. (1) alone; `places` masks the bits of the places."""
+        return word & self.needs & places == self.needs & places and not word & self.forbids & places
+
+    def fire(self, word: Word) -> Word:
+        """Eq. (3)-(4), and the completion signals of the places entered cleared."""
+        return word & ~(self.takes | self.clears) | self.puts
+
+    def disturbs(self, writes: Word, reads: Word) -> bool:
+        """Whether firing could change what another reads, or reads what another will write (O1)."""
+        return bool(self.writes & reads or self.reads & writes)
+
+
+@dataclass(frozen=True)
+class TokenPlayer:
+    """The compiled transitions of a net, by name in the order of the net."""
+
+    net: Net
+    transitions: dict[str, Compiled]
+    places: Word
+    """The bits of the places."""
+
+    @classmethod
+    def of(cls, net: Net) -> Self:
+        """Compile a net."""
+        signal_bit = {signal.name: 1 << len(net.places) + j for j, signal in enumerate(net.signals)}
+        compiled = {}
+        for t, transition in enumerate(net.transitions):
+            masks = net.masks[t]
+            opening = sum({signal_bit[gate.signal] for gate in transition.external if gate.wanted})
+            closing = sum({signal_bit[gate.signal] for gate in transition.external if not gate.wanted})
+            completions = {net.place(place).completion for place in transition.outputs}
+            compiled[transition.name] = Compiled(
+                transition.name,
+                needs=masks.inputs | masks.permissive | opening,
+                forbids=masks.outputs | masks.inhibitive | closing,
+                takes=masks.inputs,
+                puts=masks.outputs,
+                clears=sum(signal_bit[name] for name in completions if name is not None),
+            )
+        return cls(net, compiled, (1 << len(net.places)) - 1)
+
+    def marking(self, word: Word) -> Marking:
+        """The marking in the word."""
+        return word & self.places
+
+    def signal_bit(self, signal: str) -> Word:
+        """The bit of a signal; `KeyError` where there is none."""
+        return 1 << len(self.net.places) + self.net.signal_index[signal]
+
+    def entered(self, transition: str) -> tuple[str, ...]:
+        """The places with a command that a firing of the transition enters, in the order of the net."""
+        outputs = self.net.transition(transition).outputs
+        return tuple(sorted((p for p in outputs if self.net.place(p).command), key=self.net.place_index.__getitem__))
+
+
+class Arbiter:
+    """Chooses one of the enabled transitions at a time, by the arbitration groups it has to decide.
+
+    Interleaving fires one transition at a time, so a maximal set without conflict is chosen as a sequence of single
+    choices, each made on the transitions enabled then. Where no conflict decides, the first behind the last winner is
+    taken, so that a transition that is always enabled does not keep others from their turn.
+    """
+
+    def __init__(self, net: Net, groups: Iterable[ArbitrationGroup]) -> None:
+        index = net.transition_index
+        self.net = net
+        self.arbitration = Arbitration(
+            conflicts(net),
+            tuple(
+                Group(g.name, tuple(index[t] for t in g.sequence), tuple(index[t] for t in g.rest), g.by)
+                for g in groups
+            ),
+        )
+        self.turns: Turns = self.arbitration.first_turns
+        self.last = -1
+
+    def choose(self, enabled: Iterable[str]) -> str:
+        """The one transition to fire now; `enabled` must not be empty."""
+        candidates = frozenset(self.net.transition_index[name] for name in enabled)
+        if len(candidates) == 1:
+            (self.last,) = candidates
+            return self.net.transitions[self.last].name
+        granted, _ = self.arbitration.decide(candidates, self.turns)
+        count = len(self.net.transitions)
+        chosen = min(granted, key=lambda t: (t - self.last - 1) % count)
+        self.last = chosen
+        if self.arbitration.conflicts.input_rivals[chosen] & candidates:
+            self.turns = tuple(
+                group.turn_after(chosen, turn) if chosen in group.sequence else turn
+                for group, turn in zip(self.arbitration.groups, self.turns, strict=True)
+            )
+        return self.net.transitions[chosen].name
