@@ -33,7 +33,7 @@ def complement(net: Net, place: str, *, new_name: str | None = None, flip_gates:
             [
                 Diagnostic(
                     "F2020",
-                    f"'{place}' has an output signal, sent when a token enters; its complement would send it on leaving",
+                    f"'{place}' has an output signal, sent when a token enters; its complement would do so on leaving",
                     "complement a place that sends no command",
                     ("places", place),
                 )
