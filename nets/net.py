@@ -29,7 +29,7 @@ Marking = int
 """The set of places with a token; bit i is place i of the net."""
 
 _PROBLEMS_MAX: Final = 100  # enough to read; a file of noise has millions
-_FORBIDDEN_IN_NAMES: Final = frozenset(" \t\r\n()[]{},:#&*!|>'\"%@`\\")
+FORBIDDEN_IN_NAMES: Final = frozenset(" \t\r\n()[]{},:#&*!|>'\"%@`\\")
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,7 +320,7 @@ def _duplicate_names(net: Net) -> Iterator[Diagnostic]:
             singular = {"properties": "property"}.get(kind, kind[:-1])
             if (
                 not name
-                or _FORBIDDEN_IN_NAMES & set(name)
+                or FORBIDDEN_IN_NAMES & set(name)
                 or not name.isprintable()
                 or name in {"and", "or", "not", "->"}
             ):

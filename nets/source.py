@@ -67,37 +67,41 @@ def read_source(path: str | Path, size_bytes_max: int) -> Source:
     Raises `InputError`: F1001 where there is no such file or it may not be read, F1003 where it is too large, F1004
     where it is not text.
     """
+    data = read_bytes(path, size_bytes_max)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        found = f"byte {error.start} is 0x{data[error.start]:02x}"
+        raise _refusal(path, "F1004", f"not UTF-8 text: {found}", "save the file as UTF-8 text") from None
+    if "\0" in text:
+        raise _refusal(path, "F1004", f"not text: byte {data.index(0)} is NUL", "save the file as UTF-8 text")
+    return Source(str(path), text)
+
+
+def read_bytes(path: str | Path, size_bytes_max: int) -> bytes:
+    """Read a file of at most `size_bytes_max` bytes, asking for the size before reading.
+
+    Raises `InputError`: F1001 where there is no such file or it may not be read, F1003 where it is too large.
+    """
     path = Path(path)
-    name = str(path)
-
-    def refuse(code: str, message: str, hint: str) -> InputError:
-        return InputError([Diagnostic(code, f"{printable(name)}: {message}", hint, span=Span(printable(name), 1, 1))])
-
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
-            raise refuse("F1001", "this is a directory", "name a file in it")
+            raise _refusal(path, "F1001", "this is a directory", "name a file in it")
         if not stat.S_ISREG(status.st_mode):
-            raise refuse("F1001", "this is not a regular file", "name a file that can be read twice")
+            raise _refusal(path, "F1001", "this is not a regular file", "name a file that can be read twice")
         if status.st_size > size_bytes_max:
-            raise refuse(
-                "F1003",
-                f"{status.st_size:,} bytes are more than a net of this format can need ({size_bytes_max:,})",
-                "is this the right file?",
-            )
+            found = f"{status.st_size:,} bytes are more than a net of this format can need ({size_bytes_max:,})"
+            raise _refusal(path, "F1003", found, "is this the right file?")
         with path.open("rb") as stream:
             data = stream.read(size_bytes_max + 1)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise refuse("F1001", f"cannot be read: {reason}", "check the path and the permissions") from None
+        raise _refusal(path, "F1001", f"cannot be read: {reason}", "check the path and the permissions") from None
     if len(data) > size_bytes_max:
-        raise refuse("F1003", "the file grew beyond the limit while it was read", "is something writing to it?")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise refuse(
-            "F1004", f"not UTF-8 text: byte {error.start} is 0x{data[error.start]:02x}", "save the file as UTF-8 text"
-        ) from None
-    if "\0" in text:
-        raise refuse("F1004", f"not text: byte {data.index(0)} is NUL", "save the file as UTF-8 text")
-    return Source(name, text)
+        raise _refusal(path, "F1003", "the file grew beyond the limit while it was read", "is something writing to it?")
+    return data
+
+
+def _refusal(path: str | Path, code: str, message: str, hint: str) -> InputError:
+    return InputError([Diagnostic(code, message, hint, span=Span(printable(str(path)), 1, 1))])

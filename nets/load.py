@@ -1,0 +1,47 @@
+"""Reading a net from whatever file it is in.
+
+The extension tells the format; where it does not, the first character does, because XML begins with `<` and a net file
+does not. Guessing from the content alone would let a broken PNML file be reported as broken YAML.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from firable.nets import pnml, text
+from firable.nets.diagnostics import Diagnostic
+from firable.nets.net import Net
+
+PNML_SUFFIXES: Final = frozenset({".pnml", ".xml", ".tapn"})
+TEXT_SUFFIXES: Final = frozenset({".yaml", ".yml"})
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A net, and what of its file it does not carry (nothing, for a net file)."""
+
+    net: Net
+    notes: tuple[Diagnostic, ...] = ()
+
+
+def load(path: str | Path) -> Loaded:
+    """Read a net file or PNML.
+
+    Raises `InputError` as `read_net` and `read_pnml` do.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix in PNML_SUFFIXES or (suffix not in TEXT_SUFFIXES and _looks_like_xml(path)):
+        imported = pnml.read_pnml(path)
+        return Loaded(imported.net, imported.notes)
+    return Loaded(text.read_net(path))
+
+
+def _looks_like_xml(path: str | Path) -> bool:
+    try:
+        with Path(path).open("rb") as stream:
+            head = stream.read(512)
+    except (OSError, ValueError):  # the reader of net files finds it again and says it well
+        return False
+    return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<")
