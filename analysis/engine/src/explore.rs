@@ -49,6 +49,8 @@ pub struct Space {
     pub table: Table,
     /// The index at which each level begins.
     pub levels: Vec<u32>,
+    /// Where the last level that was begun ends: what was found beyond it, in an incomplete graph, is one level farther.
+    pub levels_end: u32,
     /// Edges that each transition takes part in.
     pub fired: Vec<u64>,
     /// How many edges.
@@ -118,6 +120,7 @@ impl Space {
             step: limits.step,
             table,
             levels: Vec::new(),
+            levels_end: 1,
             fired: vec![0; count],
             edges: 0,
             contacts: vec![0; count],
@@ -175,6 +178,7 @@ impl Space {
                 return Ok(false);
             }
             self.memory.push(&mut self.levels, next as u32)?;
+            self.levels_end = *end as u32;
         }
         Ok(true)
     }
@@ -264,9 +268,9 @@ impl Space {
                 }
             }
             self.note_deadlocks(next, batch.valid & !alive)?;
-            for j in 0..batch.count {
+            for (j, firable) in firable.iter().enumerate().take(batch.count) {
                 let marking = &batch.markings[j * words..(j + 1) * words];
-                let factors = steps.factors(&firable[j], &self.memory, watch)?;
+                let factors = steps.factors(firable, &self.memory, watch)?;
                 let (table, memory, parents) = (&mut self.table, &self.memory, &mut self.parents);
                 let mut edges = 0;
                 Steps::each(width, marking, batch.hashes[j], &factors, watch, &mut |_, after, hash| {

@@ -35,7 +35,7 @@ mod python {
     use pyo3::prelude::*;
     use pyo3::types::{PyBytes, PyInt};
 
-    use crate::budget::{Stop, Watch};
+    use crate::budget::{Memory, Stop, Watch};
     use crate::explore::{Edges, Limits, NONE, Space};
     use crate::net::{Net, Transition};
     use crate::scc::{Csr, Scc};
@@ -331,7 +331,7 @@ mod python {
         fn successors(&self, py: Python<'_>, index: usize) -> PyResult<Vec<(Vec<u32>, u32)>> {
             let index = self.check(index)?;
             self.long(py, |space, watch| {
-                let memory = space.memory.clone();
+                let memory = Memory::new(paths::WITNESS_BYTES);
                 let mut all = Vec::new();
                 Edges::new(space).visit(&[index], &memory, watch, &mut |_, fired, target| {
                     memory.push(&mut all, (fired.transitions(), target))

@@ -12,6 +12,9 @@ use crate::marking::{Width, linear_hash, slice};
 use crate::scc::Csr;
 use crate::with_width;
 
+/// What a witness may take beyond the budget: a graph that ended for want of memory must still show what it found.
+pub const WITNESS_BYTES: usize = 64 << 20;
+
 /// A firing sequence: the set fired at each edge, a single transition under interleaving.
 pub type Sequence = Vec<Vec<u32>>;
 
@@ -36,7 +39,7 @@ fn sequence(space: &Space, path: &[u32], memory: &Memory, watch: &mut Watch<'_>)
 
 /// A shortest firing sequence from M0.
 pub fn path_to(space: &Space, index: u32, watch: &mut Watch<'_>) -> Result<Sequence, Stop> {
-    let memory = space.memory.clone();
+    let memory = Memory::new(WITNESS_BYTES);
     let mut path = vec![index];
     let mut at = index;
     while at != 0 {
@@ -49,8 +52,12 @@ pub fn path_to(space: &Space, index: u32, watch: &mut Watch<'_>) -> Result<Seque
 
 /// A predecessor on the level before; by the order of exploration every marking but M0 has one.
 fn predecessor(space: &Space, index: u32) -> u32 {
-    let level = space.levels.partition_point(|&start| start <= index) - 1;
-    let here = space.levels[level];
+    // Where the level of the marking begins; its predecessors of interest lie before.
+    let here = if index >= space.levels_end {
+        space.levels_end
+    } else {
+        space.levels[space.levels.partition_point(|&start| start <= index) - 1]
+    };
     let words = space.net.words;
     let marking = space.marking(index as usize);
     let mut before = vec![0; words];

@@ -297,18 +297,20 @@ mod tests {
                 }
             }
             for k in 0..4 {
-                for i in 0..4 {
-                    for j in 0..4 {
-                        reach[i][j] |= reach[i][k] && reach[k][j];
+                let middle = reach[k];
+                for row in reach.iter_mut().filter(|row| row[k]) {
+                    for (to, &from) in row.iter_mut().zip(&middle) {
+                        *to |= from;
                     }
                 }
             }
             let scc = components(&rows.iter().map(Vec::as_slice).collect::<Vec<_>>());
-            for i in 0..4 {
-                for j in 0..4 {
-                    assert_eq!(scc.of[i] == scc.of[j], reach[i][j] && reach[j][i], "{rows:?}");
+            let forth = reach;
+            for (i, row) in forth.iter().enumerate() {
+                for (j, back) in forth.iter().enumerate() {
+                    assert_eq!(scc.of[i] == scc.of[j], row[j] && back[i], "{rows:?}");
                 }
-                let leaves = (0..4).any(|j| reach[i][j] && !reach[j][i]);
+                let leaves = (0..4).any(|j| row[j] && !forth[j][i]);
                 assert_eq!(scc.bottom[scc.of[i] as usize] == 0, leaves, "{rows:?}");
             }
         }
