@@ -195,8 +195,8 @@ def symbol(name: str) -> str:
     >>> symbol("robot.free"), symbol("a|b"), symbol("é")
     ('|robot.free|', '|a%7cb|', '|%e9|')
     """
-    # `%` is no character of the net's names, so that no two of them become one.
-    return "|" + "".join(c if " " <= c <= "~" and c not in "|\\" else f"%{ord(c):x}" for c in name) + "|"
+    # `%` is written so itself, and a net's names hold none: no two names become one symbol.
+    return "|" + "".join(c if " " <= c <= "~" and c not in "|\\%" else f"%{ord(c):x}" for c in name) + "|"
 
 
 def smtlib_term(term: Term) -> str:
