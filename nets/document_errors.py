@@ -7,12 +7,13 @@ hint. Wrong indentation is the mistake that makes the most noise: `places:` one 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from pydantic import ValidationError
 
 from firable.nets import document as doc
-from firable.nets.diagnostics import Diagnostic, did_you_mean
+from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean
 from firable.nets.source import Source, quoted
 from firable.nets.text_positions import bounded
 from firable.nets.yaml_tree import Mapping, Node, Path, Scalar, Sequence, node_span, nodes_along
@@ -64,11 +65,20 @@ def document_problems(source: Source, tree: Node, error: ValidationError) -> lis
         span = problem.span
         if span is not None:
             problems.setdefault((span.line, span.column, problem.code), problem)
-    return bounded([problems[key] for key in sorted(problems)])
+    return bounded(list(_first_misplaced([problems[key] for key in sorted(problems)])))
+
+
+def _first_misplaced(problems: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+    """Of the misplaced keys of one mapping only the first: the others were moved with it."""
+    seen: set[Subject] = set()
+    for problem in problems:
+        if not problem.subject or problem.subject not in seen:
+            yield problem
+        seen.add(problem.subject)
 
 
 def _problem(source: Source, tree: Node, path: Path, kind: str, message: str, context: dict[str, Any]) -> Diagnostic:
-    if misplaced := _misplaced(source, tree, path):
+    if misplaced := _misplaced(source, tree, path, kind):
         return misplaced
     found = list(nodes_along(tree, path))
     key, node = found[-1]
@@ -103,13 +113,14 @@ def _problem(source: Source, tree: Node, path: Path, kind: str, message: str, co
     empty = isinstance(node, Scalar) and node.plain and not node.text
     at = key if empty and key is not None else node
     return Diagnostic(
-        "F1010", f"{_found(node)} stands{_where(path)}", _wanted(kind, context, node), span=node_span(source, at)
+        "F1010", f"{_found(node)} stands{_where(path)}", _wanted(kind, context, node, path), span=node_span(source, at)
     )
 
 
-def _misplaced(source: Source, tree: Node, path: Path) -> Diagnostic | None:
+def _misplaced(source: Source, tree: Node, path: Path, kind: str) -> Diagnostic | None:
     """The one diagnostic for a key that indentation has made a name, such as a controller named "places"."""
-    for length in range(2, len(path)):
+    deepest = len(path) + 1 if kind in {"model_type", "model_attributes_type"} else len(path)
+    for length in range(2, deepest):
         name = str(path[length - 1])
         outer, inner = _keys_at(path[: length - 2]), _keys_at(path[:length])
         if path[length - 2] not in _NOUNS or not inner or name not in {*outer, *inner}:
@@ -121,6 +132,7 @@ def _misplaced(source: Source, tree: Node, path: Path) -> Diagnostic | None:
                 "F1008",
                 f"'{name}' stands where the name of a {noun} is expected",
                 f"'{name}' is a key of the format: check the indentation of this line and of those below it",
+                subject=tuple(map(str, path[: length - 1])),
                 span=node_span(source, key),
             )
     return None
@@ -152,9 +164,11 @@ def _found(node: Node) -> str:
             return "nothing" if plain and not text else quoted(text)
 
 
-def _wanted(kind: str, context: dict[str, Any], node: Node) -> str:
+def _wanted(kind: str, context: dict[str, Any], node: Node, path: Path) -> str:
     word = isinstance(node, Scalar) and node.plain and node.text in {"true", "false"}
     match kind:
+        case "model_type" if path[-1:] == ("leads_to",):
+            return "two formulas are expected: `[p, q]`, or `from:` and `to:`"
         case "string_type" if word and isinstance(node, Scalar):
             return f'a name or text is expected: write "{node.text}" in double quotes if it is one'
         case "string_type" | "string_too_short":

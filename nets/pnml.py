@@ -4,8 +4,8 @@ The field exchanges nets as PNML, so reading it well is what lets public nets be
 
 - The *identifier* of a node is its name, because identifiers are unique and names are not; a `<name>` that differs is
   kept as the description. Identifiers that are no names here are mapped without collision.
-- A self-loop, an arc to and an arc from the same place, is how an ordinary net reads a place: it becomes a
-  permissive gate, as does a read arc. An inhibitor arc becomes an inhibitive gate.
+- A self-loop, an arc to and one from the same place, is how an ordinary net reads a place: it becomes a permissive
+  gate, as does a read arc. An inhibitor arc becomes an inhibitive gate.
 - What an import cannot carry (graphics, tool-specific data, delays, ...) is said in the notes. What would change the
   behaviour (weights, two tokens, colours, time windows) is refused: rejected was an "approximate" import, whose verdicts
   would be verdicts of another net.

@@ -1,8 +1,9 @@
 """Writing a net as a PNML place/transition net.
 
 Permissive gates become read arcs and inhibitive gates inhibitor arcs, in the commonest spelling
-(`<type value="read"/>`, `<type value="inhibitor"/>`). PNML has no words for owners, commands, external gates, arbiters and
-properties; the notes say which of them the file lacks. An external gate left out means "gates free", as in analysis.
+(`<type value="read"/>`, `<type value="inhibitor"/>`). PNML has no words for owners, commands, external gates,
+arbiters and properties; the notes say which of them the file lacks. An external gate left out means "gates free", as
+in analysis.
 
 Two things make the file another net for other tools, and both are said: the contact rule (a note), and a self-loop,
 which is dead here and a read everywhere else (refused). Rejected: hiding the rest in `<toolspecific>`, where a tool

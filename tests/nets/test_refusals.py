@@ -1,0 +1,273 @@
+"""Golden diagnostics: each kind of malformed net file, with its code, its place and the start of its hint."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from firable.nets.diagnostics import CODES, InputError
+from firable.nets.document_errors import version_problem
+from firable.nets.text import SIZE_BYTES_MAX, parse_net, read_net
+
+HEAD = "firable: 1\ncell: c\n"
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A text and what must be said about it: `code line:column` for each diagnostic, and words of the first hint."""
+
+    name: str
+    text: str
+    found: tuple[str, ...]
+    hint: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def of(name: str, text: str, found: str | tuple[str, ...], hint: str) -> Refusal:
+    return Refusal(name, text, (found,) if isinstance(found, str) else found, hint)
+
+
+def net(name: str, body: str, found: str | tuple[str, ...], hint: str) -> Refusal:
+    return of(name, HEAD + body, found, hint)
+
+
+ROBOT = """controllers:
+  robot:
+    start: free
+    inputs: door_shut
+    places:
+      free:
+      busy: {send: {machine: R, command: MOVE}, until: at_home}
+"""  # lines 3 to 9
+T = "transitions:\n"  # line 10
+
+TABLE = (
+    # the text
+    of("empty file", "", "F1002 1:1", "a net file begins with `firable: 1`"),
+    of("only a comment", "# nothing\n", "F1002 1:1", "a net file begins with"),
+    of("noise", "lorem ipsum\n", "F1010 1:1", "a net file begins with"),
+    of("a list", "- a\n- b\n", "F1010 1:1", "a net file begins with"),
+    of("no version", "cell: c\n", "F1009 1:1", "a net file begins with `firable: 1`"),
+    of("version misspelt", "cell: c\nfirabel: 1\n", "F1009 2:1", "a net file begins with"),
+    of("another version", "firable: 2\ncell: c\n", "F1011 1:10", "write `firable: 1`"),
+    of("no cell", "firable: 1\n", "F1009 1:1", "add `cell:`"),
+    net("tab", "places:\n\tp:\n", "F1005 4:1", "indent with spaces"),
+    net("bracket left open", "transitions: {t: {from: [p, q}}\n", "F1005 3:30", "check the"),
+    net("missing colon", "places:\n  p\n  q:\n", "F1005 5:4", "check the indentation and the colons"),
+    net("nesting without end", "places: " + "[" * 10_000, "F1005 3:40", "a net needs no such nesting"),
+    net("control character", "description: a\x07b\n", "F1005 3:15", "delete it"),
+    net("byte order mark inside", "description: a\ufeffb\n", "F1005 3:15", "delete it"),
+    net("line separator", "description: a\u2028b\n", "F1007 3:15", "delete it"),
+    net("duplicate key", "places: {p: }\nplaces: {q: }\n", "F1006 4:1", "rename one of them"),
+    net("duplicate place", "places:\n  p:\n  q:\n  p:\n", "F1006 6:3", "rename one of them"),
+    net("key `on`", "places:\n  on:\n", "F1007 4:3", 'write "on" in double quotes'),
+    net("value `off`", "places: {p: {send: {machine: M, command: OFF}}}\n", "F1007 3:42", 'write "OFF" in double'),
+    net("key `no` and value `yes`", "places: {no: }\nstart: yes\n", ("F1007 3:10", "F1007 4:8"), 'write "no"'),
+    net("null", "places: {p: ~}\n", "F1007 3:13", "or leave the value empty"),
+    net("key `true`", "places: {true: }\n", "F1007 3:10", 'write "true" in double quotes'),
+    net("empty key", "places: {: x}\n", "F1005 3:10", "check the indentation"),
+    net("empty key with a question mark", "places:\n  ?\n  : x\n", "F1007 4:4", "write a name before the colon"),
+    net("anchor", "places: &all {p: }\n", "F1007 3:9", "delete it"),
+    net("alias", "start: *all\n", "F1007 3:8", "write the part out"),
+    net("merge key", "places: {<<: {p: }}\n", "F1007 3:10", "write the keys out"),
+    net("tag", "start: !!str p\n", "F1007 3:8", "delete it"),
+    net("two documents", "---\nfirable: 1\n", "F1007 3:1", "one file holds one net"),
+    net("key that is a list", "? [a]\n: b\n", "F1010 3:3", "write `name: value`"),
+    # the document
+    net("unknown key", "contollers: {}\n", "F1008 3:1", "did you mean 'controllers'?"),
+    net("unknown key in a place", "places: {p: {sned: x}}\n", "F1008 3:14", "did you mean 'send'?"),
+    net("unknown key in a transition", T + "  t: {form: p}\n", "F1008 4:7", "did you mean 'from'?"),
+    net("comma without quotes", "places: {p: {description: a, b}}\n", "F1008 3:30", "The keys here are send"),
+    net("places beside the controllers", "controllers:\n  robot:\n  places:\n    p:\n    q:\n", "F1008 5:3",
+        "'places' is a key of the format: check the indentation"),
+    net("transitions below the controllers", "controllers:\n  r: {}\n  transitions:\n    t: {from: p}\n    u: {}\n",
+        "F1008 5:3", "'transitions' is a key of the format: check the indentation"),
+    net("key of a transition beside it", T + "  t:\n  from: p\n  to: q\n", "F1008 5:3",
+        "'from' is a key of the format: check the indentation"),
+    net("send without a command", "places: {p: {send: {machine: R}}}\n", "F1009 3:14", "add `command:`"),
+    net("send without structure", "places: {p: {send: MOVE}}\n", "F1010 3:20", "a mapping, lines of `name: value`"),
+    net("parameter that is a list", "places: {p: {send: {machine: R, command: M, to: [a]}}}\n", "F1010 3:49",
+        "a name or text is expected"),
+    net("places as a list", "places: [p, q]\n", "F1010 3:9", "a mapping, lines of `name: value`"),
+    net("from as a mapping", T + "  t: {from: {p: q}}\n", "F1010 4:13", "a name or a list of names"),
+    net("number that is none", T + "  t: {number: one}\n", "F1010 4:15", "a whole number from 0"),
+    net("negative number", T + "  t: {number: -1}\n", "F1010 4:15", "a whole number from 0"),
+    net("coordinator that is neither true nor false", "controllers: {s: {coordinator: maybe}}\n", "F1010 3:32",
+        "true or false"),
+    net("true where a name is expected", "start: true\n", "F1010 3:8", "a name or a list of names"),
+    net("unknown arbitration", "arbiters: {a: {among: [t, u], by: luck}}\n", "F1010 3:35", "'priority', 'order' or"),
+    net("arbiter without transitions", "arbiters: {a: {by: order}}\n", "F1009 3:12", "add `among:`"),
+    net("property without a pattern", "properties: {p: {}}\n", "F1010 3:14", "write one pattern for each property"),
+    net("property with two patterns", "properties: {p: {never: a, always: b}}\n", "F1010 3:14", "write one pattern"),
+    net("property with an unknown pattern", "properties: {p: {nevr: a}}\n", "F1008 3:18", "did you mean 'never'?"),
+    net("leads_to with one formula", "properties: {p: {leads_to: [a]}}\n", "F1010 3:28", "two formulas"),
+    net("leads_to without a target", "properties: {p: {leads_to: {from: a}}}\n", "F1009 3:18", "add `to:`"),
+    net("unknown fairness", "properties: {p: {leads_to: {from: a, to: b, fairness: very}}}\n", "F1010 3:55",
+        "'none', 'weak'"),
+    # formulas
+    net("formula that ends too early", "places: {a: }\nproperties: {p: {never: a and}}\n", "F1012 4:30",
+        "write places joined"),
+    net("formula in quotes", "places: {a: }\nproperties: {p: {never: 'a or )'}}\n", "F1012 4:31",
+        "write places joined"),
+    net("formula in leads_to", "places: {a: }\nproperties: {p: {leads_to: [a, not]}}\n", "F1012 4:35",
+        "write places joined"),
+    net("formula without end", "properties: {p: {never: " + "not " * 5000 + "a}}\n", "F1012 3:429",
+        "write places joined"),
+    net("unknown place in a formula", "places: {a: }\nproperties: {p: {never: a and (not b)}}\n", "F2002 4:36",
+        "Declare it"),
+    net("unknown transition in a formula", "properties: {p: {never: firable(go)}}\n", "F2004 3:33", "Declare it"),
+    net("place with the name of an atom", "places: {start: }\nproperties: {p: {never: start}}\n", "F2012 3:10",
+        "rename the place"),
+    # the net
+    net("start that is no place", "places: {p: }\nstart: q\n", "F2002 4:8", "`start` names places"),
+    net("start with a full name", ROBOT.replace("start: free", "start: robot.free"), "F2002 5:12",
+        "inside 'robot' names are local: write 'free'"),
+    net("two tokens", "places: {p: }\nstart: [p, p]\n", "F2006 4:12", "a place holds one token at most"),
+    net("wrong name", ROBOT + T + "  t: {from: robot.fre}\n", "F2002 11:13", "did you mean 'robot.free'?"),
+    net("missing owner", ROBOT + T + "  t: {from: free}\n", "F2002 11:13", "did you mean 'robot.free'?"),
+    net("one wrong name in three places", ROBOT + T + "  t: {from: busy}\n  u: {from: busy}\n  v: {to: busy}\n",
+        "F2002 11:13", "did you mean 'robot.busy'?"),
+    net("unknown gate", ROBOT + T + "  t: {from: robot.free, if: robot.door_shot}\n", "F2002 11:29",
+        "did you mean 'robot.door_shut'?"),
+    net("gate sourced in a transition", ROBOT + T + "  t: {from: robot.free}\n  u: {unless: t}\n", "F2008 12:15",
+        "the source of a gate is a place or a signal"),
+    net("arc to a transition", ROBOT + T + "  t: {from: robot.free, to: t}\n", "F2017 11:29", "an arc joins"),
+    net("arc from a signal", ROBOT + T + "  t: {from: robot.door_shut}\n", "F2017 11:13", "write it under `if`"),
+    net("double arc", ROBOT + T + "  t: {from: [robot.free, robot.free]}\n", "F2007 11:26", "arcs and gates are sets"),
+    net("double gate", ROBOT + T + "  t: {if: [robot.door_shut, robot.door_shut]}\n", "F2007 11:29", "write it once"),
+    net("self-loop", ROBOT + T + "  t: {from: robot.free, to: robot.free}\n", "F2009 11:29",
+        "write `if: robot.free` to read the place"),
+    net("until without a command", "places: {p: {until: done}}\n", "F2014 3:21", "add `send`"),
+    net("until on a sensor", "inputs: done\nplaces: {p: {send: {machine: M, command: C}, until: done}}\n", "F2018 4:53",
+        "a completion is a bit that the driver forms"),
+    net("signal with the name of a place", "inputs: [p]\nplaces: {p: }\n", "F2001 3:10", "rename one of them"),
+    net("transition with the name of a place", "places: {p: }\ntransitions: {p: }\n", "F2001 4:15",
+        "rename one of them"),
+    net("signal twice", "inputs: [a, a]\n", "F2001 3:13", "rename one of them"),
+    net("not a name", "places: {'a b': }\n", "F2012 3:10", "use letters, digits"),
+    net("invisible name", 'places: {"a\\u200bb": }\n', "F2012 3:10", "use letters, digits"),
+    net("empty name", 'places: {"": }\n', "F2012 3:10", "write a name before the colon"),
+    net("two coordinators", "controllers: {a: {coordinator: true}, b: {coordinator: true}}\n", "F2015 3:39",
+        "leave `coordinator: true` at one"),
+    net("number twice", T + "  t: {number: 1}\n  u: {number: 1}\n", "F2016 5:15", "numbers name the parts"),
+    net("arbiter of an unknown transition", T + "  t:\narbiters: {a: {among: [t, u]}}\n", "F2004 5:27", "Declare it"),
+    net("arbiter with nothing to decide", T + "  t:\narbiters: {a: {among: t}}\n", "F2013 5:23", "name at least two"),
+    net("two arbiters for one transition", T + "  t:\n  u:\narbiters: {a: {among: [t, u]}, b: {among: [u, t]}}\n",
+        ("F2013 6:44", "F2013 6:47"), "a conflict component has one arbiter"),
+    net("arbiter that names a transition twice", T + "  t:\n  u:\narbiters: {a: {among: [t, u, t]}}\n", "F2013 6:23",
+        "only `by: order`"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("refusal", TABLE, ids=str)
+def test_a_malformed_net_is_refused_with_its_code_place_and_hint(refusal: Refusal) -> None:
+    with pytest.raises(InputError) as refused:
+        parse_net(refusal.text, "net.yaml")
+    problems = refused.value.diagnostics
+    assert tuple(f"{p.code} {p.span.line}:{p.span.column}" for p in problems if p.span) == refusal.found
+    assert refusal.hint in problems[0].hint
+    for problem in problems:
+        assert problem.code in CODES
+        assert problem.span is not None
+        assert str(problem).startswith(f"net.yaml:{problem.span.line}:{problem.span.column}: error[{problem.code}]: ")
+        assert all(len(line) < 200 for line in str(problem).splitlines()[:3])
+
+
+def refused_file(path: Path) -> tuple[str, str]:
+    with pytest.raises(InputError) as refused:
+        read_net(path)
+    (problem,) = refused.value.diagnostics
+    assert problem.hint
+    assert problem.span is not None
+    assert problem.span.file == str(path)
+    return problem.code, problem.message
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    code, message = refused_file(tmp_path / "none.yaml")
+    assert (code, "No such file" in message) == ("F1001", True)
+
+
+def test_a_directory_is_refused(tmp_path: Path) -> None:
+    code, message = refused_file(tmp_path)
+    assert (code, "directory" in message) == ("F1001", True)
+
+
+def test_a_device_is_refused() -> None:
+    code, message = refused_file(Path("/dev/zero"))
+    assert (code, "regular file" in message) == ("F1001", True)
+
+
+def test_a_binary_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cell.firable.yaml"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0")
+    assert refused_file(path)[0] == "F1004"
+    path.write_bytes(b"firable: 1\0")
+    assert refused_file(path)[0] == "F1004"
+
+
+def test_noise_of_100_megabytes_is_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "noise.yaml"
+    with path.open("wb") as stream:
+        stream.truncate(100_000_000)  # sparse: reading it would find NUL and give F1004
+    code, message = refused_file(path)
+    assert (code, "100,000,000" in message) == ("F1003", True)
+
+
+def test_a_text_above_the_limit_is_refused() -> None:
+    with pytest.raises(InputError) as refused:
+        parse_net("#" * (SIZE_BYTES_MAX + 1))
+    assert refused.value.diagnostics[0].code == "F1003"
+
+
+def test_a_byte_order_mark_before_the_text_is_accepted(tmp_path: Path) -> None:
+    path = tmp_path / "cell.yaml"
+    path.write_bytes(b"\xef\xbb\xbffirable: 1\r\ncell: c\r\n")
+    assert read_net(path).name == "c"
+
+
+def test_many_problems_are_bounded_and_counted() -> None:
+    text = HEAD + T + "".join(f"  t{i}: {{from: p{i}}}\n" for i in range(1000))
+    with pytest.raises(InputError) as refused:
+        parse_net(text)
+    problems = refused.value.diagnostics
+    assert len(problems) == 20
+    assert "80 more problems are not shown" in problems[-1].hint
+
+
+def test_repeated_use_of_one_wrong_name_tells_the_lines() -> None:
+    with pytest.raises(InputError) as refused:
+        parse_net(HEAD + T + "".join(f"  t{i}: {{from: p}}\n" for i in range(4)))
+    (problem,) = refused.value.diagnostics
+    assert problem.message == "there is no place 'p' (also on line 5, 6, 7)"
+
+
+def test_the_excerpt_of_a_very_long_line_is_a_window_with_the_caret_in_place() -> None:
+    with pytest.raises(InputError) as refused:
+        parse_net(HEAD + "places: {" + "".join(f"p{i}: , " for i in range(5000)) + "'b d': }\n")
+    first, excerpt, caret, _ = str(refused.value).splitlines()
+    assert len(excerpt) < 120
+    at = caret.index("^")
+    assert excerpt[at : at + caret.count("^")] == "'b d'"
+    assert "F2012" in first
+
+
+def test_terminal_controls_in_the_text_do_not_reach_the_message() -> None:
+    with pytest.raises(InputError) as refused:
+        parse_net(HEAD + "places: {'a\x9b31m': }\n\x1b[2J\n")
+    assert all(line.isprintable() for line in str(refused.value).splitlines())
+
+
+def test_a_quoted_word_is_a_name() -> None:
+    net = parse_net(HEAD + 'places: {"on": , \'no\': }\nstart: "on"\n')
+    assert [place.name for place in net.places] == ["on", "no"]
+
+
+def test_a_net_file_is_told_by_its_version() -> None:
+    from firable.nets.source import Source
+    from firable.nets.yaml_tree import parse_tree
+
+    source = Source("f", HEAD)
+    assert version_problem(source, parse_tree(source)) is None
