@@ -1,0 +1,168 @@
+"""Drivers: from commands and signals of the net to machines, and back.
+
+A driver is told of each command that a place sends, and tells of each change of a signal. It *forms* the completion
+bits: a completion is 1 when the machine has acknowledged the command and, where a sensor sees the outcome, the sensor
+shows it; sending the next command that it completes clears it. What was acknowledged is named by signal and entry
+number, so that the answer to an earlier command is never taken for that to the present one.
+
+Drivers run as a task of their own, and hand over what they have to tell without waiting. `stop` drives the safe
+outputs. The alternative, polling a process image at a fixed period, adds half a period to every reaction; drivers of
+devices that can only be polled will do so inside, behind the same protocol.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from typing import Protocol
+
+from firable.executor.plant import CommandDone, Plant, PlantFault, Report, SensorChanged
+from firable.nets.net import Net, Place, SignalKind
+
+
+class Listener(Protocol):
+    """Whom a driver tells."""
+
+    def signal(self, name: str, value: bool, entry: int | None) -> None:
+        """A signal has a new value; for a completion, `entry` is the number of the command completed."""
+        ...
+
+    def driver_fault(self, machine: str, message: str) -> None:
+        """A machine or its link has failed."""
+        ...
+
+    def moved(self) -> None:
+        """Something happened in the cell, whether or not a signal shows it."""
+        ...
+
+
+class Clock(Protocol):
+    """The time of a run, in its own seconds."""
+
+    def now_seconds(self) -> float:
+        """The time since the beginning of the run."""
+        ...
+
+    def loop_delay_seconds(self, until_seconds: float) -> float:
+        """How long the event loop has to wait until a time of the run."""
+        ...
+
+
+class Driver(Protocol):
+    """The border between the executor and the machines."""
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing will happen any more unless a command is sent; False where the driver cannot know."""
+        ...
+
+    async def run(self, clock: Clock, listener: Listener) -> None:
+        """Serve the machines until cancelled."""
+        ...
+
+    def send(self, place: Place, entry: int) -> None:
+        """Send the command of a place."""
+        ...
+
+    def stop(self) -> None:
+        """Drive the safe outputs: every machine stops where it is. Nothing is sent afterwards."""
+        ...
+
+    def close(self) -> None:
+        """Let no new work into the cell, as far as the driver can."""
+        ...
+
+
+@dataclass(slots=True)
+class _Awaited:
+    """A completion that is being formed."""
+
+    signal: str
+    entry: int
+    acknowledged: bool = False
+
+
+class SimulatedDriver:
+    """The driver of a simulated cell."""
+
+    def __init__(self, plant: Plant, net: Net) -> None:
+        self.plant = plant
+        self.sensors = {signal.name for signal in net.signals if signal.kind is SignalKind.SENSOR}
+        self.awaited: dict[str, _Awaited] = {}
+        """For each completion signal, the command that it will complete."""
+        self.tickets: dict[int, _Awaited] = {}
+        self.next_ticket = 0
+        self.clock: Clock | None = None
+        self.listener: Listener | None = None
+        self.awake: asyncio.Event = asyncio.Event()
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether no event is scheduled in the plant."""
+        return self.plant.next_seconds is None
+
+    async def run(self, clock: Clock, listener: Listener) -> None:
+        """Let the plant's events happen when they are due."""
+        self.clock, self.listener = clock, listener
+        loop = asyncio.get_running_loop()
+        while True:
+            self._tell(self.plant.advance(clock.now_seconds()))
+            listener.moved()
+            self.awake.clear()
+            due = self.plant.next_seconds
+            timer = None if due is None else loop.call_later(clock.loop_delay_seconds(due), self.awake.set)
+            await self.awake.wait()
+            if timer is not None:
+                timer.cancel()
+
+    def send(self, place: Place, entry: int) -> None:
+        """Give the machine its command, under a new ticket."""
+        command = place.command
+        if command is None or self.clock is None:
+            raise RuntimeError(f"'{place.name}' sends no command, or the driver does not run yet")
+        ticket = self.next_ticket
+        self.next_ticket += 1
+        if place.completion is not None:
+            self.awaited[place.completion] = self.tickets[ticket] = _Awaited(place.completion, entry)
+        now = self.clock.now_seconds()
+        self._tell(self.plant.command(now, command.machine, command.command, dict(command.parameters), ticket))
+        self.awake.set()
+
+    def stop(self) -> None:
+        """Stop every machine of the plant where it is."""
+        self.plant.halt()
+
+    def close(self) -> None:
+        """Let no more workpieces come."""
+        self.plant.close()
+
+    def _tell(self, reports: list[Report]) -> None:
+        for report in reports:
+            match report:
+                case SensorChanged(signal, value):
+                    self._sensor(signal, value)
+                case CommandDone(ticket):
+                    if (awaited := self.tickets.pop(ticket, None)) is not None:
+                        awaited.acknowledged = True
+                        self._form(awaited)
+                case PlantFault(machine, message):
+                    self._listener.driver_fault(machine, message)
+
+    def _sensor(self, signal: str, value: bool) -> None:
+        if signal in self.sensors:
+            self._listener.signal(signal, value, None)
+        elif (awaited := self.awaited.get(signal)) is not None:
+            self._form(awaited)
+
+    def _form(self, awaited: _Awaited) -> None:
+        """Set the completion bit, if its command is acknowledged and its sensor, if it has one, agrees."""
+        shown = self.plant.shown.get(awaited.signal, True)
+        if awaited.acknowledged and shown and self.awaited.get(awaited.signal) is awaited:
+            del self.awaited[awaited.signal]
+            self._listener.signal(awaited.signal, value=True, entry=awaited.entry)
+
+    @property
+    def _listener(self) -> Listener:
+        if self.listener is None:
+            raise RuntimeError("the driver does not run yet")
+        return self.listener

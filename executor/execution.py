@@ -1,0 +1,384 @@
+"""The execution: the tasks of one process that run a decomposition, and the operator's controls over them.
+
+One task for the coordinator, one for each local controller, one for the driver; they talk through mailboxes and share
+nothing else. The machines they wrap are pure, so this file is the edge: here is the clock, here effects become
+messages, commands and lines of the trace.
+
+All tasks run in one event loop, so every message handled is one act, and the trace is written in the order of the acts.
+When the last mailbox is empty the execution is *quiescent*: that is when markings are shown (O7), situations are judged
+and an operator's step is over. Rejected: threads. They would add every interleaving of two lines of Python to those of
+the protocol, for no gain in one process.
+
+Operator's controls. *Pause*: no further firing; rounds that are not decided are aborted, machines end the command they
+are at. *Step*: while paused, one firing. *Stop*: no further firing, ever; what is decided is applied and commanded,
+which takes no time in one process, then the driver drives the safe outputs, which stop every machine where it is.
+*Stop at the end of the cycle*: no new work comes in, and the run ends when the cell is at rest.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from firable.executor.controller import LocalController
+from firable.executor.coordinator import Coordinator
+from firable.executor.drivers import Driver
+from firable.executor.messages import Decision, Effect, Firing, Message, Sending, Taken, VoteRequest
+from firable.executor.recorder import Recorder
+from firable.executor.situation import Situation, State, blocked, is_deadlock
+from firable.nets.decomposition import Decomposition
+
+COORDINATOR: Final = ""
+"""The mailbox of the coordinator; no controller has the empty name."""
+
+FIRINGS_AT_ONCE_MAX: Final = 100_000
+"""More firings at one instant of virtual time are a net that runs in circles without its cell."""
+
+
+@dataclass(frozen=True, slots=True)
+class SignalRead:
+    """A driver's message to a controller: a new value of one of its signals."""
+
+    signal: str
+    value: bool
+    entry: int | None
+
+
+class Continue:
+    """A controller's message to itself: it may have more to fire."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunClock:
+    """The time of a run on the present event loop, `speed` times as fast as the loop's."""
+
+    loop: asyncio.AbstractEventLoop
+    begin_seconds: float
+    speed: float
+
+    def now_seconds(self) -> float:
+        """The time since the beginning of the run."""
+        return (self.loop.time() - self.begin_seconds) * self.speed
+
+    def loop_delay_seconds(self, until_seconds: float) -> float:
+        """How long the event loop has to wait until a time of the run."""
+        return max(0.0, until_seconds - self.now_seconds()) / self.speed
+
+
+class _Mailbox:
+    """Messages for one task, in the order in which they were posted."""
+
+    def __init__(self) -> None:
+        self.items: deque[object] = deque()
+        self.waiter: asyncio.Future[None] | None = None
+
+    def post(self, item: object) -> None:
+        self.items.append(item)
+        if self.waiter is not None and not self.waiter.done():
+            self.waiter.set_result(None)
+
+    async def wait(self) -> None:
+        if not self.items:
+            self.waiter = asyncio.get_running_loop().create_future()
+            await self.waiter
+
+
+class Execution:
+    """One run of a decomposition with a driver; `main` runs it to its end."""
+
+    def __init__(
+        self,
+        decomposition: Decomposition,
+        driver: Driver,
+        recorder: Recorder,
+        *,
+        speed: float = 1.0,
+        overdue_seconds: float = 120.0,
+        is_complete: Callable[[], bool] = lambda: False,
+        operator: Callable[[Execution], Awaitable[None]] | None = None,
+    ) -> None:
+        self.net = decomposition.net
+        self.driver = driver
+        self.recorder = recorder
+        self.overdue_seconds = overdue_seconds
+        self.is_complete = is_complete
+        self.operator = operator
+        self.speed = speed
+        self.coordinator = Coordinator(decomposition)
+        self.controllers = {s.name: LocalController(decomposition, s.name) for s in decomposition.subnets}
+        self.owner_of = {signal.name: subnet.name for subnet in decomposition.subnets for signal in subnet.signals}
+        self.mailboxes = {name: _Mailbox() for name in (COORDINATOR, *self.controllers)}
+        self.under_way = 0
+        self.messages = 0
+        self.paused = False
+        self.stopping = False
+        self.draining = False
+        self.fault = ""
+        self.operated = operator is not None
+        self.overdue: dict[str, asyncio.TimerHandle] = {}
+        """For each completion signal, the alarm of the command that it completes."""
+        self.turn = 0
+        self.fired_seconds = -1.0
+        self.fired_at_once = 0
+        self.quiet_waiters: list[asyncio.Future[None]] = []
+        self.clock: RunClock | None = None
+        self.outcome: asyncio.Future[Situation] | None = None
+
+    # The run
+
+    async def main(self) -> Situation:
+        """Run until the work is done, or nothing can go on, or the operator stops; returns how it ended."""
+        loop = asyncio.get_running_loop()
+        self.clock = RunClock(loop, loop.time(), self.speed)
+        self.outcome = loop.create_future()
+        tasks = [
+            asyncio.create_task(self._coordinate(), name="coordinator"),
+            *(asyncio.create_task(self._control(name), name=name) for name in self.controllers),
+            asyncio.create_task(self.driver.run(self.clock, self), name="driver"),
+        ]
+        if self.operator is not None:
+            tasks.append(asyncio.create_task(self._operate(self.operator), name="operator"))
+        for task in tasks:
+            task.add_done_callback(self._task_ended)
+        for name in self.controllers:
+            self._post(name, Continue())
+        try:
+            return await asyncio.shield(self.outcome)
+        except asyncio.CancelledError:
+            self.stop()  # Ctrl-C is the operator's stop: the run ends in order, with its report and its trace
+            return await self.outcome
+        finally:
+            self.driver.stop()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            for alarm in self.overdue.values():
+                alarm.cancel()
+
+    def now_seconds(self) -> float:
+        """The time since the run began."""
+        return self.clock.now_seconds() if self.clock is not None else 0.0
+
+    def situation(self) -> Situation:
+        """What the run is doing, and what waits for what; exact at quiescence."""
+        player, word = self.recorder.player, self.recorder.word
+        shown = player.net.names(self.recorder.marking)
+        if self.fault:
+            return Situation(State.FAULT, shown, tuple(blocked(player, word)), self.fault)
+        if self.under_way and not self.paused:
+            return Situation(State.RUNNING, shown)
+        if is_deadlock(player, word):
+            message = "no transition can fire any more, whatever the signals do"
+            return Situation(State.DEADLOCK, shown, tuple(blocked(player, word)), message)
+        if self.paused:
+            return Situation(State.PAUSED, shown, tuple(blocked(player, word)))
+        return Situation(State.WAITING, shown, tuple(blocked(player, word)))
+
+    # The operator's controls
+
+    def pause(self) -> None:
+        """Let nothing fire any more; machines end the command they are at."""
+        if not self.paused:
+            self.paused = True
+            self.recorder.note(self.now_seconds(), "paused")
+            self._perform(self.coordinator.permit(0))
+
+    def resume(self) -> None:
+        """Let transitions fire again after a pause."""
+        if self.paused and not self.stopping:
+            self.paused = False
+            self.recorder.note(self.now_seconds(), "resumed")
+            self._perform(self.coordinator.permit(None))
+            for name in self.controllers:
+                self._post(name, Continue())
+
+    async def step(self) -> str | None:
+        """While paused, fire one transition; returns its name, or None where none is enabled."""
+        if not self.paused or self.stopping:
+            return None
+        await self.quiet()
+        before = dict(self.recorder.firings)
+        # Locals of each controller and the coordinator take turns to be first.
+        names = [COORDINATOR, *self.controllers]
+        order = names[self.turn :] + names[: self.turn]
+        for name in order:
+            if name == COORDINATOR:
+                self._perform(self.coordinator.permit(1))
+                await self.quiet()
+                self._perform(self.coordinator.permit(0))
+            else:
+                self._perform(self.controllers[name].fire())
+                self._perform(self.controllers[name].report())
+            await self.quiet()
+            fired = [t for t, count in self.recorder.firings.items() if count > before[t]]
+            if fired:
+                self.turn = (names.index(name) + 1) % len(names)
+                return fired[0]
+        return None
+
+    def stop(self, *, at_end_of_cycle: bool = False) -> None:
+        """End the run: now, with every machine stopped where it is, or when the work in the cell is done."""
+        if at_end_of_cycle:
+            self.draining = True
+            self.recorder.note(self.now_seconds(), "stopping at the end of the cycle")
+            self.driver.close()
+            self.moved()
+            return
+        self.stopping = self.paused = True
+        self.recorder.note(self.now_seconds(), "stopped by the operator")
+        self._perform(self.coordinator.permit(0))
+        self._settle()
+
+    async def quiet(self) -> None:
+        """Wait until no message is under way."""
+        if self.under_way and self.outcome is not None and not self.outcome.done():
+            waiter = asyncio.get_running_loop().create_future()
+            self.quiet_waiters.append(waiter)
+            await waiter
+
+    # What the driver tells
+
+    def signal(self, name: str, value: bool, entry: int | None) -> None:
+        """A signal has a new value."""
+        if entry is not None and (alarm := self.overdue.pop(name, None)) is not None:
+            alarm.cancel()
+        self._post(self.owner_of[name], SignalRead(name, value, entry))
+
+    def driver_fault(self, machine: str, message: str) -> None:
+        """A machine has failed: nothing fires any more."""
+        self._fail(f"{machine}: {message}" if machine else message)
+
+    def moved(self) -> None:
+        """Something happened in the cell; perhaps it has come to rest."""
+        self._settle()
+
+    # The tasks
+
+    async def _coordinate(self) -> None:
+        box = self.mailboxes[COORDINATOR]
+        while True:
+            await box.wait()
+            item = box.items.popleft()
+            self._perform(self.coordinator.receive(item))  # type: ignore[arg-type]
+            self._handled()
+
+    async def _control(self, name: str) -> None:
+        box, controller = self.mailboxes[name], self.controllers[name]
+        while True:
+            await box.wait()
+            match box.items.popleft():
+                case VoteRequest() | Decision() as message:
+                    self._perform(controller.receive(message))
+                case SignalRead(signal, value, entry):
+                    self._perform(controller.read(signal, value, entry))
+            if not self.paused and (effects := controller.fire()):
+                self._perform(effects)
+                self._post(name, Continue())
+            self._perform(controller.report())
+            self._handled()
+
+    async def _operate(self, operator: Callable[[Execution], Awaitable[None]]) -> None:
+        await operator(self)
+        self.operated = False
+        self._settle()
+
+    def _task_ended(self, task: asyncio.Task[None]) -> None:
+        if self.outcome is None or self.outcome.done() or task.cancelled():
+            return
+        if (error := task.exception()) is not None:
+            self.outcome.set_exception(error)
+
+    # Effects
+
+    def _perform(self, effects: list[Effect]) -> None:
+        for effect in effects:
+            match effect:
+                case Firing(transition):
+                    self._fired(transition)
+                case Taken(signal, value):
+                    self.recorder.signal(self.now_seconds(), signal, value)
+                case Sending(place, entry):
+                    self._send(place, entry)
+                case VoteRequest() | Decision():
+                    self.messages += 1
+                    self._post(effect.controller, effect)
+                case _:
+                    self.messages += 1
+                    self._post(COORDINATOR, effect)
+
+    def _fired(self, transition: str) -> None:
+        now = self.now_seconds()
+        self.recorder.fired(now, transition)
+        self.fired_at_once = self.fired_at_once + 1 if now == self.fired_seconds else 1
+        self.fired_seconds = now
+        if self.fired_at_once > FIRINGS_AT_ONCE_MAX:
+            self._fail(f"'{transition}' and others fire without end, and no time passes: no gate ever holds them")
+
+    def _send(self, place: str, entry: int) -> None:
+        # The line comes first: what the machine answers is written behind it.
+        self.recorder.sent(self.now_seconds(), place)
+        sender = self.net.place(place)
+        if sender.completion is not None:
+            if (earlier := self.overdue.pop(sender.completion, None)) is not None:
+                earlier.cancel()
+            self.overdue[sender.completion] = asyncio.get_running_loop().call_later(
+                self.overdue_seconds / self.speed, self._overdue, place, self.now_seconds()
+            )
+        self.driver.send(sender, entry)
+
+    def _overdue(self, place: str, sent_at: float) -> None:
+        sender = self.net.place(place)
+        self.overdue.pop(str(sender.completion), None)
+        self._fail(
+            f"'{sender.command}' of '{place}', sent at {sent_at:.1f} s, is overdue: "
+            f"'{sender.completion}' has not come within {self.overdue_seconds:g} s"
+        )
+
+    def _fail(self, message: str) -> None:
+        if not self.fault:
+            self.fault = message
+            self.recorder.note(self.now_seconds(), "fault", message=message)
+            self.stopping = self.paused = True
+            self._perform(self.coordinator.permit(0))
+            self._settle()
+
+    def _post(self, mailbox: str, item: Message | SignalRead | Continue) -> None:
+        self.under_way += 1
+        self.mailboxes[mailbox].post(item)
+
+    def _handled(self) -> None:
+        self.under_way -= 1
+        self._settle()
+
+    # Quiescence
+
+    def _settle(self) -> None:
+        """At quiescence, wake who waits for it, and end the run if nothing more will happen."""
+        if self.under_way or self.outcome is None or self.outcome.done():
+            return
+        for waiter in self.quiet_waiters:
+            if not waiter.done():
+                waiter.set_result(None)
+        self.quiet_waiters.clear()
+        ended = self._ended()
+        if ended is not None:
+            self.outcome.set_result(ended)
+
+    def _ended(self) -> Situation | None:
+        if self.fault:
+            return self.situation()
+        if self.stopping:
+            return replace(self.situation(), state=State.STOPPED, message="stopped by the operator")
+        at_rest = self.driver.at_rest and not self.overdue
+        if at_rest and self.draining:
+            return replace(self.situation(), state=State.STOPPED, message="stopped at the end of the cycle")
+        if at_rest and self.is_complete():
+            return replace(self.situation(), state=State.DONE, blocked=())
+        # With an operator present, a cell at rest is waited for: it may be paused, or be given work.
+        is_stuck = at_rest and not self.operated
+        if is_stuck or is_deadlock(self.recorder.player, self.recorder.word):
+            return self.situation()
+        return None

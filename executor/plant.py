@@ -1,0 +1,379 @@
+"""The simulated cell: machines, stations and workpieces with identities, and the laws that they obey.
+
+Every station and every hand holds at most one workpiece. A command takes its time, then does to a workpiece what the
+plant file says. What cannot be done is a *plant fault*: laying a workpiece on another, grasping nothing, commanding a
+busy machine, machining what is not clamped or twice. The plant knows nothing of the net, so that a wrong net crashes
+here as it would on the floor, and the identities of the workpieces tell what was lost or doubled.
+
+A pure machine with its own queue of events: the caller says what time it is. All randomness comes from one seed.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from heapq import heappop, heappush
+
+from firable.executor.plant_file import (
+    Carry,
+    Clamp,
+    Grasp,
+    Machine,
+    Move,
+    PlantModel,
+    Process,
+    Put,
+    Release,
+    Sensor,
+    Stop,
+)
+
+Ticket = int
+"""Names one sent command in the plant's answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensorChanged:
+    """A sensor sees something else."""
+
+    signal: str
+    value: bool
+
+
+@dataclass(frozen=True, slots=True)
+class CommandDone:
+    """The machine acknowledges that a command is done."""
+
+    ticket: Ticket
+
+
+@dataclass(frozen=True, slots=True)
+class PlantFault:
+    """Something happened that must not: the machines of the cell stand still from now on."""
+
+    machine: str
+    message: str
+
+
+Report = SensorChanged | CommandDone | PlantFault
+
+
+@dataclass(frozen=True, slots=True)
+class NeverCompletes:
+    """A disturbance: this command of this machine, the `occurrence`-th time (from 1), is taken and never done."""
+
+    machine: str
+    command: str
+    occurrence: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class StuckSensor:
+    """A disturbance: from a time on, the sensor shows one value whatever it sees."""
+
+    signal: str
+    value: bool
+    from_seconds: float = 0.0
+
+
+Disturbance = NeverCompletes | StuckSensor
+
+
+@dataclass(slots=True)
+class Workpiece:
+    """A workpiece and how often it was machined."""
+
+    id: int
+    processed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Busy:
+    """The command that a machine is at."""
+
+    command: str
+    parameters: Mapping[str, str]
+    ticket: Ticket
+    waits: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Arrival:
+    """The next workpiece comes."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Departure:
+    """The workpiece at the end is taken away."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Finish:
+    """The time of a command is over."""
+
+    machine: str
+    busy: _Busy
+
+
+@dataclass(frozen=True, slots=True)
+class _Stick:
+    """A sensor gets stuck."""
+
+
+_Event = _Arrival | _Departure | _Finish | _Stick
+
+
+@dataclass(slots=True)
+class _MachineNow:
+    """What a machine holds, where its hand is, and what it is at."""
+
+    model: Machine
+    position: str | None
+    holding: Workpiece | None = None
+    busy: _Busy | None = None
+    times: dict[str, int] = field(default_factory=dict)
+
+
+class _FaultError(Exception):
+    """A law of the plant is broken."""
+
+
+class Plant:
+    """The cell of a plant file at rest, into which `workpieces` workpieces will come."""
+
+    def __init__(
+        self, model: PlantModel, *, workpieces: int, seed: int = 0, disturbances: Iterable[Disturbance] = ()
+    ) -> None:
+        self.model = model
+        self.random = random.Random(seed)
+        self.disturbances = tuple(disturbances)
+        self.machines = {name: _MachineNow(machine, machine.hand) for name, machine in model.machines.items()}
+        self.stations: dict[str, Workpiece | None] = dict.fromkeys(model.stations)
+        self.clamped: set[str] = set()
+        self.to_come = workpieces
+        self.entered = 0
+        self.delivered: list[Workpiece] = []
+        self.shown = dict.fromkeys(model.sensors, False)
+        self.faulted = False
+        self.arrival_due = False
+        self.events: list[tuple[float, int, _Event]] = []
+        """What will happen: when, a tie breaker, what."""
+        self.sequence = 0
+        self.now_seconds = 0.0
+        if workpieces:
+            self._in(0.0, model.arrivals.jitter_s, _Arrival())
+        for disturbance in self.disturbances:
+            if isinstance(disturbance, StuckSensor):
+                self._in(disturbance.from_seconds, 0.0, _Stick())
+
+    @property
+    def next_seconds(self) -> float | None:
+        """When something happens next, if no command comes before; None: never."""
+        return self.events[0][0] if self.events and not self.faulted else None
+
+    @property
+    def inside(self) -> tuple[int, ...]:
+        """The workpieces in the cell, in the order in which they came."""
+        holders = [*self.stations.values(), *(machine.holding for machine in self.machines.values())]
+        return tuple(sorted(workpiece.id for workpiece in holders if workpiece is not None))
+
+    def close(self) -> None:
+        """Let no more workpieces come."""
+        self.to_come = 0
+        self.arrival_due = False
+
+    def halt(self) -> None:
+        """Stop every machine where it is: the safe output of the simulated cell."""
+        self.faulted = True
+        for machine in self.machines.values():
+            machine.busy = None
+
+    def command(
+        self, now_seconds: float, machine: str, command: str, parameters: Mapping[str, str], ticket: Ticket
+    ) -> list[Report]:
+        """Give a machine a command; the ticket comes back when it is done."""
+        if self.faulted:
+            return []
+        self.now_seconds = now_seconds
+        return self._lawful(machine, self._begin(machine, _Busy(command, parameters, ticket)))
+
+    def advance(self, now_seconds: float) -> list[Report]:
+        """Let happen what is due."""
+        reports: list[Report] = []
+        while self.next_seconds is not None and self.next_seconds <= now_seconds:
+            self.now_seconds, _, event = heappop(self.events)
+            reports += self._lawful(event.machine if isinstance(event, _Finish) else "", self._happen(event))
+        return reports
+
+    def _lawful(self, machine: str, happening: Iterator[Report]) -> list[Report]:
+        reports: list[Report] = []
+        try:
+            reports.extend(happening)
+        except _FaultError as fault:
+            self.halt()
+            reports.append(PlantFault(machine, str(fault)))
+        # What is seen comes before what is acknowledged: a completion is formed from both.
+        return [*self._seen(), *reports]
+
+    def _in(self, delay_s: float, jitter_s: float, event: _Event) -> None:
+        delay = max(0.0, delay_s + (self.random.uniform(-jitter_s, jitter_s) if jitter_s else 0.0))
+        heappush(self.events, (self.now_seconds + delay, self.sequence, event))
+        self.sequence += 1
+
+    def _happen(self, event: _Event) -> Iterator[Report]:
+        match event:
+            case _Arrival():
+                self.arrival_due = True
+                self._arrive()
+            case _Departure():
+                self._depart()
+            case _Finish(machine, busy):
+                if self.machines[machine].busy is busy:
+                    yield from self._finish(machine, busy)
+            case _Stick():
+                pass  # `_seen` looks at the disturbances
+
+    def _arrive(self) -> None:
+        arrivals = self.model.arrivals
+        if self.arrival_due and self.to_come and self.stations[arrivals.station] is None:
+            self.arrival_due = False
+            self.to_come -= 1
+            self.entered += 1
+            self.stations[arrivals.station] = Workpiece(self.entered)
+            if self.to_come:
+                self._in(arrivals.every_s, arrivals.jitter_s, _Arrival())
+
+    def _depart(self) -> None:
+        station = self.model.departures.station
+        workpiece = self.stations[station]
+        if workpiece is None:
+            return
+        self.stations[station] = None
+        self.delivered.append(workpiece)
+        if not workpiece.processed and any(
+            isinstance(action, Process)
+            for machine in self.model.machines.values()
+            for action in machine.commands.values()
+        ):
+            raise _FaultError(f"workpiece {workpiece.id} leaves the cell without having been machined")
+
+    def _begin(self, name: str, busy: _Busy) -> Iterator[Report]:
+        machine = self.machines.get(name)
+        action = machine.model.commands.get(busy.command) if machine else None
+        if machine is None or action is None:
+            raise _FaultError(f"{name} does not know the command {busy.command}")
+        machine.times[busy.command] = machine.times.get(busy.command, 0) + 1
+        if isinstance(action, Stop):
+            machine.busy = None
+            yield CommandDone(busy.ticket)
+            return
+        if machine.busy is not None:
+            raise _FaultError(f"{name} is given {busy.command} while it is at {machine.busy.command}")
+        machine.busy = busy
+        match action:
+            case Move():
+                self._position(machine, name, busy, "to")
+            case Grasp() | Put():
+                at = self._position(machine, name, busy, "at")
+                if machine.position != at:
+                    raise _FaultError(f"{name} is to {action.does} at {at}, and its hand is at {machine.position}")
+                if isinstance(action, Put) and machine.holding is None:
+                    raise _FaultError(f"{name} is to put at {at} and holds nothing")
+                if isinstance(action, Grasp) and machine.holding is not None:
+                    raise _FaultError(f"{name} is to grasp at {at} and holds workpiece {machine.holding.id}")
+            case Carry(source=source):
+                if machine.holding is None:  # it holds one where it was stopped on the way
+                    machine.holding = self._taken(source, f"{name} is to carry from {source}")
+            case Process(station=station):
+                workpiece = self._lying(station, f"{name} is to machine on {station}")
+                if station not in self.clamped:
+                    raise _FaultError(f"{name} machines workpiece {workpiece.id}, which is not clamped")
+                if workpiece.processed:
+                    raise _FaultError(f"{name} machines workpiece {workpiece.id} a second time")
+        never = NeverCompletes(name, busy.command, machine.times[busy.command])
+        if never not in self.disturbances:
+            self._in(action.takes_s, action.jitter_s, _Finish(name, busy))
+
+    def _finish(self, name: str, busy: _Busy) -> Iterator[Report]:
+        machine = self.machines[name]
+        action = machine.model.commands[busy.command]
+        match action:
+            case Move():
+                machine.position = busy.parameters["to"]
+            case Grasp():
+                station = machine.model.positions[busy.parameters["at"]]
+                if station in self.clamped:
+                    raise _FaultError(f"{name} pulls at a workpiece that is clamped on {station}")
+                machine.holding = self._taken(station, f"{name} grasps at {busy.parameters['at']}")
+            case Put(when_full=when_full):
+                station = machine.model.positions[busy.parameters["at"]]
+                if when_full == "wait" and station is not None and self.stations[station] is not None:
+                    machine.busy = _Busy(busy.command, busy.parameters, busy.ticket, waits=True)
+                    return
+                self._lay(name, machine, station)
+            case Carry(target=target):
+                self._lay(name, machine, target)
+            case Clamp(station=station):
+                self._lying(station, f"{name} clamps on {station}")
+                self.clamped.add(station)
+            case Process(station=station):
+                self._lying(station, f"{name} machines on {station}").processed += 1
+            case Release(station=station):
+                self.clamped.discard(station)
+        machine.busy = None
+        yield CommandDone(busy.ticket)
+
+    def _position(self, machine: _MachineNow, name: str, busy: _Busy, parameter: str) -> str:
+        position = busy.parameters.get(parameter)
+        if position is None or position not in machine.model.positions:
+            raise _FaultError(f"{name} does not know the position {position} of {busy.command}")
+        return position
+
+    def _lying(self, station: str | None, doing: str) -> Workpiece:
+        workpiece = self.stations[station] if station is not None else None
+        if workpiece is None:
+            raise _FaultError(f"{doing}, where no workpiece lies")
+        return workpiece
+
+    def _taken(self, station: str | None, doing: str) -> Workpiece:
+        workpiece = self._lying(station, doing)
+        self.stations[str(station)] = None
+        if station == self.model.arrivals.station:
+            self._arrive()
+        for name, machine in self.machines.items():
+            if machine.busy is not None and machine.busy.waits:
+                self._in(0.0, 0.0, _Finish(name, machine.busy))
+        return workpiece
+
+    def _lay(self, name: str, machine: _MachineNow, station: str | None) -> None:
+        workpiece = machine.holding
+        if workpiece is None:
+            raise _FaultError(f"{name} has lost the workpiece that it should lay down")
+        if station is None:
+            raise _FaultError(f"{name} drops workpiece {workpiece.id} where nothing is")
+        if (there := self.stations[station]) is not None:
+            raise _FaultError(f"{name} pushes workpiece {workpiece.id} onto {station}, where workpiece {there.id} lies")
+        machine.holding = None
+        self.stations[station] = workpiece
+        if station == self.model.departures.station:
+            self._in(self.model.departures.after_s, 0.0, _Departure())
+
+    def _sees(self, name: str, sensor: Sensor) -> bool:
+        for disturbance in self.disturbances:
+            if (
+                isinstance(disturbance, StuckSensor)
+                and disturbance.signal == name
+                and disturbance.from_seconds <= self.now_seconds
+            ):
+                return disturbance.value
+        if sensor.occupied is not None:
+            return self.stations[sensor.occupied] is not None
+        return self.machines[str(sensor.holding)].holding is not None
+
+    def _seen(self) -> Iterator[Report]:
+        for name, sensor in self.model.sensors.items():
+            value = self._sees(name, sensor)
+            if value != self.shown[name]:
+                self.shown[name] = value
+                yield SensorChanged(name, value)

@@ -1,0 +1,256 @@
+"""The plant file, `*.plant.yaml`: the physical side of a cell, as the simulated cell plays it.
+
+It says where workpieces can lie, which machines exist, what each command does to a workpiece and how long that takes,
+and what each sensor sees. It says nothing of places and transitions: commands and sensors are the whole border between
+a net and its cell, so a plant knows nothing that a real cell would not. Times are in seconds, and stand in keys that
+end in `_s`.
+
+The file is read like a net file: bounded, without ambiguous YAML, each mistake with its line. All mistakes are F5003
+except those of YAML itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
+from firable.nets.net import Net, SignalKind
+from firable.nets.source import Source, quoted, read_source
+from firable.nets.yaml_tree import Node, data, node_span, nodes_along, parse_tree
+
+SIZE_BYTES_MAX: Final = 1024 * 1024
+
+
+def _number(value: object) -> object:
+    # The tree resolves no numbers; a number that is none is left for pydantic to refuse.
+    try:
+        return float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
+
+
+def _version(value: object) -> object:
+    return int(value) if value in {"1", 1} and not isinstance(value, bool) else value
+
+
+Name = Annotated[str, Field(min_length=1)]
+Seconds = Annotated[float, BeforeValidator(_number), Field(ge=0, le=1e6, allow_inf_nan=False)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, populate_by_name=False)
+
+
+class _Timed(_Model):
+    takes_s: Seconds
+    jitter_s: Seconds = 0.0
+
+
+class Move(_Timed):
+    """Move the hand to the position named by the command's parameter `to`."""
+
+    does: Literal["move"]
+
+
+class Grasp(_Timed):
+    """Take the workpiece that lies at the hand; the command's parameter `at` is the position where this must be."""
+
+    does: Literal["grasp"]
+
+
+class Put(_Timed):
+    """Lay down the workpiece in the hand, at the position of the parameter `at`.
+
+    On a full station the machine collides with what lies there, or, with `when_full: wait`, holds on until it is free.
+    """
+
+    does: Literal["put"]
+    when_full: Literal["collide", "wait"] = "collide"
+
+
+class Carry(_Timed):
+    """Carry the workpiece from one station to another."""
+
+    does: Literal["carry"]
+    source: Name = Field(alias="from")
+    target: Name = Field(alias="to")
+
+
+class Clamp(_Timed):
+    """Clamp the workpiece on a station."""
+
+    does: Literal["clamp"]
+    station: Name
+
+
+class Process(_Timed):
+    """Machine the clamped workpiece on a station."""
+
+    does: Literal["process"]
+    station: Name
+
+
+class Release(_Timed):
+    """Unclamp the workpiece on a station."""
+
+    does: Literal["release"]
+    station: Name
+
+
+class Stop(_Model):
+    """Stop whatever the machine does, at once."""
+
+    does: Literal["stop"]
+
+
+Action = Annotated[
+    Move | Grasp | Put | Carry | Clamp | Process | Release | Stop,
+    Field(discriminator="does"),
+]
+
+
+class Machine(_Model):
+    """A machine; one with a hand has positions, each in front of a station or of nothing."""
+
+    hand: Name | None = Field(default=None, description="The position where the hand is at first.")
+    positions: dict[Name, Name | None] = {}
+    commands: dict[Name, Action]
+
+
+class Arrivals(_Model):
+    """Where workpieces come from: one each `every_s`, as soon as the station is empty."""
+
+    station: Name
+    every_s: Seconds
+    jitter_s: Seconds = 0.0
+
+
+class Departures(_Model):
+    """Where finished workpieces are taken away, `after_s` after they arrive."""
+
+    station: Name
+    after_s: Seconds = 0.0
+
+
+class Sensor(_Model):
+    """What a sensor sees: a workpiece on a station, or one in the hand of a machine."""
+
+    occupied: Name | None = None
+    holding: Name | None = None
+
+
+class PlantModel(_Model):
+    """A whole plant file."""
+
+    firable_plant: Annotated[Literal[1], BeforeValidator(_version)]
+    plant: Name
+    description: str = ""
+    stations: list[Name]
+    arrivals: Arrivals
+    departures: Departures
+    machines: dict[Name, Machine]
+    sensors: dict[Name, Sensor] = {}
+
+
+def read_plant(path: Path | str) -> PlantModel:
+    """Read a plant file; raises `InputError` F5003, or F1001-F1007 where the file is no YAML."""
+    return _parse(read_source(path, SIZE_BYTES_MAX))
+
+
+def parse_plant(text: str, file: str = "<plant>") -> PlantModel:
+    """Read a plant from text, as `read_plant` does."""
+    return _parse(Source(file, text))
+
+
+def _parse(source: Source) -> PlantModel:
+    tree = parse_tree(source)
+    try:
+        model = PlantModel.model_validate(data(tree))
+    except ValidationError as error:
+        found = error.errors(include_url=False, include_input=False)
+        raise InputError([_problem(source, tree, tuple(one["loc"]), one["msg"]) for one in found[:20]]) from None
+    problems = [_problem(source, tree, path, message, hint) for path, message, hint in _inconsistencies(model)]
+    if problems:
+        raise InputError(problems)
+    return model
+
+
+def _problem(source: Source, tree: Node, path: tuple[Any, ...], message: str, hint: str = "") -> Diagnostic:
+    # pydantic puts the chosen alternative of `does` into the path; it is no key of the file.
+    steps = [step for i, step in enumerate(path) if not (i == 4 and path[0] == "machines" and path[2] == "commands")]
+    key, node = list(nodes_along(tree, tuple(steps)))[-1]
+    where = quoted(".".join(map(str, steps))) if steps else "the file"
+    hint = hint or "the format is described in firable/executor/plant_file.py and by the plants of the catalogue"
+    return Diagnostic("F5003", f"{where}: {message}", hint, tuple(map(str, steps)), node_span(source, key or node))
+
+
+def _inconsistencies(model: PlantModel) -> Iterator[tuple[tuple[str, ...], str, str]]:
+    stations = set(model.stations)
+
+    def station(path: tuple[str, ...], name: str | None) -> Iterator[tuple[tuple[str, ...], str, str]]:
+        if name is not None and name not in stations:
+            yield path, f"there is no station '{name}'", did_you_mean(name, model.stations) + "see `stations`"
+
+    yield from station(("arrivals", "station"), model.arrivals.station)
+    yield from station(("departures", "station"), model.departures.station)
+    for name, machine in model.machines.items():
+        path = ("machines", name)
+        if machine.hand is not None and machine.hand not in machine.positions:
+            yield (*path, "hand"), f"there is no position '{machine.hand}'", "see `positions` of the machine"
+        for position, at in machine.positions.items():
+            yield from station((*path, "positions", position), at)
+        for command, action in machine.commands.items():
+            inner = (*path, "commands", command)
+            match action:
+                case Move() | Grasp() | Put() if machine.hand is None:
+                    yield inner, f"'{name}' has no hand", "give the machine `hand` and `positions`"
+                case Carry(source=source, target=target):
+                    yield from station((*inner, "from"), source)
+                    yield from station((*inner, "to"), target)
+                case Clamp(station=at) | Process(station=at) | Release(station=at):
+                    yield from station((*inner, "station"), at)
+    for name, sensor in model.sensors.items():
+        if (sensor.occupied is None) == (sensor.holding is None):
+            yield ("sensors", name), "a sensor sees one thing", "write `occupied: STATION` or `holding: MACHINE`"
+        yield from station(("sensors", name, "occupied"), sensor.occupied)
+        if sensor.holding is not None and sensor.holding not in model.machines:
+            yield ("sensors", name, "holding"), f"there is no machine '{sensor.holding}'", "see `machines`"
+
+
+def misfits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
+    """Where a plant does not fit a net (F5003): a command it does not know, a sensor on one side only."""
+    problems = []
+    for place in net.places:
+        command = place.command
+        if command is None:
+            continue
+        known = model.machines.get(command.machine)
+        if known is None or command.command not in known.commands:
+            lacking = f"machine '{command.machine}'" if known is None else f"command '{command.command}'"
+            message = f"'{place.name}' sends '{command}', and the plant has no such {lacking}"
+            problems.append(Diagnostic("F5003", message, "add it to the plant file", ("places", place.name)))
+            continue
+        action, parameters = known.commands[command.command], dict(command.parameters)
+        needed = {"move": "to", "grasp": "at", "put": "at"}.get(action.does)
+        if needed and parameters.get(needed) not in known.positions:
+            message = f"'{place.name}' sends '{command}': '{needed}' is no position of '{command.machine}'"
+            hint = f"its positions are {', '.join(known.positions)}"
+            problems.append(Diagnostic("F5003", message, hint, ("places", place.name)))
+        if place.completion and isinstance(action, Stop):
+            message = f"'{place.name}' waits for the completion of '{command}', which only stops"
+            problems.append(Diagnostic("F5003", message, "leave out `until`", ("places", place.name)))
+    for signal in net.signals:
+        if signal.kind is SignalKind.SENSOR and signal.name not in model.sensors:
+            hint = did_you_mean(signal.name, list(model.sensors)) + "add it to the `sensors` of the plant file"
+            problems.append(
+                Diagnostic("F5003", f"no sensor of the plant drives '{signal.name}'", hint, ("signals", signal.name))
+            )
+    for name in model.sensors:
+        if name not in net.signal_index:
+            hint = did_you_mean(name, [signal.name for signal in net.signals]) + "sensors bear the names of signals"
+            problems.append(Diagnostic("F5003", f"the net has no signal '{name}'", hint, ("sensors", name)))
+    return tuple(problems)

@@ -1,0 +1,65 @@
+"""The recorder: writes the trace of a run as it goes, and keeps the joint marking that the trace shows.
+
+Firings, signals, commands and notes are written in the order in which they took effect: a coordinated firing at the
+coordinator's decision, a local one where it occurs. That order is a trace of the central net (SEMANTICS O1-O5), so the
+recorder plays it along and is where a running executor is asked for its marking. It is flushed at the end, and when
+the run is waiting; a line that a killed run leaves half written is no line of the trace.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TextIO
+
+from firable.executor.token_player import TokenPlayer
+from firable.nets.net import Marking, Net
+from firable.semantics.trace import CommandSent, End, Event, Fired, Header, Noted, SignalChanged
+
+
+class Recorder:
+    """The trace so far, its marking and its counts."""
+
+    def __init__(self, net: Net, digest: str, stream: TextIO | None) -> None:
+        self.player = TokenPlayer.of(net)
+        self.word = net.initial_marking
+        self.stream = stream
+        self.firings: dict[str, int] = {transition.name: 0 for transition in net.transitions}
+        self.commands = 0
+        self._write(Header(net.name, digest, signals=True, commands=True))
+
+    @property
+    def marking(self) -> Marking:
+        """The joint marking."""
+        return self.player.marking(self.word)
+
+    def fired(self, at_seconds: float, transition: str) -> None:
+        """A transition of the central net has fired."""
+        compiled = self.player.transitions[transition]
+        self.word = self.word & ~compiled.takes | compiled.puts
+        self.firings[transition] += 1
+        self._write(Fired(at_seconds, (transition,)))
+
+    def signal(self, at_seconds: float, name: str, value: bool) -> None:
+        """A controller has taken a new value of a signal."""
+        bit = self.player.signal_bit(name)
+        self.word = self.word | bit if value else self.word & ~bit
+        self._write(SignalChanged(at_seconds, name, value))
+
+    def sent(self, at_seconds: float, place: str) -> None:
+        """The command of a place was sent."""
+        self.commands += 1
+        self._write(CommandSent(at_seconds, place))
+
+    def note(self, at_seconds: float, note: str, **data: str) -> None:
+        """Anything else that the trace should keep."""
+        self._write(Noted(at_seconds, note, data))
+
+    def end(self, at_seconds: float, reason: str) -> None:
+        """The last line."""
+        self._write(End(at_seconds, self.player.net.names(self.marking), reason))
+        if self.stream is not None:
+            self.stream.flush()
+
+    def _write(self, item: Header | Event | End) -> None:
+        if self.stream is not None:
+            self.stream.write(json.dumps(item.to_json()) + "\n")

@@ -1,0 +1,167 @@
+"""Running a bundle on a cell: the way in for the command line and for programs.
+
+A bundle is loaded only if it is unchanged (F5001) and everything that its net must prove is proved (F5002): the right
+to run is checked where the run begins, not where the bundle was made. `execute` runs a decomposition without asking for
+that right; it is for simulation and for tests, and no command offers it.
+
+The simulated cell runs in virtual time unless a speed is given; then a run is a function of bundle, plant and seed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+from firable.executor.drivers import SimulatedDriver
+from firable.executor.execution import Execution
+from firable.executor.plant import Disturbance, Plant
+from firable.executor.plant_file import PlantModel, misfits
+from firable.executor.recorder import Recorder
+from firable.executor.situation import Situation, State
+from firable.executor.virtual_time import run_in_virtual_time
+from firable.nets.bundle import Bundle, read_bundle, unproved
+from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.interchange import net_digest
+
+Operator = Callable[[Execution], Awaitable[None]]
+"""A coroutine that runs beside the cell and uses its controls."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunReport:
+    """How a run ended: the workpieces by their identities, what was done for them, and the situation at the end."""
+
+    situation: Situation
+    delivered: tuple[int, ...]
+    inside: tuple[int, ...]
+    lost: tuple[int, ...]
+    doubled: tuple[int, ...]
+    firings: Mapping[str, int]
+    commands: int
+    messages: int
+    simulated_seconds: float
+
+    @property
+    def state(self) -> State:
+        """How the run ended."""
+        return self.situation.state
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as JSON data."""
+        return {
+            "state": self.state.value,
+            "message": self.situation.message,
+            "marking": list(self.situation.marking),
+            "blocked": [str(blocked) for blocked in self.situation.blocked],
+            "delivered": list(self.delivered),
+            "inside": list(self.inside),
+            "lost": list(self.lost),
+            "doubled": list(self.doubled),
+            "firings": dict(self.firings),
+            "commands": self.commands,
+            "messages": self.messages,
+            "simulated_seconds": self.simulated_seconds,
+        }
+
+
+def load(path: Path | str) -> Bundle:
+    """Read a bundle that may run; raises `InputError` F5001 where it is changed, F5002 where it is not proved."""
+    bundle = read_bundle(path)
+    if problems := unproved(bundle):
+        raise InputError(problems)
+    return bundle
+
+
+def run(
+    bundle: Bundle,
+    plant: PlantModel,
+    *,
+    workpieces: int,
+    seed: int = 0,
+    speed: float | None = None,
+    trace_path: Path | str | None = None,
+    overdue_seconds: float = 120.0,
+    disturbances: Iterable[Disturbance] = (),
+    operator: Operator | None = None,
+) -> RunReport:
+    """Run a bundle on the simulated cell of a plant until `workpieces` workpieces have gone through.
+
+    `speed` None is virtual time, 1.0 real time, 10.0 ten times as fast. A command that is not completed within
+    `overdue_seconds` (of the cell's time) is a fault. Raises `InputError` F5002 where the bundle is not proved, F5003
+    where the plant does not fit it, F1017 where the trace cannot be written.
+    """
+    if problems := unproved(bundle):
+        raise InputError(problems)
+    with ExitStack() as stack:
+        stream = None if trace_path is None else stack.enter_context(_opened(Path(trace_path)))
+        return execute(
+            bundle.decomposition,
+            plant,
+            workpieces=workpieces,
+            seed=seed,
+            speed=speed,
+            trace=stream,
+            overdue_seconds=overdue_seconds,
+            disturbances=disturbances,
+            operator=operator,
+        )
+
+
+def execute(
+    decomposition: Decomposition,
+    plant: PlantModel,
+    *,
+    workpieces: int,
+    seed: int = 0,
+    speed: float | None = None,
+    trace: TextIO | None = None,
+    overdue_seconds: float = 120.0,
+    disturbances: Iterable[Disturbance] = (),
+    operator: Operator | None = None,
+) -> RunReport:
+    """Run a decomposition, proved or not, on the simulated cell of a plant; parameters as for `run`.
+
+    Raises `InputError` F5003 where the plant does not fit the net.
+    """
+    if problems := misfits(plant, decomposition.net):
+        raise InputError(problems)
+    cell = Plant(plant, workpieces=workpieces, seed=seed, disturbances=disturbances)
+    recorder = Recorder(decomposition.net, net_digest(decomposition.net), trace)
+    execution = Execution(
+        decomposition,
+        SimulatedDriver(cell, decomposition.net),
+        recorder,
+        speed=1.0 if speed is None else speed,
+        overdue_seconds=overdue_seconds,
+        is_complete=lambda: len(cell.delivered) == workpieces,
+        operator=operator,
+    )
+    situation = run_in_virtual_time(execution.main()) if speed is None else asyncio.run(execution.main())
+    recorder.end(execution.now_seconds(), situation.state.value)
+    delivered = tuple(workpiece.id for workpiece in cell.delivered)
+    seen = Counter((*delivered, *cell.inside))
+    return RunReport(
+        situation,
+        delivered,
+        cell.inside,
+        lost=tuple(i for i in range(1, cell.entered + 1) if i not in seen),
+        doubled=tuple(sorted(i for i, times in seen.items() if times > 1)),
+        firings=recorder.firings,
+        commands=recorder.commands,
+        messages=execution.messages,
+        simulated_seconds=execution.now_seconds(),
+    )
+
+
+def _opened(path: Path) -> TextIO:
+    try:
+        return path.open("w", encoding="utf-8")
+    except OSError as error:
+        message = f"{path}: the trace cannot be written: {error.strerror}"
+        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None

@@ -1,0 +1,85 @@
+"""The situation of a run: running, waiting, deadlock, fault, told apart and in the words of the net.
+
+Asked at quiescence, when no message is under way, the joint marking and the process image decide:
+
+- *deadlock*: no transition is firable and openable. Nothing that a machine or an operator does will change that;
+- *waiting*: some transition is firable and an external gate of it is closed, because a machine is at work or a sensor
+  has seen nothing;
+- *fault*: the driver reported one, or a command is overdue: sent longer ago than its limit and not completed. A net
+  cannot tell a slow machine from a dead one; only time does, so a fault is never concluded from the marking.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+from firable.executor.token_player import TokenPlayer, Word
+
+
+class State(StrEnum):
+    """What a run is doing."""
+
+    RUNNING = "running"
+    WAITING = "waiting"
+    DEADLOCK = "deadlock"
+    FAULT = "fault"
+    PAUSED = "paused"
+    STOPPED = "stopped"
+    DONE = "done"
+
+
+@dataclass(frozen=True, slots=True)
+class Blocked:
+    """Why one transition does not fire: places that lack a token or hold one too many, and gates that are closed."""
+
+    transition: str
+    empty: tuple[str, ...]
+    full: tuple[str, ...]
+    gates: tuple[tuple[str, bool], ...]
+    """Signals with the value that is wanted."""
+
+    def __str__(self) -> str:
+        reasons = [f"a token on {place}" for place in self.empty]
+        reasons += [f"{place} to become empty" for place in self.full]
+        reasons += [f"{signal}" if wanted else f"not {signal}" for signal, wanted in self.gates]
+        return f"{self.transition} waits for {', '.join(reasons)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What a run is doing, and what waits for what."""
+
+    state: State
+    marking: tuple[str, ...]
+    blocked: tuple[Blocked, ...] = ()
+    message: str = ""
+
+    def __str__(self) -> str:
+        lines = [f"{self.state}: {self.message}" if self.message else str(self.state)]
+        return "\n  ".join([*lines, *map(str, self.blocked)])
+
+
+def is_deadlock(player: TokenPlayer, word: Word) -> bool:
+    """Whether no transition is firable and openable."""
+    openable = (c for c in player.transitions.values() if not c.needs & c.forbids & ~player.places)
+    return not any(compiled.firable(word, player.places) for compiled in openable)
+
+
+def blocked(player: TokenPlayer, word: Word) -> Iterator[Blocked]:
+    """What waits: the firable transitions with closed gates; in a deadlock, those that have some token to take."""
+    net = player.net
+    firable = [c for c in player.transitions.values() if c.firable(word, player.places)]
+    shown = firable or [c for c in player.transitions.values() if c.takes & word]
+    for compiled in shown:
+        yield Blocked(
+            compiled.name,
+            net.names(compiled.needs & ~word & player.places),
+            net.names(compiled.forbids & word & player.places),
+            tuple(
+                (gate.signal, gate.wanted)
+                for gate in net.transition(compiled.name).external
+                if bool(word & player.signal_bit(gate.signal)) != gate.wanted
+            ),
+        )
