@@ -1,0 +1,96 @@
+# One command for each habit. Every target does its own set-up: it needs Python 3.11 or later, cargo, make, git and the
+# package registries, nothing else. What was set up is remembered in the environment (.venv), so the second time is quick.
+
+PYTHON ?= $(firstword $(foreach name,python3 python3.14 python3.13 python3.12 python3.11,$(shell \
+	$(name) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $(name))))
+VENV ?= .venv
+BIN := $(VENV)/bin
+MADE := $(VENV)/made
+CRATE := analysis/engine
+CARGO_OPTIONS := --locked --manifest-path $(CRATE)/Cargo.toml
+PYTEST_OPTIONS ?= -q -n 2
+
+# Public nets to test against, where they stand beside the checkout; tests that miss them say so.
+ifneq ($(wildcard ../shared/nets),)
+export FIRABLE_NETS ?= $(abspath ../shared/nets)
+endif
+
+# The crate links to the Python that the environment was made with.
+export PYO3_PYTHON = $(abspath $(BIN)/python)
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test fmt bench clean lint lint-python lint-ruff lint-format lint-types lint-types-tests
+.PHONY: lint-rust lint-rust-format lint-clippy test-rust test-python
+
+help: ## these lines
+	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/\t/' | expand -t 14
+
+demo: $(MADE)/install ## check, prove, bundle and run the one-robot cell, and see another one deadlock
+	@BIN=$(BIN) sh docs/demo.sh
+
+test: lint test-rust test-python ## lint, format, types, and all tests
+
+lint: lint-python lint-rust ## what `make test` checks before it tests
+
+lint-python: lint-ruff lint-format lint-types lint-types-tests
+
+lint-ruff: $(MADE)/develop
+	$(BIN)/ruff check --quiet .
+
+lint-format: $(MADE)/develop
+	$(BIN)/ruff format --check .
+
+lint-types: $(MADE)/develop
+	$(BIN)/mypy
+
+lint-types-tests: $(MADE)/develop
+	$(BIN)/mypy tests $(wildcard benchmarks/*.py)
+
+lint-rust: lint-rust-format lint-clippy
+
+lint-rust-format: $(MADE)/rust-tools
+	cargo fmt --manifest-path $(CRATE)/Cargo.toml --check
+
+lint-clippy: $(MADE)/rust-tools
+	cargo clippy --quiet $(CARGO_OPTIONS) --all-targets -- -D warnings
+
+test-rust: $(MADE)/develop
+	cargo test $(CARGO_OPTIONS) --quiet
+
+test-python: $(MADE)/develop
+	$(BIN)/pytest $(PYTEST_OPTIONS)
+
+fmt: $(MADE)/develop $(MADE)/rust-tools ## format all code, and repair what the linter can
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	cargo fmt --manifest-path $(CRATE)/Cargo.toml
+
+bench: $(MADE)/develop ## measure; prints ratios against a reference in the same run
+	@for file in $(sort $(wildcard benchmarks/bench_*.py)); do $(BIN)/python $$file || exit 1; done
+
+clean: ## remove what was built
+	rm -rf $(VENV) out build dist src/*.egg-info $(CRATE)/target .mypy_cache .ruff_cache .pytest_cache
+	rm -f analysis/_engine*.so
+
+$(MADE)/venv:
+	@test -n "$(PYTHON)" || { echo "firable needs Python 3.11 or later; none was found (make PYTHON=... names one)"; exit 1; }
+	@command -v cargo >/dev/null || { echo "firable needs cargo, to build its Rust crate"; exit 1; }
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
+	@mkdir -p $(MADE) && touch $@
+
+$(MADE)/install: $(MADE)/venv pyproject.toml $(CRATE)/Cargo.toml $(CRATE)/Cargo.lock $(wildcard $(CRATE)/src/*.rs)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[prove]'
+	@touch $@
+
+$(MADE)/develop: $(MADE)/install
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group test --group lint
+	@touch $@
+
+# Some distributions package these apart from cargo. Without them the gate would check less than it says.
+$(MADE)/rust-tools: $(MADE)/venv
+	@cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 \
+		|| rustup component add rustfmt clippy \
+		|| { echo "install rustfmt and clippy (with rustup, or your packages rustfmt and rust-clippy)"; exit 1; }
+	@touch $@

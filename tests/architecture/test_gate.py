@@ -1,0 +1,107 @@
+"""The gate of `make test` sees every file: a planted mistake in each room must stop it, by the very commands it runs.
+
+Type checkers and linters check nothing, and say so of nothing, when they are pointed at the wrong place. So the sources
+are copied, one bad file is planted in every folder that holds code, and `make lint-python` and `make lint-rust` must
+fail and name each of them, and nothing else.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("nets", "semantics", "analysis", "decompose", "executor", "cli", "tests", "benchmarks")
+COPIED = (*ROOMS, "src", "Makefile", "pyproject.toml", ".gitignore", ".mypy_cache")
+
+
+BAD = {
+    "unused": '"""Planted."""\n\nimport json\n',
+    "unformatted": '"""Planted."""\n\nANSWER = [ 42 ]\n',
+    "mistyped": '"""Planted."""\n\n\ndef planted() -> int:\n    """Plant."""\n    return "42"\n',
+    "printing": '"""Planted."""\n\nprint("hello")\n',
+}
+
+
+def make(folder: Path, target: str, *variables: str, **environment: str) -> str:
+    """The output of a target of the Makefile, which has to fail, with this environment: nothing is installed for it."""
+    venv = Path(sys.executable).parents[1]
+    made = [f"--assume-old={venv}/made/{stamp}" for stamp in ("develop", "rust-tools")]
+    inherited = {key: value for key, value in os.environ.items() if key not in {"MAKEFLAGS", "MFLAGS", "MAKELEVEL"}}
+    done = subprocess.run(
+        ["make", "--keep-going", *made, f"VENV={venv}", *variables, target],
+        cwd=folder,
+        env=inherited | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode != 0, done.stdout
+    return done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def output(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What the Python half of the gate says of a copy of the sources with every kind of bad file in every folder."""
+    copy = tmp_path_factory.mktemp("gate")
+    ignored = shutil.ignore_patterns("__pycache__", "engine", "reference", "*.so", "*.egg-info")
+    for name in COPIED:
+        source = ROOT / name
+        if source.is_dir():
+            shutil.copytree(source, copy / name, symlinks=True, ignore=ignored)
+        elif source.is_file():
+            shutil.copy2(source, copy / name)
+    for room in ROOMS:
+        (copy / room).mkdir(exist_ok=True)
+        for kind, text in BAD.items():
+            (copy / room / f"planted_{kind}.py").write_text(text, encoding="utf-8")
+    return make(copy, "lint-python")
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_an_unused_import_in_any_room_stops_the_gate(output: str, room: str) -> None:
+    assert f"{room}/planted_unused.py:3:8" in output
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_badly_formatted_line_in_any_room_stops_the_gate(output: str, room: str) -> None:
+    assert f"{room}/planted_unformatted.py" in output  # which nothing but the formatter objects to
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_type_error_in_any_room_stops_the_gate(output: str, room: str) -> None:
+    assert f"{room}/planted_mistyped.py:6: error: Incompatible return value" in output
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_printing_outside_the_command_line_stops_the_gate(output: str, room: str) -> None:
+    assert (f"{room}/planted_printing.py:3:1" in output) == (room not in {"cli", "benchmarks"})
+
+
+def planted_crate(folder: Path, text: str) -> Path:
+    crate = ROOT / "analysis" / "engine"
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copytree(crate / "src", folder / "src", dirs_exist_ok=True)
+    for name in ("Cargo.toml", "Cargo.lock", "rustfmt.toml"):
+        shutil.copy2(crate / name, folder / name)
+    with (folder / "src" / "lib.rs").open("a", encoding="utf-8") as stream:
+        stream.write(text)
+    return folder
+
+
+def test_a_badly_formatted_line_in_the_crate_stops_the_gate(tmp_path: Path) -> None:
+    crate = planted_crate(tmp_path, "\nfn  planted( ){}\n")
+    assert f"Diff in {crate}/src/lib.rs" in make(ROOT, "lint-rust-format", f"CRATE={crate}")
+
+
+def test_a_clippy_warning_in_the_crate_stops_the_gate() -> None:
+    # Always the same folder, inside the target folder: so the dependencies are those that the gate has built already.
+    target = ROOT / "analysis" / "engine" / "target"
+    text = "\n/// Planted.\npub fn planted(bytes: &Vec<u8>) -> bool {\n    bytes.len() == 0\n}\n"
+    crate = planted_crate(target / "planted", text)
+    output = make(ROOT, "lint-clippy", f"CRATE={crate}", CARGO_TARGET_DIR=str(target))
+    assert "clippy::len-zero" in output
+    assert "clippy::ptr-arg" in output

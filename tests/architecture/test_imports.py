@@ -1,0 +1,74 @@
+"""Who may import whom, read from the source of every room, and what the executor loads when it runs."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+MAY_IMPORT = {
+    "nets": set[str](),
+    "semantics": {"nets"},
+    "analysis": {"semantics", "nets"},
+    "decompose": {"analysis", "semantics", "nets"},
+    "executor": {"semantics", "nets"},
+    "cli": {"executor", "decompose", "analysis", "semantics", "nets"},
+}
+PROVERS = {"z3", "networkx", "sympy", "numpy", "cvc5"}
+THIN = {"nets", "semantics", "executor"}
+
+
+def imported(file: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file}:{node.lineno} imports relatively"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_the_rooms_of_this_test_are_the_rooms_of_the_package() -> None:
+    linked = {path.name for path in (ROOT / "src" / "firable").iterdir() if path.is_symlink()}
+    assert linked == set(MAY_IMPORT)
+    assert all((ROOT / "src" / "firable" / room).resolve() == ROOT / room for room in linked)
+
+
+@pytest.mark.parametrize("room", sorted(MAY_IMPORT))
+def test_a_room_imports_only_the_rooms_below_it(room: str) -> None:
+    files = sorted((ROOT / room).rglob("*.py"))
+    assert files
+    for file in files:
+        for name in imported(file):
+            first, _, rest = name.partition(".")
+            assert first not in MAY_IMPORT, f"{file}: `import {name}` must be `import firable.{name}`"
+            if first == "firable" and (target := rest.partition(".")[0]) in MAY_IMPORT:
+                assert target in MAY_IMPORT[room] | {room}, f"{file} imports firable.{target}"
+            if room in THIN:
+                assert first not in PROVERS, f"{file} imports {first}"
+
+
+def loaded_by(code: str) -> set[str]:
+    shown = f"{code}\nimport sys\nprint(' '.join(sorted({{name.partition('.')[0] for name in sys.modules}})))"
+    done = subprocess.run([sys.executable, "-c", shown], capture_output=True, text=True, check=True, cwd=ROOT)
+    return set(done.stdout.split())
+
+
+def test_the_executor_loads_no_prover_at_run_time() -> None:
+    modules = [f"firable.executor.{path.stem}" for path in (ROOT / "executor").glob("*.py") if path.stem != "__init__"]
+    loaded = loaded_by("import " + ", ".join(["firable.executor", *modules]))
+    assert "firable" in loaded
+    assert not loaded & PROVERS
+    rooms = (
+        f"{'import ' + ', '.join(modules)}\nimport sys\nprint(*(n for n in sys.modules if n.startswith('firable.')))"
+    )
+    names = subprocess.run([sys.executable, "-c", rooms], capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    assert {name.split(".")[1] for name in names.split()} <= THIN
+
+
+def test_the_command_line_starts_without_loading_what_only_commands_need() -> None:
+    loaded = loaded_by("import firable.cli.main")
+    assert not loaded & (PROVERS | {"pydantic", "yaml", "asyncio"})
