@@ -6,9 +6,9 @@ The field exchanges nets as PNML, so reading it well is what lets public nets be
   kept as the description. Identifiers that are no names here are mapped without collision.
 - A self-loop, an arc to and one from the same place, is how an ordinary net reads a place: it becomes a permissive
   gate, as does a read arc. An inhibitor arc becomes an inhibitive gate.
-- What an import cannot carry (graphics, tool-specific data, delays, ...) is said in the notes. What would change the
-  behaviour (weights, two tokens, colours, time windows) is refused: rejected was an "approximate" import, whose verdicts
-  would be verdicts of another net.
+- What an import cannot carry (graphics, tool-specific data, rates, ...) is said in the notes. What would change the
+  behaviour (weights, two tokens, colours, time windows) is refused: an "approximate" import, the alternative, would
+  give the verdicts of another net.
 
 The ordinary firing rule lets a token pile up where the contact rule blocks; the notes say that too.
 """
@@ -31,6 +31,7 @@ from firable.nets.text_positions import bounded
 __all__ = ["PnmlImport", "parse_pnml", "read_pnml", "write_pnml"]
 
 SIZE_BYTES_MAX: Final = 256 * 1024 * 1024
+KINDS_MAX: Final = 20
 
 _NORMAL: Final = frozenset({"", "normal", "timed", "arc", "ptarc", "directed", "flow", "regular", "default"})
 _READ: Final = frozenset({"read", "readarc", "test", "testarc", "activator"})
@@ -59,10 +60,11 @@ def read_pnml(path: str | Path) -> PnmlImport:
 
 def parse_pnml(data: bytes | str, file: str = "<pnml>") -> PnmlImport:
     """Read PNML from memory; raises `InputError` as `read_pnml` does."""
+    encoding = None
     if isinstance(data, str):
-        data = data.encode("utf-8", "surrogatepass")
+        data, encoding = data.encode("utf-8", "surrogatepass"), "utf-8"
     source = Source(file, data.decode("utf-8-sig", "replace"))
-    records = parse_xml(source, data)
+    records = parse_xml(source, data, encoding)
     importing = _Import(source, records)
     net = importing.net()
     return PnmlImport(net, tuple(importing.notes()))
@@ -99,18 +101,21 @@ class _Import:
         kind = records.net.attributes.get("type", "")
         if _PT_TYPES.search(kind):
             self.refuse(records.net, "F1014", f"a net of type {quoted(kind)}", "export it as a place/transition net")
-        elif records.coloured is not None:
+        elif records.foreign is not None:
+            what, record = records.foreign
             self.refuse(
-                records.coloured,
+                record,
                 "F1014",
-                f"<{records.coloured.tag}> belongs to a coloured net",
-                "unfold the net into a place/transition net and export that",
+                f"<{record.tag}> belongs to a {what} net",
+                "unfold the colours and export a place/transition net"
+                if what == "coloured"
+                else "time is not part of a net here: delete it to have the net without time",
             )
         nodes = self.unique(record for record in records.nodes if record.tag != "arc")
-        if self.problems:  # colours and double identifiers would be reported again, arc by arc
+        resolve = self.references(nodes)
+        if self.problems:  # colours, double identifiers and broken references would be reported again, arc by arc
             raise InputError(bounded(self.problems))
         names = self.names(nodes.values())
-        resolve = self.references(nodes)
         arcs = self.arcs(nodes, resolve)
         places = tuple(self.place(record, names[record.id]) for record in nodes.values() if record.tag == "place")
         transitions = tuple(
@@ -310,11 +315,12 @@ class _Import:
                 f"{self.records.pages:,} pages with {references:,} references are joined to one net",
                 "pages are a matter of drawing",
             )
-        for tag, count in sorted(self.records.left.items()):
-            yield note(
-                f"{count:,} <{printable_tag(tag)}> are left out",
-                "drawing, tool data and time are no part of a net here",
-            )
+        kinds = sorted(self.records.left.items())
+        hint = "drawing, tool data, priorities and rates are no part of a net here"
+        for tag, count in kinds[:KINDS_MAX]:
+            yield note(f"{count:,} <{printable_tag(tag)}> are left out", hint)
+        if len(kinds) > KINDS_MAX:
+            yield note(f"elements of {len(kinds) - KINDS_MAX:,} other names are left out", hint)
 
 
 def printable_tag(tag: str) -> str:

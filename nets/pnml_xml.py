@@ -29,10 +29,13 @@ _LABELS: Final[dict[str, frozenset[str]]] = {
     "referenceTransition": frozenset(),
 }
 _VALUES: Final = frozenset({"text", "value"})
-_COLOURED: Final = frozenset(
-    {"declaration", "hlinitialMarking", "hlinscription", "condition", "structure", "type", "sort"}
-)
-"""Labels of high-level nets, at the net, a place, a transition or an arc that has no such label as a P/T net."""
+_FOREIGN: Final[dict[str, str]] = {
+    **dict.fromkeys(
+        ("declaration", "hlinitialMarking", "hlinscription", "condition", "structure", "type", "sort"), "coloured"
+    ),
+    **dict.fromkeys(("delay", "interval"), "time"),
+}
+"""Labels of other classes of nets, where a P/T net has no label of that name: to leave them out would change the net."""
 
 
 @dataclass(slots=True)
@@ -60,18 +63,18 @@ class PnmlRecords:
     pages: int = 0
     left: Counter[str] = field(default_factory=Counter)
     """How many elements of each name were not understood or are not part of a net."""
-    coloured: Record | None = None
-    """The first element that only a high-level net has."""
+    foreign: tuple[str, Record] | None = None
+    """The first element that only another class of nets has, and the name of that class."""
 
 
-def parse_xml(source: Source, data: bytes) -> PnmlRecords:
-    """Read the records of the one net of a PNML file.
+def parse_xml(source: Source, data: bytes, encoding: str | None = None) -> PnmlRecords:
+    """Read the records of the one net of a PNML file; `encoding` overrides what the file says of itself.
 
     Raises `InputError`: F1002 empty, F1013 where it is not XML or not PNML, F1014 where it holds several nets.
     """
     if not data.strip():
         raise source.refuse("F1002", "the file is empty", "a PNML file begins with `<pnml>`")
-    reader = _Reader(source)
+    reader = _Reader(source, encoding)
     try:
         reader.parser.Parse(data, True)
     except expat.ExpatError as error:
@@ -89,7 +92,7 @@ def parse_xml(source: Source, data: bytes) -> PnmlRecords:
 class _Reader:
     """The handlers of the stream: a stack of element names and the record that is open."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, encoding: str | None) -> None:
         self.source = source
         self.records: PnmlRecords | None = None
         self.frames: list[str] = []
@@ -101,7 +104,7 @@ class _Reader:
         """How deep the stream is inside an element that is left out."""
         self.inside: list[str] = []
         """The elements that are open inside the record."""
-        parser = expat.ParserCreate(namespace_separator=" ")
+        parser = expat.ParserCreate(encoding, namespace_separator=" ")
         parser.buffer_text = True
         parser.StartElementHandler = self.start
         parser.EndElementHandler = self.end
@@ -176,8 +179,8 @@ class _Reader:
         if self.records is None:
             return
         self.records.left[tag] += 1
-        if tag in _COLOURED and self.records.coloured is None and not self.inside:
-            self.records.coloured = Record(tag, *self.position, {})
+        if tag in _FOREIGN and self.records.foreign is None and not self.inside:
+            self.records.foreign = _FOREIGN[tag], Record(tag, *self.position, {})
 
     def end(self, name: str) -> None:
         tag = name.rpartition(" ")[2]
