@@ -1,20 +1,21 @@
 """The explicit engine: the reachability graph of a net, explored by the Rust crate `analysis/engine`.
 
-A marking is an index: markings are numbered in the order of a breadth-first search from M0 (index 0), level by level,
-so a lower index is never farther from M0. As a value a marking is an `int` bit mask over the places. A set of
-markings is given as a list of indexes or as a bitmap, `bytes` with one byte for each marking (not 0: in the set), and is
-returned as a bitmap. A firing sequence is a list of fired sets, each a list of transitions (one under interleaving).
+A marking is an index: markings are numbered in the order of a breadth-first search from M0 (index 0), level by
+level, so a lower index is never farther from M0. As a value a marking is an `int` bit mask over the places. A set
+of markings is given as a list of indexes or as a bitmap, `bytes` with one byte for each marking (not 0: in the
+set), and is returned as a bitmap. A firing sequence is a list of fired sets, each a list of transitions (one under
+interleaving).
 
-What needs the whole graph raises `IncompleteGraph` where `complete` is false, so that nothing is concluded from a part. The
-rest (markings, contacts, deadlocks, paths) holds of the part explored.
+What needs the whole graph raises `IncompleteGraph` where `complete` is false, so that nothing is concluded from a
+part. The rest (markings, contacts, deadlocks, paths) holds of the part explored.
 """
 
 from typing import final
 
-class BudgetExceeded(RuntimeError):
+class BudgetExceeded(RuntimeError):  # noqa: N818
     """The answer needs more memory than the graph's `max_memory_bytes` leaves."""
 
-class IncompleteGraph(RuntimeError):
+class IncompleteGraph(RuntimeError):  # noqa: N818
     """The answer needs the whole reachability graph, and the exploration ended early."""
 
 def explore(
@@ -29,13 +30,14 @@ def explore(
 ) -> Graph:
     """Explore the reachability graph from the marking `initial`, external gates free.
 
-    A transition is (inputs, outputs, permissive, inhibitive, external literals): places by index, literals as (signal, wanted
-    value). Under interleaving an edge fires one transition that is firable (Eq. 1) and whose literals do not contradict each other;
-    under `step` it fires a maximal set F of E(v), for some valuation v of the signals, in which a place has at most
-    one consumer and one producer; each F is one edge, the empty one is left out.
+    A transition is (inputs, outputs, permissive, inhibitive, external literals): places by index, literals as
+    (signal, wanted value). Under interleaving an edge fires one transition that is firable (Eq. 1) and whose
+    literals do not contradict each other; under `step` it fires a maximal set F of E(v), for some valuation v of
+    the signals, in which a place has at most one consumer and one producer; each F is one edge, the empty one is
+    left out.
 
-    Running out of a budget, and Ctrl-C, give an incomplete graph with its `reason`. `max_memory_bytes` counts all that the
-    engine holds, copies while a table grows included; time is looked at every few thousand edges.
+    Running out of a budget, and Ctrl-C, give an incomplete graph with its `reason`. `max_memory_bytes` counts all
+    that the engine holds, copies while a table grows included; time is looked at every few thousand edges.
 
     Raises `ValueError` for a place out of range or a negative time, `BudgetExceeded` where not even the net fits.
 
@@ -93,7 +95,8 @@ class Graph:
     def contacts(self) -> list[int]:
         """For each transition, the number of markings in contact.
 
-        Inputs and internal gates are satisfied and some output place that is no input is full; external gates are ignored.
+        Inputs and internal gates are satisfied and some output place that is no input is full; external gates are
+        ignored.
         """
     def contact_witness(self, t: int) -> int | None:
         """The lowest marking in contact for a transition."""
@@ -102,18 +105,18 @@ class Graph:
     def successors(self, index: int) -> list[tuple[list[int], int]]:
         """The edges that leave a marking: what fires and the marking after.
 
-        In the order of the transitions (interleaving) or of the choices (step). In an incomplete graph, edges to markings
-        that were not found are left out.
+        In the order of the transitions (interleaving) or of the choices (step). In an incomplete graph, edges to
+        markings that were not found are left out.
         """
     def path_to(self, index: int) -> list[list[int]]:
         """A shortest firing sequence from M0 to a marking; the same one every time."""
     def path_between(
         self, index: int, targets: list[int] | bytes, within: list[int] | bytes | None = None
     ) -> tuple[list[list[int]], int] | None:
-        """A shortest firing sequence from a marking to one of `targets`, and the target reached; None where there is none.
+        """A shortest firing sequence from a marking to one of `targets`, and the target reached; None: there is none.
 
-        Every marking before the last is in `within` (E[within U targets]). Empty where the marking is itself a target.
-        That there is none needs the whole graph.
+        Every marking before the last is in `within` (E[within U targets]). Empty where the marking is itself a
+        target. That there is none needs the whole graph.
         """
     def backward(self, targets: list[int] | bytes, within: list[int] | bytes | None = None) -> bytes:
         """The bitmap of the markings from which some target can be reached, targets included (EF targets).
@@ -125,8 +128,8 @@ class Graph:
     def edges(self) -> tuple[bytes, bytes]:
         """The edges as compressed rows: offsets (`n_markings + 1` "<u8") and targets (`n_edges` "<u4").
 
-        The row of a marking has the order of `successors`; under interleaving its k-th edge fires `enabled(index)[k]`.
-        Needs the whole graph.
+        The row of a marking has the order of `successors`; under interleaving its k-th edge fires
+        `enabled(index)[k]`. Needs the whole graph.
         """
     def live(self) -> list[bool]:
         """For each transition, whether from every marking it can fire again: it fires in every bottom component."""
@@ -139,8 +142,8 @@ class Graph:
     def effective_conflicts(self, pairs: list[tuple[int, int]]) -> list[int | None]:
         """For each pair of transitions, the lowest marking at which both are firable by Eq. (1), or None.
 
-        Whether the two conflict in structure, and whether one valuation opens both, is the caller's question. None needs the
-        whole graph.
+        Whether the two conflict in structure, and whether one valuation opens both, is the caller's question. None
+        needs the whole graph.
         """
 
 @final

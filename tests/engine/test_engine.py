@@ -1,24 +1,24 @@
 """The engine against the definitions: an explorer written here from SEMANTICS, and networkx for what graphs mean."""
 
+from __future__ import annotations
+
 import itertools
 import signal
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firable.analysis import _engine
 
 Row = tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]
 Edge = tuple[frozenset[int], int]
-
-ROOM = {"max_markings": 1 << 20, "max_memory_bytes": 1 << 28, "max_seconds": None}
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def nets(draw: st.DrawFn, *, max_places: int = 5, max_transitions: int = 5) -> D
     count = draw(st.integers(0, max_places))
     spread = draw(st.sampled_from([1, 1, 13, 30, 45, 62, 100, 200]))
     places = st.lists(st.integers(0, count - 1).map(lambda p: p * spread), max_size=2) if count else st.just([])
-    few = st.one_of(st.just([]), places)
+    few: st.SearchStrategy[list[int]] = st.one_of(st.just([]), places)
     literals = st.lists(st.tuples(st.integers(0, 2), st.booleans()), max_size=2)
     row = st.tuples(places, places, few, few, st.one_of(st.just([]), literals))
     rows = draw(st.lists(row, max_size=max_transitions))
@@ -116,21 +116,39 @@ def nets(draw: st.DrawFn, *, max_places: int = 5, max_transitions: int = 5) -> D
     return Drawn(count * spread, rows, initial)
 
 
+def explore(
+    net: Drawn,
+    *,
+    step: bool = False,
+    max_markings: int = 1 << 20,
+    max_memory_bytes: int = 1 << 28,
+    max_seconds: float | None = None,
+) -> _engine.Graph:
+    return _engine.explore(
+        net.n_places,
+        net.rows,
+        net.initial,
+        step=step,
+        max_markings=max_markings,
+        max_memory_bytes=max_memory_bytes,
+        max_seconds=max_seconds,
+    )
+
+
 def explored(net: Drawn, *, step: bool) -> _engine.Graph:
-    graph = _engine.explore(net.n_places, net.rows, net.initial, step=step, **ROOM)
+    graph = explore(net, step=step)
     assert graph.complete
     assert graph.reason is None
     return graph
 
 
-def both(test):  # type: ignore[no-untyped-def]
+def both(test: Callable[[Drawn, bool], None]) -> Callable[[], None]:
     """A generated net under either discipline."""
-    test = given(net=nets(), step=st.booleans())(test)
-    return settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.too_slow])(test)
+    return settings(max_examples=250, deadline=None)(given(net=nets(), step=st.booleans())(test))
 
 
-def digraph(graph: _engine.Graph) -> nx.DiGraph:
-    found = nx.DiGraph()
+def digraph(graph: _engine.Graph) -> nx.DiGraph[int]:
+    found: nx.DiGraph[int] = nx.DiGraph()
     found.add_nodes_from(range(graph.n_markings))
     found.add_edges_from((i, j) for i in range(graph.n_markings) for _, j in graph.successors(i))
     return found
@@ -206,7 +224,7 @@ def test_paths_within_a_set_are_those_of_networkx(net: Drawn, step: bool, data: 
     start = data.draw(indexes)
     targets = data.draw(st.sets(indexes, max_size=2))
     within = data.draw(st.one_of(st.just(set(everything)), st.sets(indexes)))
-    allowed = nx.DiGraph(everything)
+    allowed: nx.DiGraph[int] = nx.DiGraph(everything)
     allowed.remove_edges_from([(i, j) for i, j in everything.edges if i not in within or i in targets])
     lengths = nx.single_source_shortest_path_length(allowed, start)
     found = graph.path_between(start, sorted(targets), bitmap(graph, within))
@@ -321,8 +339,12 @@ def test_many_conflicts_on_one_place_give_one_step_each() -> None:
 
 def test_a_budget_that_runs_out_is_said_and_nothing_is_concluded_from_the_part() -> None:
     net = machines(14)
-    for budget, reason in [({"max_markings": 50}, "markings"), ({"max_memory_bytes": 20_000}, "memory"), ({"max_seconds": 0.0}, "time")]:
-        graph = _engine.explore(net.n_places, net.rows, net.initial, **{**ROOM, **budget})
+    stopped = {
+        "markings": explore(net, max_markings=50),
+        "memory": explore(net, max_memory_bytes=20_000),
+        "time": explore(net, max_seconds=0.0),
+    }
+    for reason, graph in stopped.items():
         assert (graph.complete, graph.reason) == (False, reason)
         assert 0 < graph.n_markings < 2**14
         for question in (
@@ -332,38 +354,47 @@ def test_a_budget_that_runs_out_is_said_and_nothing_is_concluded_from_the_part()
             graph.home_markings,
             graph.components,
             graph.edges,
-            lambda g=graph: g.backward([0]),
-            lambda g=graph: g.effective_conflicts([(0, 1)]),
         ):
             with pytest.raises(_engine.IncompleteGraph, match=reason):
                 question()
+        with pytest.raises(_engine.IncompleteGraph, match=reason):
+            graph.backward([0])
+        with pytest.raises(_engine.IncompleteGraph, match=reason):
+            graph.effective_conflicts([(0, 1)])
         with pytest.raises(_engine.BudgetExceeded if reason == "memory" else _engine.IncompleteGraph):
             graph.path_between(1, [])
         last = graph.n_markings - 1
         assert len(graph.path_to(last)) == sum(graph.marking(last) >> (2 * i + 1) & 1 for i in range(14)) > 0
-    graph = _engine.explore(net.n_places, net.rows, net.initial, **{**ROOM, "max_markings": 2**14})
+    graph = explore(net, max_markings=2**14)
     assert graph.complete
 
 
 def test_memory_held_stays_within_the_budget_and_is_stated() -> None:
     net = machines(14)
-    graph = _engine.explore(net.n_places, net.rows, net.initial, **{**ROOM, "max_memory_bytes": 1 << 20})
+    graph = explore(net, max_memory_bytes=1 << 20)
     assert graph.complete
     assert 8 + 4 < graph.bytes_per_marking < 20
     assert graph.memory_bytes == pytest.approx(graph.bytes_per_marking * graph.n_markings)
-    tight = _engine.explore(net.n_places, net.rows, net.initial, **{**ROOM, "max_memory_bytes": graph.memory_bytes + 40_000})
-    if tight.complete:
-        with pytest.raises(_engine.BudgetExceeded):
-            tight.edges()
+    tight = explore(net, max_memory_bytes=1 << 17)
+    assert not tight.complete
+    assert tight.memory_bytes <= 1 << 17
+    enough = explore(net, max_memory_bytes=graph.memory_bytes + 200_000)
+    assert enough.complete
     with pytest.raises(_engine.BudgetExceeded):
-        _engine.explore(net.n_places, net.rows, net.initial, **{**ROOM, "max_memory_bytes": 100})
+        enough.edges()
+    with pytest.raises(_engine.BudgetExceeded):
+        explore(net, max_memory_bytes=100)
 
 
 def test_an_exploding_step_component_ends_with_a_reason() -> None:
     # Maximal sets of a ladder of conflicts grow exponentially, all of them within one component of one marking.
     rows: list[Row] = [([i, i + 1], [200 + i], [], [], []) for i in range(100)]
-    for budget, reason in [({"max_seconds": 0.05}, "time"), ({"max_memory_bytes": 1 << 20}, "memory")]:
-        graph = _engine.explore(300, rows, list(range(101)), step=True, **{**ROOM, **budget})
+    net = Drawn(300, rows, list(range(101)))
+    stopped = {
+        "time": explore(net, step=True, max_seconds=0.05),
+        "memory": explore(net, step=True, max_memory_bytes=1 << 20),
+    }
+    for reason, graph in stopped.items():
         assert (graph.complete, graph.reason, graph.n_markings) == (False, reason, 1)
 
 
@@ -372,7 +403,7 @@ def test_ctrl_c_gives_what_is_known_so_far() -> None:
     timer = threading.Timer(0.2, signal.raise_signal, [signal.SIGINT])
     timer.start()
     try:
-        graph = _engine.explore(net.n_places, net.rows, net.initial, **{**ROOM, "max_markings": 1 << 26})
+        graph = explore(net, max_markings=1 << 26)
     finally:
         timer.cancel()
     assert (graph.complete, graph.reason) == (False, "interrupted")
@@ -392,7 +423,7 @@ def test_what_a_signal_handler_raises_is_not_swallowed() -> None:
     timer.start()
     try:
         with pytest.raises(StopEverythingError):
-            _engine.explore(net.n_places, net.rows, net.initial, **{**ROOM, "max_markings": 1 << 26})
+            explore(net, max_markings=1 << 26)
     finally:
         timer.cancel()
         signal.signal(signal.SIGINT, before)
@@ -400,7 +431,13 @@ def test_what_a_signal_handler_raises_is_not_swallowed() -> None:
 
 def test_the_empty_net_has_one_marking_which_is_a_deadlock() -> None:
     graph = explored(Drawn(0, [], []), step=False)
-    assert (graph.n_markings, graph.n_edges, graph.deadlocks(), graph.live(), graph.reversible()) == (1, 0, [0], [], True)
+    assert (graph.n_markings, graph.n_edges, graph.deadlocks(), graph.live(), graph.reversible()) == (
+        1,
+        0,
+        [0],
+        [],
+        True,
+    )
     assert graph.find(1) is None
     assert len(graph.components()) == 1
 
@@ -423,9 +460,9 @@ def test_an_index_that_does_not_exist_is_refused() -> None:
     with pytest.raises(ValueError, match="not a negative"):
         graph.find(-1)
     with pytest.raises(ValueError, match="place 7"):
-        _engine.explore(3, [([7], [], [], [], [])], [], **ROOM)
+        explore(Drawn(3, [([7], [], [], [], [])], []))
     with pytest.raises(ValueError, match="max_seconds"):
-        _engine.explore(3, [], [], **{**ROOM, "max_seconds": -1.0})
+        explore(Drawn(3, [], []), max_seconds=-1.0)
     assert graph.find(1 << 200) is None
 
 
