@@ -35,7 +35,7 @@ _FOREIGN: Final[dict[str, str]] = {
     ),
     **dict.fromkeys(("delay", "interval"), "time"),
 }
-"""Labels of other classes of nets, where a P/T net has no label of that name: to leave them out would change the net."""
+"""Labels of other classes of nets, where a P/T net has none of that name: to leave them out would change the net."""
 
 
 @dataclass(slots=True)
@@ -76,7 +76,7 @@ def parse_xml(source: Source, data: bytes, encoding: str | None = None) -> PnmlR
         raise source.refuse("F1002", "the file is empty", "a PNML file begins with `<pnml>`")
     reader = _Reader(source, encoding)
     try:
-        reader.parser.Parse(data, True)
+        reader.parser.Parse(data, True)  # noqa: FBT003
     except expat.ExpatError as error:
         raise source.refuse(
             "F1013", f"not valid XML: {expat.ErrorString(error.code)}", "export the net again, or repair the element",

@@ -120,12 +120,16 @@ def parse_tree(source: Source) -> Node:
 
 
 def _syntax_error(source: Source, error: yaml.MarkedYAMLError) -> InputError:
-    mark = error.problem_mark or error.context_mark
+    # A key without a colon is noticed on a later line; what began there says where the mistake is.
+    began = error.context_mark if error.context == "while scanning a simple key" else None
+    mark = began or error.problem_mark or error.context_mark
     line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+    if line > len(source.lines):
+        line, column = len(source.lines), len(source.lines[-1]) + 1
     problem = error.problem or "not YAML"
     if error.context:
         problem = f"{problem}, {error.context}"
-    text = source.lines[line - 1] if line <= len(source.lines) else ""
+    text = source.lines[line - 1]
     if "\t" in text[: column + 1]:
         hint = "indent with spaces: YAML forbids tabs there"
     elif ":" in text or not text.strip():

@@ -56,6 +56,7 @@ TABLE = (
     net("tab", "places:\n\tp:\n", "F1005 4:1", "indent with spaces"),
     net("bracket left open", "transitions: {t: {from: [p, q}}\n", "F1005 3:30", "check the"),
     net("missing colon", "places:\n  p\n  q:\n", "F1005 5:4", "check the indentation and the colons"),
+    net("key without a colon", "places: {p: }\nstart\n", "F1005 4:1", "check the"),
     net("nesting without end", "places: " + "[" * 10_000, "F1005 3:40", "a net needs no such nesting"),
     net("control character", "description: a\x07b\n", "F1005 3:15", "delete it"),
     net("byte order mark inside", "description: a\ufeffb\n", "F1005 3:15", "delete it"),
