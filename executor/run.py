@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping
-from contextlib import ExitStack
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
@@ -98,19 +98,22 @@ def run(
     """
     if problems := unproved(bundle):
         raise InputError(problems)
-    with ExitStack() as stack:
-        stream = None if trace_path is None else stack.enter_context(_opened(Path(trace_path)))
-        return execute(
-            bundle.decomposition,
-            plant,
-            workpieces=workpieces,
-            seed=seed,
-            speed=speed,
-            trace=stream,
-            overdue_seconds=overdue_seconds,
-            disturbances=disturbances,
-            operator=operator,
-        )
+    try:
+        with nullcontext() if trace_path is None else Path(trace_path).open("w", encoding="utf-8") as stream:
+            return execute(
+                bundle.decomposition,
+                plant,
+                workpieces=workpieces,
+                seed=seed,
+                speed=speed,
+                trace=stream,
+                overdue_seconds=overdue_seconds,
+                disturbances=disturbances,
+                operator=operator,
+            )
+    except OSError as error:  # the trace is all that a run on a simulated cell writes; the machines are stopped by now
+        message = f"{trace_path}: the trace cannot be written: {error.strerror}"
+        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
 
 
 def execute(
@@ -157,11 +160,3 @@ def execute(
         messages=execution.messages,
         simulated_seconds=execution.now_seconds(),
     )
-
-
-def _opened(path: Path) -> TextIO:
-    try:
-        return path.open("w", encoding="utf-8")
-    except OSError as error:
-        message = f"{path}: the trace cannot be written: {error.strerror}"
-        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None

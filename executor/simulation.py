@@ -38,7 +38,7 @@ from firable.semantics.trace import CommandSent, End, Event, Fired, Header, Sign
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """How bad the network is: the probabilities that a delivery is lost, and that it is not the last of its message."""
+    """How bad the network is: the probabilities that a message is lost, and that it comes once more, much later."""
 
     loss: float = 0.0
     duplication: float = 0.0
@@ -68,6 +68,8 @@ class Simulation:
         self.sensors = [signal.name for signal in self.net.signals if signal.kind is SignalKind.SENSOR]
         self.values = dict.fromkeys(self.sensors, False)
         self.in_flight: list[Message] = []
+        self.late: list[Message] = []
+        """Second copies, on a way that may take very long."""
         self.completing: list[tuple[str, int]] = []
         self.events: list[Event] = []
         self.messages = 0
@@ -81,6 +83,8 @@ class Simulation:
             self._perform(self.controllers[name].report())
         for _ in range(steps):
             self._something()
+        self.in_flight += self.late
+        self.late.clear()
         self._quieten(fire=False)
         self._check_progress()
         self._quieten(fire=False)
@@ -105,6 +109,8 @@ class Simulation:
 
     def _something(self) -> None:
         choice = self.random.random()
+        if self.late and self.random.random() < 0.03:
+            self.in_flight.append(self.late.pop(self.random.randrange(len(self.late))))
         if choice < 0.55 and self.in_flight:
             self._deliver()
         elif choice < 0.80:
@@ -129,7 +135,7 @@ class Simulation:
     def _deliver(self) -> None:
         message = self.in_flight.pop(self.random.randrange(len(self.in_flight)))
         if self.random.random() < self.network.duplication:
-            self.in_flight.append(message)
+            self.late.append(message)
         if self.random.random() >= self.network.loss:
             self._receive(message)
 

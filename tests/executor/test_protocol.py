@@ -1,0 +1,400 @@
+"""The voting protocol on a bad network: it refines the central net, and planted faults in it are found."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from support.owned_nets import owned_net
+from support.reference import load_net
+
+from firable.decompose.split import split
+from firable.executor.controller import LocalController, Promise
+from firable.executor.coordinator import Coordinator
+from firable.executor.messages import (
+    Acknowledgement,
+    Decision,
+    Effect,
+    Firing,
+    Message,
+    ProtocolError,
+    Readiness,
+    Sending,
+    Taken,
+    ToCoordinator,
+    Vote,
+    VoteRequest,
+)
+from firable.executor.simulation import Network, ProgressLostError, Simulation
+from firable.executor.token_player import Compiled, TokenPlayer
+from firable.nets.catalogue import catalogue_net
+from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Arbiter, ArbitrationRule, Controller, Net, Place, Transition
+from firable.semantics.player import Player
+from firable.semantics.trace import replay
+
+SMALL = [
+    *("local_conflict", "local_gate", "local_output_conflict", "read_before_order", "remote_gate", "ring"),
+    "no_trouble",
+]
+CELLS = ["cell1", "cell1_mc_late", "cell2_shared", "cell2_separate"]
+CATALOGUE = ["one_robot", "one_robot_mc_late", "two_robots_separate"]
+NETWORKS = [Network(), Network(loss=0.3), Network(duplication=0.4), Network(loss=0.2, duplication=0.2)]
+
+
+@cache
+def decomposition_of(name: str) -> Decomposition:
+    return split(catalogue_net(name) if name in CATALOGUE else load_net(name))
+
+
+def check(simulation: Simulation, steps: int) -> int:
+    """Run, replay on the central net, and return the number of firings."""
+    return replay(simulation.net, simulation.run(steps)).firings
+
+
+@pytest.mark.parametrize("network", NETWORKS, ids=str)
+@pytest.mark.parametrize("name", SMALL)
+def test_joint_traces_of_the_small_nets_are_traces_of_the_central_net(name: str, network: Network) -> None:
+    assert sum(check(Simulation(decomposition_of(name), seed, network), 150) for seed in range(40)) >= 40
+
+
+@pytest.mark.parametrize("network", NETWORKS, ids=str)
+@pytest.mark.parametrize("name", CELLS + CATALOGUE)
+def test_joint_traces_of_the_cells_are_traces_of_the_central_net(name: str, network: Network) -> None:
+    assert sum(check(Simulation(decomposition_of(name), seed, network), 3000) for seed in range(4)) > 40
+
+
+def test_joint_traces_of_random_nets_are_traces_of_the_central_net() -> None:
+    fired = 0
+    for seed in range(400):
+        fired += check(Simulation(split(owned_net(seed)), seed, NETWORKS[seed % 4]), 400)
+    assert fired > 2000
+
+
+def test_one_seed_is_one_run() -> None:
+    traces = [list(Simulation(decomposition_of("one_robot"), 7, NETWORKS[3]).run(800).lines()) for _ in range(2)]
+    assert traces[0] == traces[1]
+    assert traces[0] != list(Simulation(decomposition_of("one_robot"), 8, NETWORKS[3]).run(800).lines())
+
+
+def net_of(places: str, marked: str, *transitions: Transition) -> Net:
+    """A net of the controllers `a` and `b`; a place of `a` is named by `a` and a letter."""
+    names = places.split()
+    return Net(
+        "net",
+        tuple(Place(name, name[0], marked=name in marked.split()) for name in names),
+        transitions,
+        controllers=(Controller("a"), Controller("b")),
+    )
+
+
+GATE_OF_A_LOCAL = net_of(
+    "a.i a.p a.s a.x b.j b.y",
+    "a.i a.s b.j",
+    Transition("G", ("a.i", "b.j"), ("a.p", "b.y")),
+    Transition("l", ("a.s",), ("a.x",), inhibitive=("a.p",)),
+)
+"""A local transition must not fire between a decision and its application: it reads what the part will write."""
+
+GATE_MOVED_BY_A_LOCAL = net_of(
+    "a.s a.x b.y b.z",
+    "a.s b.z",
+    Transition("G", ("a.s",), ("a.x",), inhibitive=("b.y",)),
+    Transition("back", ("a.x",), ("a.s",)),
+    Transition("k", ("b.z",), ("b.y",)),
+    Transition("k-back", ("b.y",), ("b.z",)),
+)
+"""A gate elsewhere opens and closes by a local transition, of which the coordinator hears only later."""
+
+
+@pytest.mark.parametrize("net", [GATE_OF_A_LOCAL, GATE_MOVED_BY_A_LOCAL], ids=["reads", "moves"])
+def test_joint_traces_of_nets_with_gates_at_local_transitions_are_traces_of_the_central_net(net: Net) -> None:
+    assert sum(check(Simulation(split(net), seed, NETWORKS[seed % 4]), 150) for seed in range(40)) >= 40
+
+
+# Planted faults: each is one way to forget an obligation, and must be found by the checks above.
+
+
+class NoLock(LocalController):
+    """O1 forgotten: a yes vote promises nothing."""
+
+    def _disturbs_promises(self, _transition: Compiled) -> bool:
+        return False
+
+
+class ReadsUnlocked(LocalController):
+    """O1 forgotten by half: what the part will write may still be read."""
+
+    def _disturbs_promises(self, transition: Compiled) -> bool:
+        return any(transition.writes & promise.reads for promise in self.promises.values())
+
+
+class SignalsUnlocked(LocalController):
+    """A signal may change between the vote and the commit."""
+
+    def _locked_reads(self) -> int:
+        return 0
+
+
+class AppliesTwice(LocalController):
+    """O5 forgotten: an order that comes again is carried out again."""
+
+    def _is_closed(self, _number: int) -> bool:
+        return False
+
+    def _apply(self, decision: Decision, _promise: Promise | None) -> Iterator[Effect]:
+        yield from self._fire(self.parts[str(decision.committed)])
+
+
+class AppliesBlindly(NoLock):
+    """The naive system of the paper: no promise at the vote, no check at the order."""
+
+    def _apply(self, decision: Decision, _promise: Promise | None) -> Iterator[Effect]:
+        yield from self._fire(self.parts[str(decision.committed)])
+
+
+class VotesFromMemory(LocalController):
+    """A vote is what was reported last, not what holds now; orders are carried out blindly."""
+
+    def _vote(self, request: VoteRequest) -> Iterator[Effect]:
+        if not self._is_closed(request.round):
+            self.promises.setdefault(request.round, Promise(self.readiness.transitions, 0, 0))
+            yield Vote(self.name, request.round, self.promises[request.round].promised, self.readiness)
+
+    def _apply(self, decision: Decision, _promise: Promise | None) -> Iterator[Effect]:
+        yield from self._fire(self.parts[str(decision.committed)])
+
+
+class ForgetsVotes(LocalController):
+    """The request of a decided round locks once more."""
+
+    def _is_closed(self, number: int) -> bool:
+        return number in self.closed and number not in self.promises and number % 2 == 0
+
+
+class StaleVotes(Coordinator):
+    """O5 forgotten: a vote of an earlier round counts for the present one."""
+
+    def receive(self, message: ToCoordinator) -> list[Effect]:
+        if isinstance(message, Vote):
+            for opened in self.rounds.values():
+                if not opened.decided and message.controller in opened.participants and message.round < opened.number:
+                    return super().receive(replace(message, round=opened.number))
+        return super().receive(message)
+
+
+class CachedGates(Coordinator):
+    """O3 forgotten: who owns only a gate is not asked; its last report is believed."""
+
+    def _asked(self, transition: str) -> tuple[str, ...]:
+        arcs = self.player.net.transition(transition)
+        owners = {self.player.net.place(place).owner for place in (*arcs.inputs, *arcs.outputs)}
+        return tuple(controller for controller in self.participants[transition] if controller in owners)
+
+
+class OldReports(Coordinator):
+    """A report that was overtaken replaces the newer one."""
+
+    def _hear(self, controller: str, readiness: Readiness) -> None:
+        self.seen[controller] = -1
+        super()._hear(controller, readiness)
+        self.seen[controller] = 1 << 40
+
+
+class ForgetsLosers(Coordinator):
+    """What lost the arbitration, or was aborted, is not asked again."""
+
+    def _acknowledged(self, message: Acknowledgement) -> Iterator[Effect]:
+        before = set(self.waiting)
+        yield from super()._acknowledged(message)
+        for group in set(self.waiting) - before:
+            del self.waiting[group]
+
+
+class DecidesEarly(Coordinator):
+    """The decision does not wait for all votes."""
+
+    def _voted(self, vote: Vote) -> Iterator[Effect]:
+        voted = self.rounds.get(vote.round)
+        if voted is not None and not voted.decided:
+            for controller in voted.participants:
+                voted.votes.setdefault(controller, frozenset(voted.transitions))
+        yield from super()._voted(vote)
+
+
+class NeverRepeats(Coordinator):
+    """O5 forgotten: an order that is lost stays lost."""
+
+    def resend(self) -> list[Effect]:
+        return []
+
+
+def found(
+    coordinator: Callable[[Decomposition], Coordinator] = Coordinator,
+    controller: Callable[[Decomposition, str], LocalController] = LocalController,
+) -> bool:
+    """Whether some seed of some small or random net finds the fault."""
+    decompositions = [decomposition_of(name) for name in SMALL]
+    decompositions += [split(net) for net in (GATE_OF_A_LOCAL, GATE_MOVED_BY_A_LOCAL, *map(owned_net, range(60)))]
+    for seed in range(20):
+        for decomposition in decompositions:
+            try:
+                check(Simulation(decomposition, seed, NETWORKS[3 - seed % 4], coordinator, controller), 300)
+            except (InputError, ProtocolError, ProgressLostError):
+                return True
+    return False
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [NoLock, ReadsUnlocked, SignalsUnlocked, AppliesTwice, AppliesBlindly, VotesFromMemory, ForgetsVotes],
+)
+def test_planted_fault_in_a_controller_is_found(fault: Callable[[Decomposition, str], LocalController]) -> None:
+    assert found(controller=fault)
+
+
+@pytest.mark.parametrize("fault", [StaleVotes, CachedGates, OldReports, ForgetsLosers, DecidesEarly, NeverRepeats])
+def test_planted_fault_in_the_coordinator_is_found(fault: Callable[[Decomposition], Coordinator]) -> None:
+    assert found(coordinator=fault)
+
+
+def test_machines_without_a_planted_fault_pass_the_same_search() -> None:
+    assert not found()
+
+
+# Single machines
+
+
+def pump(decomposition: Decomposition, firings: int) -> list[str]:
+    """The firings of the machines on a perfect network, each message handled in turn."""
+    coordinator = Coordinator(decomposition)
+    controllers = {subnet.name: LocalController(decomposition, subnet.name) for subnet in decomposition.subnets}
+    queue: list[Message] = []
+    fired: list[str] = []
+
+    def perform(effects: list[Effect]) -> None:
+        for effect in effects:
+            if isinstance(effect, Firing):
+                fired.append(effect.transition)
+            elif not isinstance(effect, Taken | Sending):
+                queue.append(effect)
+
+    for _ in range(20 * firings):
+        for controller in controllers.values():
+            perform([*controller.fire(), *controller.report()])
+        while queue:
+            message = queue.pop(0)
+            if isinstance(message, VoteRequest | Decision):
+                perform(controllers[message.controller].receive(message))
+            else:
+                perform(coordinator.receive(message))
+            if len(fired) >= firings:
+                return fired[:firings]
+    return fired
+
+
+def rivals(by: ArbitrationRule, among: tuple[str, ...] = ("A", "B")) -> Decomposition:
+    """Two global transitions that compete for the same tokens, again and again."""
+    names = ("a.p", "a.x", "a.y", "b.q", "b.x", "b.y")
+    return split(
+        Net(
+            "rivals",
+            tuple(Place(name, name[0], marked=name in {"a.p", "b.q"}) for name in names),
+            (
+                Transition("A", ("a.p", "b.q"), ("a.x", "b.x")),
+                Transition("B", ("a.p", "b.q"), ("a.y", "b.y")),
+                Transition("A-back", ("a.x", "b.x"), ("a.p", "b.q")),
+                Transition("B-back", ("a.y", "b.y"), ("a.p", "b.q")),
+            ),
+            controllers=(Controller("a"), Controller("b")),
+            arbiters=(Arbiter("next", among, by),),
+        )
+    )
+
+
+def test_conflicting_yes_votes_are_decided_by_the_rule_of_the_arbiter() -> None:
+    def winners(by: ArbitrationRule, among: tuple[str, ...] = ("A", "B")) -> str:
+        return "".join(name for name in pump(rivals(by, among), 12) if "-" not in name)
+
+    assert winners(ArbitrationRule.PRIORITY) == "AAAAAA"
+    assert winners(ArbitrationRule.PRIORITY, ("B", "A")) == "BBBBBB"
+    assert winners(ArbitrationRule.ROTATION) == "ABABAB"
+    assert winners(ArbitrationRule.ORDER, ("B", "B", "A")) == "BBABBA"
+
+
+def asked(controller: LocalController, number: int, *transitions: str) -> list[Effect]:
+    return controller.receive(VoteRequest(controller.name, number, transitions, 0, -1))
+
+
+def decided(controller: LocalController, number: int, committed: str | None) -> list[Effect]:
+    return controller.receive(Decision(controller.name, number, committed, 0, -1))
+
+
+def test_decision_is_applied_once_and_acknowledged_each_time() -> None:
+    controller = LocalController(decomposition_of("ring"), "c1")
+    assert [vote.promised for vote in asked(controller, 0, "G") if isinstance(vote, Vote)] == [{"G"}]
+    for _ in range(3):
+        assert any(isinstance(effect, Acknowledgement) for effect in decided(controller, 0, "G"))
+        assert controller.subnet.names(controller.marking) == ("c1.q",)
+
+
+def test_request_that_comes_after_its_decision_gets_no_vote() -> None:
+    controller = LocalController(decomposition_of("ring"), "c1")
+    decided(controller, 0, None)
+    assert asked(controller, 0, "G") == []
+    assert controller.promises == {}
+
+
+def test_promise_holds_a_local_transition_back_until_the_abort() -> None:
+    controller = LocalController(decomposition_of("local_gate"), "c1")
+    asked(controller, 0, "G")
+    assert controller.fire() == []
+    decided(controller, 0, None)
+    assert controller.fire() == [Firing("l")]
+
+
+def test_commit_without_a_promise_is_refused() -> None:
+    controller = LocalController(decomposition_of("ring"), "c1")
+    with pytest.raises(ProtocolError, match="without a promise"):
+        decided(controller, 0, "G")
+
+
+def test_command_clears_its_completion_before_it_is_sent() -> None:
+    controller = LocalController(decomposition_of("one_robot"), "robot")
+    assert controller.read("robot.at_cv1", value=True) == [Taken("robot.at_cv1", value=True)]
+    asked(controller, 0, "G2")
+    effects = decided(controller, 0, "G2")
+    assert effects[:2] == [Taken("robot.at_cv1", value=False), Sending("robot.to_cv1", 1)]
+    assert controller.fire() == []
+
+
+def test_completion_of_an_earlier_command_is_stale() -> None:
+    controller = LocalController(decomposition_of("one_robot"), "robot")
+    asked(controller, 0, "G2")
+    decided(controller, 0, "G2")
+    assert controller.read("robot.at_cv1", value=True, entry=0) == []
+    assert controller.read("robot.at_cv1", value=True, entry=1) == [Taken("robot.at_cv1", value=True)]
+
+
+def test_closed_rounds_are_forgotten() -> None:
+    decomposition = decomposition_of("no_trouble")
+    assert len(pump(decomposition, 200)) == 200
+    simulation = Simulation(decomposition, 1)
+    simulation.run(4000)
+    assert max(len(controller.closed) for controller in simulation.controllers.values()) <= 2
+
+
+def test_compiled_transitions_are_enabled_and_fire_as_the_reference_says() -> None:
+    for seed in range(60):
+        net = owned_net(seed)
+        player, reference = TokenPlayer.of(net), Player(net)
+        for draw in range(40):
+            word = hash((seed, draw)) & (1 << len(net.places) + len(net.signals)) - 1
+            signals = {s.name: bool(word >> len(net.places) + j & 1) for j, s in enumerate(net.signals)}
+            marking = player.marking(word)
+            enabled = [t for t, c in enumerate(player.transitions.values()) if c.enabled(word)]
+            assert tuple(enabled) == reference.enabled(marking, signals)
+            for t in enabled:
+                fired = player.transitions[net.transitions[t].name].fire(word)
+                assert player.marking(fired) == reference.fire(marking, (t,))
