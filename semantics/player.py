@@ -170,14 +170,19 @@ class Player:
 
     def serialisable(self, step: Iterable[int]) -> bool:
         """Whether some order replays the step one by one: iff the gate races within it are acyclic."""
-        remaining = set(step)
+        return self.order_of(step) is not None
+
+    def order_of(self, step: Iterable[int]) -> tuple[int, ...] | None:
+        """An order that replays the step one by one, None where the gate races within it are cyclic."""
+        remaining, order = set(step), list[int]()
         while remaining:
             # The next to replay closes no gate of one that still has to fire.
-            free = {t for t in remaining if not any((t, u) in self.races for u in remaining)}
+            free = sorted(t for t in remaining if not any((t, u) in self.races for u in remaining))
             if not free:
-                return False
-            remaining -= free
-        return True
+                return None
+            order += free
+            remaining -= set(free)
+        return tuple(order)
 
     def jointly_enabled(self, marking: Marking, transitions: Iterable[int]) -> bool:
         """Whether all are firable at the marking and one valuation opens them all."""

@@ -1,0 +1,202 @@
+"""`check`: everything that the reachability graph of a net decides, as verdicts and figures.
+
+One exploration, then one question after the other to the same graph. The verdicts say what holds, with their
+evidence; the figures are the numbers and sets behind them, for tables, tests and comparisons. A figure that needs the
+whole graph is None where the budget ended first: an unknown number is not zero.
+
+The tables below hold the verdicts in the order of the report. To add one: its technique in a file of its own, one row
+here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+from typing import Any, Final, TypeVar
+
+from firable.analysis import behaviour as behaviour_of
+from firable.analysis import conflict_verdicts as conflict
+from firable.analysis.behaviour import Behaviour
+from firable.analysis.commands import commands_agree, machines_stopped, no_command_in_initial_marking
+from firable.analysis.conflict_verdicts import ConflictAnalysis, Pairs
+from firable.analysis.properties import decide_properties
+from firable.analysis.question import Answer, Question
+from firable.analysis.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
+from firable.analysis.starvation import starvation_free
+from firable.nets.net import Net
+from firable.nets.verdict import Status, Verdict, Weight, overall
+from firable.semantics.player import Player
+from firable.semantics.trace import Discipline
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """The numbers and sets behind the verdicts, by the names of the net; None is unknown, because the budget ended.
+
+    `deadlocks`, `doomed`, `home` and the values of `contacts` count markings. `nonserialisable` holds the steps of a
+    step graph that no order replays; it is None for an interleaving graph, which has no steps.
+    """
+
+    markings: int
+    edges: int
+    complete: bool
+    bytes_per_marking: float
+    deadlocks: int | None
+    doomed: int | None
+    home: int | None
+    reversible: bool | None
+    live: bool | None
+    dead: tuple[str, ...] | None
+    nonlive: tuple[str, ...] | None
+    contacts: Mapping[str, int] | None
+    self_loops: tuple[str, ...]
+    firable_in_initial_marking: tuple[str, ...]
+    structural_conflicts: Pairs
+    effective_conflicts: Pairs | None
+    gate_races: tuple[tuple[str, str], ...]
+    nonserialisable: tuple[tuple[str, ...], ...] | None
+
+    def to_json(self) -> dict[str, Any]:
+        """The figures as JSON data; unknown ones are null."""
+        data: dict[str, Any] = {}
+        for name in (field.name for field in fields(self)):
+            value = getattr(self, name)
+            if isinstance(value, Pairs):
+                value = {
+                    "by_input": [list(pair) for pair in value.by_input],
+                    "by_output": [list(pair) for pair in value.by_output],
+                }
+            elif isinstance(value, Mapping):
+                value = dict(value)
+            elif isinstance(value, tuple):
+                value = [list(item) if isinstance(item, tuple) else item for item in value]
+            data[name] = value
+        return data
+
+
+@dataclass(frozen=True)
+class Report:
+    """What `check` found of a net under one discipline; `graph` is there for further questions."""
+
+    net: Net
+    discipline: Discipline
+    figures: Figures
+    verdicts: tuple[Verdict, ...]
+    graph: ReachabilityGraph
+
+    @property
+    def status(self) -> Status:
+        """The status of all required verdicts together."""
+        return overall(self.verdicts)
+
+    def verdict(self, name: str) -> Verdict:
+        """The verdict of this name; `KeyError` where there is none."""
+        for verdict in self.verdicts:
+            if verdict.name == name:
+                return verdict
+        raise KeyError(name)
+
+
+def check(net: Net, discipline: Discipline | str = Discipline.INTERLEAVING, budget: Budget | None = None) -> Report:
+    """Explore the net under a discipline, external gates free, and decide every verdict of this room.
+
+    Raises `InputError` F2013 where the arbiters do not fit the conflicts of the net.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> report = check(catalogue_net("conceptual_one_robot"))
+    >>> report.figures.markings, report.figures.edges, str(report.verdict("live").status)
+    (14, 23, 'proved')
+    """
+    return report_on(explore(net, discipline, budget))
+
+
+def report_on(graph: ReachabilityGraph) -> Report:
+    """Decide every verdict of this room on a graph that was explored before."""
+    behaviour, conflicts = Behaviour(graph), ConflictAnalysis(graph)
+    verdicts = [
+        *(decide(behaviour) for decide in _ON_BEHAVIOUR),
+        self_loop_free(graph),
+        *(decide(conflicts) for decide in _ON_CONFLICTS),
+        *([conflict.steps_serialisable(conflicts)] if graph.discipline is Discipline.STEP else []),
+        *(decide(graph) for decide in _ON_GRAPH),
+        starvation_free(behaviour),
+        *decide_properties(graph),
+    ]
+    return Report(graph.net, graph.discipline, figures(behaviour, conflicts), tuple(verdicts), graph)
+
+
+_ON_BEHAVIOUR: Final[tuple[Callable[[Behaviour], Verdict], ...]] = (
+    behaviour_of.contact_free,
+    behaviour_of.deadlock_free,
+    behaviour_of.no_doomed,
+    behaviour_of.quasi_live,
+    behaviour_of.all_live,
+    behaviour_of.reversible,
+    behaviour_of.home_markings,
+)
+_ON_CONFLICTS: Final[tuple[Callable[[ConflictAnalysis], Verdict], ...]] = (
+    conflict.structural_conflict_free,
+    conflict.effective_conflict_free,
+    conflict.race_free,
+)
+_ON_GRAPH: Final[tuple[Callable[[ReachabilityGraph], Verdict], ...]] = (
+    commands_agree,
+    machines_stopped,
+    no_command_in_initial_marking,
+)
+
+
+def self_loops(net: Net) -> tuple[str, ...]:
+    """The transitions with a place that is both input and output: it would have to hold a token and hold none."""
+    return tuple(t.name for t in net.transitions if set(t.inputs) & set(t.outputs))
+
+
+def self_loop_free(graph: ReachabilityGraph) -> Verdict:
+    """No place is both input and output of a transition."""
+    question = Question(
+        "self-loops",
+        "no place is both input and output of one transition",
+        Weight.WARNING,
+        hint="the transition is dead; if it only reads the place, write a permissive gate",
+    )
+    found = self_loops(graph.net)
+    return question.ask(graph, lambda: Answer(not found, found))
+
+
+def figures(behaviour: Behaviour, conflicts: ConflictAnalysis) -> Figures:
+    """The figures of a graph, each None where the budget ended before it was known."""
+    graph, net = behaviour.graph, behaviour.graph.net
+    whole = graph.complete
+    nonlive = _known(lambda: behaviour.nonlive)
+    stepwise = graph.discipline is Discipline.STEP and whole
+    firable = Player(net).firable(net.initial_marking)
+    return Figures(
+        markings=graph.n_markings,
+        edges=graph.n_edges,
+        complete=whole,
+        bytes_per_marking=graph.engine.bytes_per_marking,
+        deadlocks=int(graph.deadlocks.sum()) if whole else None,
+        doomed=_known(lambda: int(behaviour.doomed.sum())),
+        home=_known(lambda: behaviour.home),
+        reversible=_known(lambda: behaviour.reversible),
+        live=None if nonlive is None else not nonlive,
+        dead=behaviour.dead if whole else None,
+        nonlive=nonlive,
+        contacts=MappingProxyType(behaviour.contacts) if whole else None,
+        self_loops=self_loops(net),
+        firable_in_initial_marking=tuple(net.transitions[t].name for t in firable),
+        structural_conflicts=conflicts.structural,
+        effective_conflicts=conflicts.effective if whole else None,
+        gate_races=conflicts.races,
+        nonserialisable=tuple(conflicts.nonserialisable) if stepwise else None,
+    )
+
+
+def _known(figure: Callable[[], T]) -> T | None:
+    try:
+        return figure()
+    except (IncompleteGraph, BudgetExceeded):
+        return None

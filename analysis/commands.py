@@ -1,0 +1,176 @@
+"""Verdicts on commands: what the net tells its machines, and what it forgets to tell them.
+
+A place with an output signal sends its command when the token enters. While the token stays, the machine works under
+that command. Three things can be wrong that no verdict on tokens alone shows:
+
+*Conflicting commands*: two places that send different commands to one machine hold a token at one reachable marking.
+The same command twice is no contradiction and is not reported.
+
+*A machine that is never stopped* (a warning). What a command means is the machine's matter, and a list of words such
+as STOP or OFF would know only English. What the net does know is the order in which commands follow each other. A
+command ends another of the same machine if it has another name and is sent after it in some run: STOP ends RUN,
+UNCLAMP ends CLAMP, GRASP ends MOVE. A command is reported when it is sent in some run, and in no run a command of
+another name is sent to that machine before or after it: then it starts the machine and nothing in the net ever stops
+it. That a command of another name comes *before* is enough because then this one may be the stop, as at the end of a
+net that stops for good. Parameters do not count (RUN fast does not stop RUN slow), and a completion signal does not
+either: it says that the machine has arrived, and whether it then stands still is an assumption about the machine
+which an engineer should confirm. So a conveyor that is only ever told RUN is reported, though it may stop at its exit
+sensor by itself.
+
+*An output signal in M0* (a warning): the token is already there, nothing enters, no command is sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from firable.analysis.question import Answer, Question, listed, no, yes
+from firable.analysis.reachability import Column, ReachabilityGraph, first
+from firable.nets.net import Net
+from firable.nets.verdict import Verdict, Weight
+from firable.semantics.player import Player
+
+
+def machines(net: Net) -> dict[str, dict[str, tuple[int, ...]]]:
+    """For each machine the names of its commands, and for each of them the places that send it, by index."""
+    found: dict[str, dict[str, tuple[int, ...]]] = {}
+    for p, place in enumerate(net.places):
+        if place.command is not None:
+            names = found.setdefault(place.command.machine, {})
+            names[place.command.command] = (*names.get(place.command.command, ()), p)
+    return found
+
+
+def entries(net: Net, firings: Iterable[Iterable[str]], place: str) -> tuple[str, ...]:
+    """The transitions by which a token enters a place in a firing sequence: each entry sends the place's command once.
+
+    Raises `firable.semantics.player.NotFirableError` where the sequence is none of the net.
+    """
+    player, marking, p, found = Player(net), net.initial_marking, net.place_index[place], []
+    for fired in firings:
+        chosen = [net.transition_index[name] for name in fired]
+        after = player.fire(marking, chosen)
+        if after & ~marking & 1 << p:
+            found += [net.transitions[t].name for t in chosen if place in net.transitions[t].outputs]
+        marking = after
+    return tuple(found)
+
+
+def commands_agree(graph: ReachabilityGraph) -> Verdict:
+    """No two places that send different commands to one machine hold a token at one reachable marking."""
+    question = Question(
+        "conflicting-commands",
+        "no machine is under two different commands at once",
+        code="F3003",
+        hint="let the two places exclude each other, by a place that stands for the machine being free",
+    )
+
+    def find() -> Answer:
+        net, clashes = graph.net, []
+        for machine, names in machines(net).items():
+            places = sorted(p for sending in names.values() for p in sending)
+            # The columns of one machine at a time: there are few.
+            columns = {p: graph.marked(p) for p in places}
+            for k, p in enumerate(places):
+                for q in places[k + 1 :]:
+                    if net.places[p].command == net.places[q].command:
+                        continue
+                    index = first(columns[p] & columns[q])
+                    if index is not None:
+                        clashes.append((index, machine, p, q))
+        if not clashes:
+            graph.require_complete()
+            return yes()
+        index, machine, p, q = min(clashes)
+        note = f"{machine} is under '{net.places[p].command}' and '{net.places[q].command}'"
+        subjects = dict.fromkeys(net.places[place].name for *_, p, q in sorted(clashes) for place in (p, q))
+        return no(tuple(subjects), graph.witness(index, note))
+
+    return question.ask(graph, find)
+
+
+def machines_stopped(graph: ReachabilityGraph) -> Verdict:
+    """Every command that is sent follows or is followed by a command of another name to its machine.
+
+    Cost: none where M0 can be reached from everywhere; otherwise one backward closure for each name of a command.
+    """
+    question = Question(
+        "machine-never-stopped",
+        "every machine that is started can be stopped by another command",
+        Weight.WARNING,
+        "F3001",
+    )
+
+    def find() -> Answer:
+        net, found = graph.net, []
+        # Machines with one command first: their violation needs no more than the marking that shows it.
+        for machine, names in sorted(machines(net).items(), key=lambda item: len(item[1])):
+            if len(names) > 1 and not graph.complete:
+                break
+            for name, source in _unanswered(graph, names):
+                found.append((machine, name, names[name], source))
+        if not found:
+            graph.require_complete()
+            return yes()
+        machine, name, _, index = found[0]
+        others = listed(f"{machine} {name}" for machine, name, _, _ in found)
+        hint = (
+            f"after {others} no other command is ever sent: make sure that the machine stops by itself, or add a stop"
+        )
+        subjects = tuple(net.places[p].name for _, _, sending, _ in found for p in sending)
+        return no(subjects, graph.witness(index, f"the next firing can send {machine} {name}"), hint)
+
+    return question.ask(graph, find)
+
+
+def _unanswered(graph: ReachabilityGraph, names: dict[str, tuple[int, ...]]) -> Iterator[tuple[str, int]]:
+    """The commands of one machine that are sent, and that no other one follows or precedes; with a marking before."""
+    entered = {name: sources for name, sending in names.items() if (sources := _sources(graph, sending)).any()}
+    if len(entered) > 1 and graph.engine.reversible():
+        return  # from every marking every other one can be reached, so each command follows each
+    closing = {name: graph.backward(sources) for name, sources in entered.items()} if len(entered) > 1 else {}
+
+    def follows(after: str, before: str) -> bool:
+        return _leads_into(graph, names[before], entered[before], closing[after])
+
+    for name, sources in entered.items():
+        source = first(sources)
+        if source is not None and not any(
+            follows(name, other) or follows(other, name) for other in entered if other != name
+        ):
+            yield name, source
+
+
+def _sources(graph: ReachabilityGraph, places: tuple[int, ...]) -> Column:
+    """The markings in which a transition may fire that puts a token on one of the places."""
+    found = np.zeros(graph.n_markings, dtype=np.bool_)
+    for t in sorted({t for p in places for t in graph.net.producers[p]}):
+        found |= graph.may_fire(t)
+    return found
+
+
+def _leads_into(graph: ReachabilityGraph, places: tuple[int, ...], sources: Column, closing: Column) -> bool:
+    """Whether a firing that enters one of the places leads into the set `closing`."""
+    if not (sources & closing).any():
+        return False
+    marked = [graph.marked(p) for p in places]
+    for index in np.flatnonzero(sources & closing):
+        for _, target in graph.successors(int(index)):
+            if closing[target] and any(column[target] and not column[index] for column in marked):
+                return True
+    return False
+
+
+def no_command_in_initial_marking(graph: ReachabilityGraph) -> Verdict:
+    """No place with an output signal is marked in M0."""
+    question = Question(
+        "output-signals-in-M0",
+        "no place that sends a command holds a token in the initial marking",
+        Weight.WARNING,
+        "F3002",
+        "no command is sent for a token that is there from the start: begin in a place without `send`",
+    )
+    names = tuple(place.name for place in graph.net.places if place.marked and place.command is not None)
+    return question.ask(graph, lambda: Answer(not names, names))

@@ -1,0 +1,191 @@
+"""Verdicts on conflict: who competes with whom, who decides, and which steps no order can replay.
+
+A *structural* conflict is a shared input or output place; an *effective* one is a structural conflict of two
+transitions that are both firable at one reachable marking and both openable by one valuation: there, somebody must
+choose. Transitions with complementary external gates are never in effective conflict. Sharing nothing, two
+transitions may still meet in a *gate race*: one closes an internal gate of the other. Under interleaving that is only
+an order; in a synchronous step both fire, and where the races of a step form a cycle the step reaches a marking that
+no order of single firings reaches.
+
+That conflict exists is no defect, it is what arbiters are for: these verdicts inform. An effective conflict that no
+arbiter of the file names is decided by the order of the file, which nobody reads as a decision: it warns. So does
+a step that cannot be serialised, because the net then means two things, one for each discipline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from firable.analysis.question import Answer, Question, listed, no, yes
+from firable.analysis.reachability import ReachabilityGraph
+from firable.nets.net import Net
+from firable.nets.verdict import Verdict, Weight
+from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts
+from firable.semantics.trace import Discipline
+
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """Conflicting pairs of transitions in the order of the net, by what they share."""
+
+    by_input: tuple[Pair, ...] = ()
+    by_output: tuple[Pair, ...] = ()
+
+    @property
+    def all(self) -> tuple[Pair, ...]:
+        """All pairs, each once."""
+        return tuple(dict.fromkeys((*self.by_input, *self.by_output)))
+
+
+@dataclass(frozen=True)
+class ConflictAnalysis:
+    """The conflicts and races of the net of a graph; each is computed once, when asked for."""
+
+    graph: ReachabilityGraph
+
+    @cached_property
+    def structural(self) -> Pairs:
+        """The pairs that share an input or an output place."""
+        by_input, by_output = structural_conflicts(self.graph.net)
+        return Pairs(self._named(by_input), self._named(by_output))
+
+    @cached_property
+    def met(self) -> dict[Pair, int]:
+        """The pairs in effective conflict at a marking found, with the lowest such marking."""
+        pairs = [self._indexes(pair) for pair in self.structural.all]
+        pairs = [pair for pair in pairs if jointly_openable(self.graph.net, pair)]
+        found = self.graph.engine.effective_conflicts(pairs)
+        return {
+            self._named((pair,))[0]: marking for pair, marking in zip(pairs, found, strict=True) if marking is not None
+        }
+
+    @cached_property
+    def effective(self) -> Pairs:
+        """The pairs in effective conflict; raises `IncompleteGraph` where more may come."""
+        self.graph.require_complete()
+        return Pairs(
+            tuple(pair for pair in self.structural.by_input if pair in self.met),
+            tuple(pair for pair in self.structural.by_output if pair in self.met),
+        )
+
+    @cached_property
+    def races(self) -> tuple[Pair, ...]:
+        """The gate races (t, u): t closes an internal gate of u."""
+        return self._named(tuple(gate_races(self.graph.net)))
+
+    @cached_property
+    def nonserialisable(self) -> dict[tuple[str, ...], int]:
+        """The steps of a step graph that no order can replay, with the lowest marking at which each may fire.
+
+        Raises `ValueError` for an interleaving graph, which has no steps, `IncompleteGraph` where more may come.
+        """
+        if self.graph.discipline is not Discipline.STEP:
+            raise ValueError("only the step graph has steps")
+        found: dict[tuple[str, ...], int] = {}
+        if not races_may_cycle(self.graph.net):
+            return found
+        for index in range(self.graph.n_markings):
+            for fired, _ in self.graph.successors(index):
+                if len(fired) > 1 and not self.graph.player.serialisable(fired):
+                    found.setdefault(tuple(self.graph.net.transitions[t].name for t in fired), index)
+        return found
+
+    def _indexes(self, pair: Pair) -> tuple[int, int]:
+        return self.graph.net.transition_index[pair[0]], self.graph.net.transition_index[pair[1]]
+
+    def _named(self, pairs: tuple[tuple[int, int], ...]) -> tuple[Pair, ...]:
+        names = [transition.name for transition in self.graph.net.transitions]
+        return tuple((names[t], names[u]) for t, u in pairs)
+
+
+def races_may_cycle(net: Net) -> bool:
+    """Whether the gate races among transitions that may fire together form a cycle: if not, every step has an order."""
+    relation = conflicts(net)
+    after: dict[int, set[int]] = {}
+    for t, u in gate_races(net):
+        if u not in relation.rivals[t] and jointly_openable(net, (t, u)):
+            after.setdefault(t, set()).add(u)
+    remaining = set(after)
+    while remaining:
+        ends = {t for t in remaining if not after[t] & remaining}
+        if not ends:
+            return True
+        remaining -= ends
+    return False
+
+
+def structural_conflict_free(analysis: ConflictAnalysis) -> Verdict:
+    """No two transitions share an input or an output place."""
+    question = Question(
+        "structural-conflicts", "no two transitions share an input or an output place", Weight.INFORMATION
+    )
+    pairs = analysis.structural.all
+    return question.ask(analysis.graph, lambda: Answer(not pairs, _spelled(pairs)))
+
+
+def effective_conflict_free(analysis: ConflictAnalysis) -> Verdict:
+    """No two transitions that share a place are firable at one reachable marking and openable by one valuation.
+
+    Warns where an effective conflict is decided by no arbiter of the file; informs where all are.
+    """
+    net = analysis.graph.net
+    decided = [set(arbiter.among) for arbiter in net.arbiters]
+    undecided = [pair for pair in analysis.met if not any(set(pair) <= among for among in decided)]
+    question = Question(
+        "effective-conflicts",
+        "no two transitions compete for a place at a reachable marking",
+        Weight.WARNING if undecided else Weight.INFORMATION,
+    )
+
+    def find() -> Answer:
+        graph = analysis.graph
+        if not analysis.met:
+            graph.require_complete()
+            return yes()
+        pairs = [pair for pair in analysis.structural.all if pair in analysis.met]
+        hint = ""
+        if undecided:
+            hint = (
+                f"no arbiter names {' and '.join(undecided[0])}: the order of the file decides; add one to `arbiters`"
+            )
+        pair = min(undecided or pairs, key=lambda pair: analysis.met[pair])
+        witness = graph.witness(analysis.met[pair], f"here {' and '.join(pair)} compete")
+        return no(_spelled(pairs), witness, hint)
+
+    return question.ask(analysis.graph, find)
+
+
+def race_free(analysis: ConflictAnalysis) -> Verdict:
+    """No transition closes an internal gate of another."""
+    question = Question("gate-races", "no transition closes an internal gate of another one", Weight.INFORMATION)
+    races = tuple(f"{t} -> {u}" for t, u in analysis.races)
+    return question.ask(analysis.graph, lambda: Answer(not races, races))
+
+
+def steps_serialisable(analysis: ConflictAnalysis) -> Verdict:
+    """Every step of the step graph can be replayed one firing after the other."""
+    question = Question(
+        "steps-serialisable",
+        "every step can be replayed by some order of single firings",
+        Weight.WARNING,
+        hint="these transitions close each other's gates and fire together in one scan: make them share an input place",
+    )
+
+    def find() -> Answer:
+        found = analysis.nonserialisable
+        if found:
+            step, index = min(found.items(), key=lambda item: item[1])
+            witness = analysis.graph.witness(index, f"here the step of {listed(step)} has no order")
+            return no(tuple(" + ".join(step) for step in found), witness)
+        if races_may_cycle(analysis.graph.net):
+            analysis.graph.require_complete()
+        return yes()
+
+    return question.ask(analysis.graph, find)
+
+
+def _spelled(pairs: tuple[Pair, ...] | list[Pair]) -> tuple[str, ...]:
+    return tuple(f"{t} / {u}" for t, u in pairs)

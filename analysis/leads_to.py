@@ -1,0 +1,269 @@
+"""Response under fairness: does every fair run that meets p meet q afterwards?
+
+The statement AG (p -> AF q) fails iff from a reachable marking with p and without q a run goes on for ever without q
+and is fair, or ends in a deadlock before q. Within the markings without q:
+
+- *no fairness*: any cycle will do;
+- *weak*: no transition stays enabled for ever without firing. A strongly connected component holds such a run iff for
+  each transition it has a marking in which the transition is disabled or an edge that fires it: these are Büchi
+  conditions, so the maximal components suffice;
+- *strong*: a transition that is enabled again and again fires again and again. That is a Streett condition: where a
+  component enables a transition that it never fires, no fair run stays among the markings that enable it, so they are
+  taken out and the rest is decomposed again, until a component is left in which each enabled transition also fires, or
+  nothing is (Emerson and Lei 1987, "Modalities for model checking").
+
+Enabled means firable and openable, external gates free: that a gate opens at last is part of the assumption, as the
+statement of the verdict says. Under steps a transition fires when the step holds it.
+
+A violation is a lasso: a shortest sequence to p, a shortest way from there to the component without meeting q, and a
+cycle through it that meets every obligation of fairness. Before it is shown, the reference player fires prefix and
+cycle, and checks that the cycle closes, that q is never met and that the cycle is fair, from the definition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from firable.analysis.question import Answer, no, yes
+from firable.analysis.reachability import (
+    NO_COMPONENT,
+    Column,
+    Components,
+    ReachabilityGraph,
+    WitnessError,
+    first,
+    indexes,
+)
+from firable.nets.formula import Formula, format_formula
+from firable.nets.net import Fairness, Marking, Property
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import FiringSet, holds_in
+from firable.semantics.trace import Discipline
+
+Matrix = npt.NDArray[np.bool_]
+"""One Boolean for each component and transition."""
+
+
+def leads_to(graph: ReachabilityGraph, of: Property) -> Answer:
+    """Decide a `leads_to` property; raises `IncompleteGraph` where the graph is not whole.
+
+    Cost: one decomposition into components for no and weak fairness; for strong fairness one for each round of pruning.
+    """
+    graph.require_complete()
+    if of.then is None:
+        raise ValueError(f"'{of.name}' has no second formula")
+    without = ~graph.satisfying(of.then)
+    fair = _Fair(graph, of.fairness, without)
+    stuck = graph.deadlocks & without
+    start = first(graph.satisfying(of.formula) & graph.backward(fair.markings | stuck, without) & without)
+    if start is None:
+        return yes()
+    prefix = [tuple(fired) for fired in graph.engine.path_to(start)]
+    prefix_length = len(prefix)
+    tail, entry = _way(graph, start, fair.markings | stuck, without)
+    prefix += tail
+    cycle = fair.cycle(entry) if not stuck[entry] else []
+    _check_lasso(graph, of.formula, of.then, of.fairness, prefix, prefix_length, cycle)
+    after = f"after firing {prefix_length} of the sequence ({format_formula(of.formula)}) holds, and then "
+    end = f"({format_formula(of.then)}) never comes: " + (
+        "the cycle is fair" if cycle else "the sequence ends in a deadlock"
+    )
+    return no((), graph.named(prefix, graph.marking(entry), cycle, after + end))
+
+
+def _way(graph: ReachabilityGraph, source: int, targets: Column, within: Column) -> tuple[list[FiringSet], int]:
+    """A shortest firing sequence through `within` that is known to exist, and the target it reaches."""
+    found = graph.engine.path_between(source, targets.tobytes(), within.tobytes())
+    if found is None:
+        raise WitnessError("there is no way to a marking from which it was found by going back")
+    firings, target = found
+    return [tuple(fired) for fired in firings], target
+
+
+@dataclass
+class _Fair:
+    """The components, among markings without q, in which a fair run can go on for ever."""
+
+    graph: ReachabilityGraph
+    fairness: Fairness
+    without: Column
+    markings: Column = field(init=False)
+    component: npt.NDArray[np.int64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        # `component` numbers the fair components over all rounds; -1 elsewhere.
+        self.markings = np.zeros(self.graph.n_markings, dtype=np.bool_)
+        self.component = np.full(self.graph.n_markings, -1, dtype=np.int64)
+        remaining, n_found = self.without, 0
+        while remaining.any():
+            components = self.graph.components(remaining)
+            inside = components.nontrivial
+            if not inside.any():
+                return
+            of = components.of.astype(np.int64)
+            unfair, to_remove = self._unfair(components, inside)
+            fair = inside.copy()
+            fair[inside] = ~unfair[of[inside]]
+            self.markings |= fair
+            self.component[fair] = of[fair] + n_found
+            n_found += len(components.sizes)
+            if self.fairness is not Fairness.STRONG:
+                return
+            remaining = inside & ~fair & ~to_remove
+
+    def _unfair(self, components: Components, inside: Column) -> tuple[Column, Column]:
+        """The components that hold no fair run as they are, and the markings none of their fair runs stays among."""
+        n_components, to_remove = len(components.sizes), np.zeros_like(inside)
+        unfair = np.zeros(n_components, dtype=np.bool_)
+        if self.fairness is Fairness.NONE:
+            return unfair, to_remove
+        fires = self._fires(components, inside)
+        of = components.of[inside]
+        for t in range(len(self.graph.net.transitions)):
+            enabled = self.graph.may_fire(t)
+            count = np.bincount(of[enabled[inside]], minlength=n_components)
+            if self.fairness is Fairness.WEAK:
+                unfair |= (count == components.sizes) & ~fires[:, t]
+            else:
+                bad = (count > 0) & ~fires[:, t]
+                unfair |= bad
+                to_remove[inside] |= bad[of] & enabled[inside]
+        unfair &= ~components.trivial
+        return unfair, to_remove
+
+    def _fires(self, components: Components, inside: Column) -> Matrix:
+        """Which transitions each component fires on an edge that stays in it."""
+        graph, of = self.graph, components.of
+        fires = np.zeros((len(components.sizes), len(graph.net.transitions)), dtype=np.bool_)
+        if graph.discipline is Discipline.STEP:
+            for source in indexes(inside):
+                for fired, target in graph.successors(source):
+                    if of[target] == of[source]:
+                        fires[of[source], list(fired)] = True
+            return fires
+        offsets, targets = graph.edges()
+        # Under interleaving the edges of a row stand in the order of the transitions that may fire. So the k-th edge
+        # of each marking fires its k-th enabled transition: count the enabled ones while going through them.
+        next_edge = offsets[:-1].astype(np.int64)
+        for t in range(len(graph.net.transitions)):
+            sources = np.flatnonzero(graph.may_fire(t))
+            reached = targets[next_edge[sources]]
+            next_edge[sources] += 1
+            stays = (of[sources] != NO_COMPONENT) & (of[sources] == of[reached])
+            fires[of[sources][stays], t] = True
+        return fires
+
+    def cycle(self, entry: int) -> list[FiringSet]:
+        """A closed walk from a marking of a fair component through that component, which is itself fair."""
+        graph, net = self.graph, self.graph.net
+        within: Column = self.component == self.component[entry]
+        walk = _Walk(graph, within, entry)
+        for t in range(len(net.transitions)) if self.fairness is not Fairness.NONE else ():
+            enabled = graph.may_fire(t) & within
+            if self.fairness is Fairness.WEAK:
+                disabled = within & ~enabled
+                if disabled.any():
+                    if not any(disabled[index] for index in walk.visited):
+                        walk.go(disabled)
+                    continue
+            if enabled.any() and t not in walk.fired:
+                walk.fire(t, enabled)
+        if not walk.firings:
+            walk.step()
+        return walk.back_to(entry)
+
+
+@dataclass
+class _Walk:
+    """A walk inside one component, and what it has met so far."""
+
+    graph: ReachabilityGraph
+    within: Column
+    at: int
+    firings: list[FiringSet] = field(default_factory=list)
+    visited: set[int] = field(default_factory=set)
+    fired: set[int] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.visited.add(self.at)
+
+    def go(self, targets: Column) -> None:
+        """Go on to the nearest target."""
+        firings, reached = _way(self.graph, self.at, targets, self.within)
+        for fired in firings:
+            self._move(fired, next(target for label, target in self.graph.successors(self.at) if label == fired))
+        if self.at != reached:
+            raise WitnessError("a path between two markings does not end where it should")
+
+    def fire(self, t: int, enabled: Column) -> None:
+        """Go on to an edge inside the component that fires a transition, and take it."""
+        sources = np.zeros_like(self.within)
+        for index in indexes(enabled):
+            sources[index] = any(t in fired and self.within[target] for fired, target in self.graph.successors(index))
+        self.go(sources)
+        self.step(t)
+
+    def step(self, t: int | None = None) -> None:
+        """Take an edge inside the component, one that fires `t` if it is given."""
+        edges = self.graph.successors(self.at)
+        self._move(*next((f, to) for f, to in edges if self.within[to] and (t is None or t in f)))
+
+    def back_to(self, entry: int) -> list[FiringSet]:
+        """Close the walk; all that was fired."""
+        home = np.zeros_like(self.within)
+        home[entry] = True
+        self.go(home)
+        return self.firings
+
+    def _move(self, fired: FiringSet, target: int) -> None:
+        self.firings.append(fired)
+        self.fired.update(fired)
+        self.visited.add(target)
+        self.at = target
+
+
+def _check_lasso(
+    graph: ReachabilityGraph,
+    p: Formula,
+    q: Formula,
+    fairness: Fairness,
+    prefix: list[FiringSet],
+    trigger: int,
+    cycle: list[FiringSet],
+) -> None:
+    """Play prefix and cycle by the reference player; raises `WitnessError` unless they refute p leads to q."""
+    player = graph.player
+
+    def holds(formula: Formula, marking: Marking) -> bool:
+        return evaluate(BOOL, graph.net, formula, holds_in(marking))
+
+    def played(marking: Marking, firings: Iterable[FiringSet]) -> list[Marking]:
+        markings = [marking]
+        for fired in firings:
+            markings.append(graph.replay(markings[-1], [fired]))
+        return markings
+
+    before = played(graph.net.initial_marking, prefix)
+    around = played(before[-1], cycle)
+    if not holds(p, before[trigger]) or any(holds(q, marking) for marking in (*before[trigger:], *around)):
+        raise WitnessError("the lasso does not refute the property")
+    if not cycle:
+        if not player.deadlocked(before[-1]):
+            raise WitnessError("the sequence does not end in a deadlock")
+        return
+    if around[-1] != around[0]:
+        raise WitnessError("the cycle does not close")
+    fired = {t for label in cycle for t in label}
+    enabled = [set(player.may_fire(marking)) for marking in around[:-1]]
+    owed: set[int] = set()
+    if fairness is Fairness.WEAK:
+        owed = set.intersection(*enabled)
+    elif fairness is Fairness.STRONG:
+        owed = set.union(*enabled)
+    if not owed <= fired:
+        raise WitnessError("the cycle is not fair")

@@ -1,0 +1,92 @@
+"""The properties that a net file states of its own net, decided on the reachability graph.
+
+Each kind is one temporal pattern over state formulas, with its own method and its own counterexample: `never` and
+`always` by looking at every marking, `reachable` by finding one, `always_possible` (AG EF p) by the backward closure
+of p, `leads_to` by fair components (`firable.analysis.leads_to`). The shortest firing sequence to a marking that
+violates the property is the evidence; for `reachable` the sequence is the proof.
+"""
+
+from __future__ import annotations
+
+from firable.analysis.leads_to import leads_to
+from firable.analysis.question import Answer, Question, no, yes
+from firable.analysis.reachability import ReachabilityGraph, first
+from firable.nets.formula import format_formula
+from firable.nets.net import Fairness, Property, PropertyKind
+from firable.nets.verdict import Verdict
+
+_FAIRNESS = {
+    Fairness.NONE: "without any assumption of fairness",
+    Fairness.WEAK: "under weak fairness (a transition that stays firable fires; its external gates do open)",
+    Fairness.STRONG: (
+        "under strong fairness (a transition that is firable again and again fires; its external gates do open)"
+    ),
+}
+
+
+def statement(of: Property) -> str:
+    """The property in words, with the assumptions it is decided under.
+
+    >>> from firable.nets.formula import parse_formula
+    >>> statement(Property("no_crash", PropertyKind.NEVER, parse_formula("a and b")))
+    'never (a and b)'
+    """
+    formula = format_formula(of.formula)
+    match of.kind:
+        case PropertyKind.NEVER | PropertyKind.ALWAYS:
+            return f"{of.kind} ({formula})"
+        case PropertyKind.REACHABLE:
+            return f"({formula}) is reachable, external gates free"
+        case PropertyKind.ALWAYS_POSSIBLE:
+            return f"from every reachable marking ({formula}) can be reached, external gates free"
+        case PropertyKind.LEADS_TO:
+            then = format_formula(of.then) if of.then else ""
+            return f"({formula}) is always followed by ({then}), {_FAIRNESS[of.fairness]}"
+
+
+def decide_property(graph: ReachabilityGraph, of: Property) -> Verdict:
+    """The verdict `property.NAME` on one property of the net, under the discipline of the graph."""
+
+    def find() -> Answer:
+        match of.kind:
+            case PropertyKind.NEVER:
+                return _invariant(graph, of, violating=True)
+            case PropertyKind.ALWAYS:
+                return _invariant(graph, of, violating=False)
+            case PropertyKind.REACHABLE:
+                return _reachable(graph, of)
+            case PropertyKind.ALWAYS_POSSIBLE:
+                return _always_possible(graph, of)
+            case PropertyKind.LEADS_TO:
+                return leads_to(graph, of)
+
+    return Question(f"property.{of.name}", statement(of)).ask(graph, find)
+
+
+def decide_properties(graph: ReachabilityGraph) -> tuple[Verdict, ...]:
+    """The verdicts on all properties of the net, in the order of the file."""
+    return tuple(decide_property(graph, of) for of in graph.net.properties)
+
+
+def _invariant(graph: ReachabilityGraph, of: Property, *, violating: bool) -> Answer:
+    index = first(graph.satisfying(of.formula) == violating)
+    if index is not None:
+        note = f"here ({format_formula(of.formula)}) {'holds' if violating else 'does not hold'}"
+        return no((), graph.witness(index, note))
+    graph.require_complete()
+    return yes()
+
+
+def _reachable(graph: ReachabilityGraph, of: Property) -> Answer:
+    index = first(graph.satisfying(of.formula))
+    if index is not None:
+        return yes(graph.witness(index))
+    graph.require_complete()
+    return no(hint="no reachable marking satisfies it; the whole reachability graph was searched")
+
+
+def _always_possible(graph: ReachabilityGraph, of: Property) -> Answer:
+    index = first(~graph.backward(graph.satisfying(of.formula)))
+    if index is None:
+        return yes()
+    return no((), graph.witness(index, f"from here ({format_formula(of.formula)}) can never be reached again"))

@@ -1,0 +1,344 @@
+"""The reachability graph of a net, explored by the engine and spoken of in the net's own names.
+
+Everything that the explicit method decides is a question to this graph. The Rust engine finds the markings, breadth
+first, and answers questions of graph theory; here markings get their names, state formulas become columns (one Boolean
+for each marking, evaluated by the one text of the firing rule in `semantics`), and a marking becomes a witness.
+
+Every witness is replayed by the reference player before anyone sees it. The engine is fast and therefore not trusted:
+a wrong path must become an internal error, never a counterexample that misleads an engineer.
+
+Columns are computed in chunks, because a column for each place of ten million markings takes more memory than the
+graph. The rejected alternative, evaluating formulas in Rust, would be a second text of the firing rule to keep equal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from firable.analysis import _engine
+from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.nets.formula import Formula
+from firable.nets.net import Marking, Net
+from firable.nets.verdict import Witness
+from firable.semantics.algebra import Bitwise
+from firable.semantics.firing import Valuation, firable
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import FiringSet, NotFirableError, Player
+from firable.semantics.trace import Discipline
+
+__all__ = [
+    "COLUMNS",
+    "Budget",
+    "BudgetExceeded",
+    "Column",
+    "Components",
+    "IncompleteGraph",
+    "ReachabilityGraph",
+    "WitnessError",
+    "explore",
+    "first",
+    "indexes",
+    "is_step",
+]
+
+Column = npt.NDArray[np.bool_]
+"""A set of markings of a graph: one Boolean for each index."""
+
+COLUMNS: Final[Bitwise[Any]] = Bitwise(true=np.True_, false=np.False_)
+"""The algebra of columns: numpy arrays of Booleans, with numpy's own scalars for true and false."""
+
+NO_COMPONENT: Final = 2**32 - 1
+_CHUNK: Final = 1 << 16
+_REASONS: Final = {
+    "markings": "the budget of markings is used up",
+    "memory": "the budget of memory is used up",
+    "time": "the budget of time is used up",
+    "interrupted": "interrupted",
+}
+
+
+class WitnessError(RuntimeError):
+    """A witness does not replay: an error of firable, never of the net."""
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """How much an exploration may take before it ends as UNKNOWN: markings, bytes held by the engine, seconds."""
+
+    markings: int = 20_000_000
+    memory_bytes: int = 2 * 2**30
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class ReachabilityGraph:
+    """The markings reachable from M0 under one discipline, numbered breadth first; M0 is 0.
+
+    A marking with a lower number is never farther from M0, so the lowest number of a set is its shortest witness. What
+    needs the whole graph raises `IncompleteGraph` where it is not `complete`.
+    """
+
+    net: Net
+    discipline: Discipline
+    budget: Budget
+    engine: _engine.Graph
+
+    @property
+    def complete(self) -> bool:
+        """Whether every reachable marking was found and expanded."""
+        return self.engine.complete
+
+    @property
+    def n_markings(self) -> int:
+        """How many markings were found."""
+        return self.engine.n_markings
+
+    @property
+    def n_edges(self) -> int:
+        """How many edges were followed."""
+        return self.engine.n_edges
+
+    @property
+    def bound(self) -> str:
+        """How far an incomplete exploration went, in words; empty where it is complete."""
+        if self.complete:
+            return ""
+        reason = _REASONS.get(self.engine.reason or "", str(self.engine.reason))
+        return f"{self.n_markings:,} markings found, {self.n_edges:,} edges followed: {reason}"
+
+    @cached_property
+    def player(self) -> Player:
+        """The reference player that replays every witness."""
+        return Player(self.net)
+
+    def require_complete(self) -> None:
+        """Raise `IncompleteGraph` unless the whole graph is known."""
+        if not self.complete:
+            raise IncompleteGraph(self.bound)
+
+    def marking(self, index: int) -> Marking:
+        """The marking of this number, as a bit mask over the places."""
+        return self.engine.marking(index)
+
+    def names(self, index: int) -> tuple[str, ...]:
+        """The places that hold a token in the marking of this number."""
+        return self.net.names(self.marking(index))
+
+    def index_of(self, marking: Marking) -> int | None:
+        """The number of a marking, or None where it was not found."""
+        return self.engine.find(marking)
+
+    @cached_property
+    def _words(self) -> npt.NDArray[np.uint64]:
+        return np.frombuffer(self.engine.markings_bytes(), "<u8").reshape(self.n_markings, self.engine.words)
+
+    def column(self, term: Callable[[Bitwise[Any], Valuation[Any]], Any]) -> Column:
+        """The value of a Boolean term at every marking; `term` gets the algebra and the reader of places."""
+        result = np.empty(self.n_markings, dtype=np.bool_)
+        for start in range(0, self.n_markings, _CHUNK):
+            rows = self._words[start : start + _CHUNK]
+            result[start : start + _CHUNK] = term(COLUMNS, _reader(rows))
+        return result
+
+    def satisfying(self, formula: Formula) -> Column:
+        """The markings in which a state formula holds."""
+        return self.column(lambda algebra, holds: evaluate(algebra, self.net, formula, holds))
+
+    def marked(self, place: int) -> Column:
+        """The markings in which a place holds a token."""
+        return self.column(lambda _, holds: holds(place))
+
+    def may_fire(self, t: int) -> Column:
+        """The markings in which a transition is firable and some valuation opens its external gates."""
+        if not self.net.transitions[t].openable:
+            return np.zeros(self.n_markings, dtype=np.bool_)
+        return self.column(lambda algebra, holds: firable(algebra, self.net, t, holds))
+
+    @cached_property
+    def deadlocks(self) -> Column:
+        """The deadlocks among the markings that were expanded."""
+        found = np.zeros(self.n_markings, dtype=np.bool_)
+        found[self.engine.deadlocks()] = True
+        return found
+
+    def successors(self, index: int) -> list[tuple[FiringSet, int]]:
+        """What may fire in a marking, and the number of the marking after it."""
+        return [(tuple(fired), target) for fired, target in self.engine.successors(index)]
+
+    def backward(self, targets: Column, within: Column | None = None) -> Column:
+        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets])."""
+        bitmap = self.engine.backward(targets.tobytes(), None if within is None else within.tobytes())
+        return _column(bitmap)
+
+    def components(self, within: Column | None = None) -> Components:
+        """The strongly connected components of the graph, or of its part within a set of markings."""
+        found = self.engine.components(None if within is None else within.tobytes())
+        return Components(
+            np.frombuffer(found.of(), "<u4"),
+            np.frombuffer(found.sizes(), "<u4"),
+            _column(found.bottom()),
+            _column(found.trivial()),
+        )
+
+    def edges(self) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint32]]:
+        """The edges as compressed rows: the offset of each marking's row, and the targets."""
+        offsets, targets = self.engine.edges()
+        return np.frombuffer(offsets, "<u8"), np.frombuffer(targets, "<u4")
+
+    def witness(self, index: int, note: str = "") -> Witness:
+        """A shortest firing sequence from M0 to a marking, replayed by the reference player.
+
+        Raises `WitnessError` where it does not replay.
+        """
+        firings = [tuple(fired) for fired in self.engine.path_to(index)]
+        reached = self.replay(self.net.initial_marking, firings)
+        if reached != self.marking(index):
+            raise WitnessError("the firing sequence ends in another marking")
+        return self.named(firings, reached, note=note)
+
+    def named(
+        self, firings: list[FiringSet], marking: Marking, cycle: list[FiringSet] | None = None, note: str = ""
+    ) -> Witness:
+        """A firing sequence, and what is fired for ever after it, in the names of the net."""
+        return Witness(
+            tuple(self._names(fired) for fired in firings),
+            tuple(self._names(fired) for fired in cycle or ()),
+            self.net.names(marking),
+            note=note,
+        )
+
+    def _names(self, fired: FiringSet) -> tuple[str, ...]:
+        return tuple(self.net.transitions[t].name for t in fired)
+
+    def replay(self, marking: Marking, firings: list[FiringSet]) -> Marking:
+        """Play a firing sequence by the reference player under the graph's discipline; the marking after it.
+
+        Raises `WitnessError` where it is none of the net.
+        """
+        for fired in firings:
+            allowed = is_step(self.player, marking, fired) if self.discipline is Discipline.STEP else len(fired) == 1
+            if not allowed or not all(self.net.transitions[t].openable for t in fired):
+                raise WitnessError(f"{self._names(fired)} may not fire in {self.net.names(marking)}")
+            try:
+                marking = self.player.fire(marking, fired)
+            except NotFirableError as error:
+                raise WitnessError(str(error)) from error
+        return marking
+
+
+@dataclass(frozen=True, slots=True)
+class Components:
+    """Strongly connected components: the component of each marking, and for each its size and kind.
+
+    `of` is `NO_COMPONENT` outside the set that was asked for. No edge leaves a `bottom` component; no run can stay in
+    a `trivial` one.
+    """
+
+    of: npt.NDArray[np.uint32]
+    sizes: npt.NDArray[np.uint32]
+    bottom: Column
+    trivial: Column
+
+    @property
+    def nontrivial(self) -> Column:
+        """The markings on some cycle within the set."""
+        inside = self.of != NO_COMPONENT
+        found = np.zeros(len(self.of), dtype=np.bool_)
+        found[inside] = ~self.trivial[self.of[inside]]
+        return found
+
+
+def explore(
+    net: Net, discipline: Discipline | str = Discipline.INTERLEAVING, budget: Budget | None = None
+) -> ReachabilityGraph:
+    """The reachability graph of a net, external gates free, or as much of it as the budget allows.
+
+    >>> from firable.nets.net import Net, Place, Transition
+    >>> net = Net("n", (Place("p", marked=True), Place("q")), (Transition("t", ("p",), ("q",)),))
+    >>> graph = explore(net)
+    >>> graph.n_markings, graph.n_edges, graph.names(1)
+    (2, 1, ('q',))
+    """
+    discipline, budget = Discipline(discipline), budget or Budget()
+    place, signal = net.place_index, net.signal_index
+    graph = _engine.explore(
+        len(net.places),
+        [
+            (
+                [place[name] for name in transition.inputs],
+                [place[name] for name in transition.outputs],
+                [place[name] for name in transition.permissive],
+                [place[name] for name in transition.inhibitive],
+                [(signal[gate.signal], gate.wanted) for gate in transition.external],
+            )
+            for transition in net.transitions
+        ],
+        [i for i, of in enumerate(net.places) if of.marked],
+        step=discipline is Discipline.STEP,
+        max_markings=budget.markings,
+        max_memory_bytes=budget.memory_bytes,
+        max_seconds=budget.seconds,
+    )
+    return ReachabilityGraph(net, discipline, budget, graph)
+
+
+def is_step(player: Player, marking: Marking, fired: FiringSet) -> bool:
+    """Whether a set is a maximal set without conflict of E(v), for some valuation v of the signals.
+
+    The player's own `steps` tries all valuations. Here one is searched for that opens the gates of the set and closes a
+    gate of every other transition that could fire with it, so that nets with many signals can be replayed too.
+    """
+    candidates, chosen, net = player.may_fire(marking), frozenset(fired), player.net
+    if not chosen or not chosen <= set(candidates) or not player.conflicts.free(chosen):
+        return False
+    valuation: dict[str, bool] = {}
+    for t in chosen:
+        for gate in net.transitions[t].external:
+            if valuation.setdefault(gate.signal, gate.wanted) != gate.wanted:
+                return False
+    to_close = [
+        tuple((gate.signal, not gate.wanted) for gate in net.transitions[t].external)
+        for t in candidates
+        if t not in chosen and not player.conflicts.rivals[t] & chosen
+    ]
+    return _satisfiable(to_close, valuation)
+
+
+def _satisfiable(clauses: list[tuple[tuple[str, bool], ...]], valuation: dict[str, bool]) -> bool:
+    """Whether a valuation that extends the given one makes a literal of every clause true, by branching."""
+    open_clauses = [c for c in clauses if not any(valuation.get(signal) is value for signal, value in c)]
+    if not open_clauses:
+        return True
+    clause = min(open_clauses, key=len)
+    return any(
+        _satisfiable(open_clauses, {**valuation, signal: value}) for signal, value in clause if signal not in valuation
+    )
+
+
+def _reader(rows: npt.NDArray[np.uint64]) -> Callable[[int], Column]:
+    def holds(place: int) -> Column:
+        bit: Column = (rows[:, place // 64] >> np.uint64(place % 64) & np.uint64(1)).astype(np.bool_)
+        return bit
+
+    return holds
+
+
+def _column(bitmap: bytes) -> Column:
+    return np.frombuffer(bitmap, np.uint8).astype(np.bool_)
+
+
+def first(column: Column) -> int | None:
+    """The lowest marking of a set, which is one nearest to M0; None where the set is empty."""
+    index = int(np.argmax(column)) if len(column) else 0
+    return index if len(column) and column[index] else None
+
+
+def indexes(column: Column) -> Iterator[int]:
+    """The numbers of the markings of a set, ascending."""
+    return (int(i) for i in np.flatnonzero(column))

@@ -1,0 +1,168 @@
+"""Starvation: a live transition that the arbiters, as they are, never let fire.
+
+Liveness is a verdict on the un-arbitrated net: from every marking the transition *can* fire again. A fixed priority can
+still pass it over for ever. With all external gates open, the arbitrated net is deterministic under synchronous steps:
+the arbiters choose one maximal set in each marking and remember finitely much, so the run from M0 ends in a deadlock
+or in a cycle, found by running it. A transition that is live in the net and does not fire on the cycle is starved.
+
+What this does and does not say: it is a verdict on one run, the one in which every machine answers at once. In another
+timing the transition may fire, or others may starve; the statement says so. Where two transitions that meet want a
+signal 1 and 0, no valuation opens all gates, that run does not exist, and the verdict is UNKNOWN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Final
+
+from firable.analysis.behaviour import Behaviour
+from firable.analysis.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph, WitnessError
+from firable.nets.net import Net
+from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
+from firable.semantics.arbitration import Arbitration
+from firable.semantics.conflict import jointly_openable
+from firable.semantics.player import FiringSet, Player
+from firable.semantics.trace import Discipline
+
+STEPS_MAX: Final = 100_000
+
+
+class GatesCannotBeOpenError(ValueError):
+    """No valuation opens the external gates of all transitions that are firable at one marking of the run."""
+
+
+@dataclass(frozen=True, slots=True)
+class EagerRun:
+    """The run in which all enabled transitions fire as the arbiters choose: first `prefix`, then `cycle` for ever.
+
+    Each element is the set fired in one step. An empty cycle is a deadlock, or, where not `complete`, a run that was
+    cut off after `STEPS_MAX` steps.
+    """
+
+    prefix: tuple[tuple[str, ...], ...]
+    cycle: tuple[tuple[str, ...], ...]
+    complete: bool = True
+
+    def first(self, n_steps: int) -> tuple[tuple[str, ...], ...]:
+        """The first steps of the run."""
+        fired = list(self.prefix[:n_steps])
+        while self.cycle and len(fired) < n_steps:
+            fired += self.cycle[: n_steps - len(fired)]
+        return tuple(fired)
+
+
+def eager_run(net: Net, *, steps_max: int = STEPS_MAX) -> EagerRun:
+    """The arbitrated run from M0 with all external gates open.
+
+    Raises `InputError` F2013 where the arbiters do not fit the conflicts, `GatesCannotBeOpenError` where no valuation
+    opens the gates.
+
+    >>> from firable.nets.net import Net, Place, Transition
+    >>> net = Net("n", (Place("p", marked=True), Place("q")),
+    ...           (Transition("t", ("p",), ("q",)), Transition("u", ("q",), ("p",))))
+    >>> eager_run(net).cycle
+    (('t',), ('u',))
+    """
+    player, arbitration = Player(net), Arbitration.of(net)
+    marking, turns = net.initial_marking, arbitration.first_turns
+    seen = {(marking, turns): 0}
+    fired: list[tuple[str, ...]] = []
+    while len(fired) < steps_max:
+        enabled = player.may_fire(marking)
+        if not enabled:
+            return EagerRun(tuple(fired), ())
+        if not jointly_openable(net, enabled):
+            raise GatesCannotBeOpenError("transitions that are firable together want a signal both 1 and 0")
+        step, turns = arbitration.decide(enabled, turns)
+        marking = player.fire(marking, step)
+        fired.append(tuple(net.transitions[t].name for t in step))
+        if (start := seen.setdefault((marking, turns), len(fired))) < len(fired):
+            return EagerRun(tuple(fired[:start]), tuple(fired[start:]))
+    return EagerRun(tuple(fired), (), complete=False)
+
+
+def scan(net: Net, valuations: Iterable[Mapping[str, bool]]) -> tuple[tuple[str, ...], ...]:
+    """The sets fired from M0, one for each valuation of the signals, as the arbiters choose; a signal not given is 0.
+
+    Raises `InputError` F2013 where the arbiters do not fit the conflicts.
+    """
+    player, arbitration = Player(net), Arbitration.of(net)
+    marking, turns = net.initial_marking, arbitration.first_turns
+    fired = []
+    for valuation in valuations:
+        step, turns = arbitration.decide(player.enabled(marking, valuation), turns)
+        marking = player.fire(marking, step)
+        fired.append(tuple(net.transitions[t].name for t in step))
+    return tuple(fired)
+
+
+def starved(run: EagerRun, live: Iterable[str]) -> tuple[str, ...]:
+    """The live transitions that do not fire on the cycle of the run."""
+    served = {name for step in run.cycle for name in step}
+    return tuple(name for name in live if name not in served)
+
+
+def starvation_free(behaviour: Behaviour) -> Verdict:
+    """Every live transition fires again and again under the arbiters of the file, in the eager run with all gates open.
+
+    Raises `InputError` F2013 where the arbiters do not fit the conflicts.
+    """
+    graph, start = behaviour.graph, perf_counter()
+    name = "starvation"
+    statement = "every live transition fires again and again in the arbitrated run with all external gates open"
+    method = "eager run of synchronous steps under the arbiters"
+
+    def unknown(bound: str, hint: str, code: str = "") -> Verdict:
+        return Verdict(name, Status.UNKNOWN, statement, method, Weight.WARNING, code, hint, bound)
+
+    try:
+        run = eager_run(graph.net)
+        live = behaviour.live
+    except GatesCannotBeOpenError as error:
+        return unknown(str(error), "there is no run with all gates open; starvation depends on the signals")
+    except (IncompleteGraph, BudgetExceeded):
+        return unknown(graph.bound, "give it a larger budget of markings, memory or time", "F3004")
+    if not run.complete:
+        return unknown(
+            f"{len(run.prefix):,} steps of the run", "the run has not come back to an earlier marking", "F3004"
+        )
+    hungry = starved(run, live)
+    cost = Cost(graph.n_markings, graph.n_edges, perf_counter() - start)
+    if not hungry:
+        return Verdict(name, Status.PROVED, statement, method, Weight.WARNING, cost=cost)
+    return Verdict(
+        name,
+        Status.VIOLATED,
+        statement,
+        method,
+        Weight.WARNING,
+        hint="let the arbiter go by `order` or `rotation`, or accept that these wait for a slower cycle",
+        subjects=hungry,
+        witness=_witness(graph, run, f"{hungry[0]} never fires in the cycle"),
+        cost=cost,
+    )
+
+
+def _witness(graph: ReachabilityGraph, run: EagerRun, note: str) -> Witness | None:
+    """The run as a firing sequence of the graph's discipline, replayed; None where it is none of that discipline.
+
+    Under interleaving the transitions of a step fire one by one, in an order that its gate races allow, if there is
+    one.
+    """
+    index = graph.net.transition_index
+    parts: list[list[FiringSet]] = []
+    for part in (run.prefix, run.cycle):
+        steps = [tuple(sorted(index[name] for name in step)) for step in part]
+        if graph.discipline is Discipline.INTERLEAVING:
+            orders = [graph.player.order_of(step) for step in steps]
+            if None in orders:
+                return None
+            steps = [(t,) for order in orders for t in order or ()]
+        parts.append(steps)
+    prefix, cycle = parts
+    marking = graph.replay(graph.net.initial_marking, prefix)
+    if graph.replay(marking, cycle) != marking:
+        raise WitnessError("the cycle does not close")
+    return graph.named(prefix, marking, cycle, note)
