@@ -1,0 +1,150 @@
+"""Protocol variants against the central net: the reference cases, and what each obligation is needed for."""
+
+import pytest
+from support.reference import Case, cases, load_net, local
+
+from firable.decompose.persistence import nonpersistent
+from firable.decompose.protocol import ProtocolVerdict, Variant, Votes, explore_protocol
+from firable.decompose.split import split
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
+
+CASES = [(case, name) for case in cases() for name in case.expect.get("dist", {})]
+FALSIFIED = [case for case in cases() if "nonpersistent" in case.expect]
+
+A, B = Controller("a"), Controller("b")
+
+
+def explored(net: Net, name: str) -> ProtocolVerdict:
+    return explore_protocol(net, Variant.named(name))
+
+
+def shown(verdict: ProtocolVerdict) -> list[str]:
+    return sorted("{" + ",".join(map(local, marking)) + "}" for marking in verdict.wrong)
+
+
+def test_there_are_cases() -> None:
+    assert len(CASES) >= 20
+    assert FALSIFIED
+
+
+@pytest.mark.parametrize(("case", "name"), CASES, ids=[f"{case} {name}" for case, name in CASES])
+def test_variant_does_what_the_case_expects(case: Case, name: str) -> None:
+    expect = case.expect["dist"][name]
+    verdict = explored(case.net(), name)
+    assert verdict.refines == expect["refines"]
+    assert bool(verdict.counterexample) != verdict.refines
+    if "wrong" in expect:
+        assert shown(verdict) == sorted(expect["wrong"])
+    if "complete" in expect:
+        assert verdict.complete == expect["complete"]
+
+
+@pytest.mark.parametrize("case", FALSIFIED, ids=str)
+def test_nonpersistent_parts_are_those_of_the_case(case: Case) -> None:
+    assert nonpersistent(split(case.net())) == case.expect["nonpersistent"]
+
+
+def test_promises_make_the_whole_cell_refine_and_complete() -> None:
+    verdict = explored(load_net("cell1"), "locked")
+    assert verdict.refines
+    assert verdict.complete
+    assert verdict.wrong == ()
+    assert verdict.n_configurations == 31_005
+
+
+def test_counterexample_on_the_cell_gives_the_robot_a_second_task_while_it_carries_a_part() -> None:
+    run = explored(load_net("cell1"), "stale_serial").counterexample
+    decided = [event for event in run if event.endswith("decided")]
+    assert decided[-3:] == ["G6 is decided", "G7 is decided", "G2 is decided"]
+    vote = "c1 votes yes on G2"
+    assert run.index(vote) < run.index("G6 is decided")
+    assert run.count(vote) == decided.count("G2 is decided")
+
+
+@pytest.mark.parametrize("name", ["naive", "recheck", "gates", "fresh", "stale", "stale_serial", "locked"])
+def test_every_protocol_refines_where_no_vote_can_be_falsified(name: str) -> None:
+    verdict = explored(load_net("no_trouble"), name)
+    assert verdict.refines
+    assert verdict.complete
+    assert (verdict.counterexample, verdict.blocked, verdict.lost) == ((), (), "")
+
+
+@pytest.mark.parametrize(
+    "name", ["local_conflict", "local_output_conflict", "local_gate", "read_before_order", "remote_gate", "ring"]
+)
+def test_promises_refine_and_lose_nothing_on_every_net(name: str) -> None:
+    verdict = explored(load_net(name), "locked")
+    assert (verdict.refines, verdict.complete, verdict.wrong) == (True, True, ())
+
+
+def test_promise_that_is_never_met_does_not_block_for_ever() -> None:
+    """G waits for b.q in vain; its promise at `a` must not keep `l` from firing."""
+    places = (Place("a.p", "a", marked=True), Place("a.e", "a"), Place("b.q", "b"))
+    net = Net("n", places, (Transition("G", ("a.p", "b.q")), Transition("l", ("a.p",), ("a.e",))), (), (A, B))
+    verdict = explored(net, "locked")
+    assert (verdict.refines, verdict.complete) == (True, True)
+
+
+def test_crash_after_a_yes_is_safe_and_says_what_is_lost() -> None:
+    verdict = explored(load_net("ring"), "locked_crash")
+    assert verdict.refines
+    assert not verdict.complete
+    assert verdict.lost in {"G", "l", "m"}
+    assert verdict.blocked[-1].endswith("stops for ever")
+
+
+def test_late_duplicate_is_known_by_its_round() -> None:
+    net = load_net("ring")
+    assert explored(net, "locked_dup").refines
+    run = explored(net, "locked_dup_noepoch").counterexample
+    assert run[-1].startswith("the late copy of the order for G arrives")
+
+
+def test_one_order_at_a_time_repairs_orders_that_overtake_but_no_stale_vote() -> None:
+    assert not explored(load_net("read_before_order"), "fresh").refines
+    assert explored(load_net("read_before_order"), "stale_serial").refines
+    assert not explored(load_net("local_conflict"), "stale_serial").refines
+
+
+def test_cached_copy_of_a_gate_fails_also_in_a_global_transition() -> None:
+    """G is inhibited by c.h; `a` reads a copy and orders go out though h is full."""
+    c = Controller("c")
+    places = tuple(Place(name, name[0], marked) for name, marked in [("a.p", True), ("b.q", True), ("c.e", True)])
+    net = Net(
+        "n",
+        (*places, Place("c.h", "c")),
+        (Transition("G", ("a.p", "b.q"), inhibitive=("c.h",)), Transition("l", ("c.e",), ("c.h",))),
+        controllers=(A, B, c),
+    )
+    assert explored(net, "locked").refines
+    assert not explored(net, "gates").refines
+
+
+def test_transition_that_no_valuation_opens_takes_no_part() -> None:
+    torn = (ExternalGate("b.s"), ExternalGate("b.s", wanted=False))
+    net = Net(
+        "n",
+        (Place("a.p", "a", marked=True),),
+        (Transition("G", ("a.p",), external=torn),),
+        (Signal("b.s", "b"),),
+        (A, B),
+    )
+    assert explored(net, "locked").n_configurations == 1
+
+
+def test_exploration_stops_at_its_budget() -> None:
+    with pytest.raises(InputError, match="F3004"):
+        explore_protocol(load_net("cell1"), Variant.named("locked"), configurations_max=100)
+
+
+def test_decomposition_may_be_given_in_place_of_the_net() -> None:
+    net = load_net("ring")
+    variant = Variant(Votes.CACHED, loss=True)
+    assert explore_protocol(split(net), variant) == explore_protocol(net, Variant.named("naive_loss"))
+
+
+@pytest.mark.parametrize("name", ["", "lockd", "locked_", "locked_fire", "locked_loss_loss", "_loss", "dup"])
+def test_unknown_variant_is_refused_by_name(name: str) -> None:
+    with pytest.raises(ValueError, match="no protocol variant"):
+        Variant.named(name)
