@@ -1,0 +1,393 @@
+"""Running decompositions on the simulated cell: workpieces, situations, the operator's controls, the right to run."""
+
+import asyncio
+import io
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from firable.decompose.split import split
+from firable.executor.execution import Execution
+from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.plant_file import PlantModel, parse_plant, read_plant
+from firable.executor.run import Operator, RunReport, execute, load, run
+from firable.executor.situation import State
+from firable.nets.bundle import Bundle, required_verdicts, write_bundle
+from firable.nets.catalogue import catalogue_net, catalogue_path
+from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.text import parse_net
+from firable.nets.verdict import Status, Verdict
+from firable.semantics.trace import CommandSent, Fired, Noted, Trace, parse_trace, replay
+
+CELLS = ["one_robot", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"]
+
+
+@cache
+def decomposition_of(cell: str) -> Decomposition:
+    return split(catalogue_net(cell))
+
+
+@cache
+def plant_of(cell: str) -> PlantModel:
+    return read_plant(catalogue_path(cell).with_name(f"{cell}.plant.yaml"))
+
+
+def run_cell(
+    cell: str,
+    workpieces: int,
+    *,
+    seed: int = 0,
+    speed: float | None = None,
+    overdue_seconds: float = 120.0,
+    disturbances: Iterable[Disturbance] = (),
+    operator: Operator | None = None,
+    plant: PlantModel | None = None,
+) -> tuple[RunReport, Trace]:
+    """Run a cell of the catalogue; every trace must be a complete one of the central net."""
+    stream = io.StringIO()
+    report = execute(
+        decomposition_of(cell),
+        plant or plant_of(cell),
+        workpieces=workpieces,
+        seed=seed,
+        speed=speed,
+        trace=stream,
+        overdue_seconds=overdue_seconds,
+        disturbances=disturbances,
+        operator=operator,
+    )
+    trace = parse_trace(stream.getvalue())
+    replayed = replay(catalogue_net(cell), trace)
+    assert replayed.complete
+    assert catalogue_net(cell).names(replayed.marking) == report.situation.marking
+    assert (replayed.firings, replayed.commands) == (sum(report.firings.values()), report.commands)
+    return report, trace
+
+
+def test_thousand_workpieces_go_through_none_lost_none_doubled_in_order() -> None:
+    report, _ = run_cell("one_robot", 1000)
+    assert report.state is State.DONE
+    assert report.delivered == tuple(range(1, 1001))
+    assert report.lost == report.doubled == report.inside == ()
+    assert set(report.firings.values()) == {1000}
+    assert set(report.situation.marking) == set(
+        catalogue_net("one_robot").names(catalogue_net("one_robot").initial_marking)
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("cell", CELLS)
+def test_every_cell_carries_its_workpieces_through(cell: str, seed: int) -> None:
+    report, _ = run_cell(cell, 20, seed=seed)
+    assert report.state is State.DONE
+    assert report.delivered == tuple(range(1, 21))
+
+
+def test_one_seed_is_one_run() -> None:
+    traces = [list(run_cell("two_robots_separate", 5, seed=seed)[1].lines()) for seed in (3, 3, 4)]
+    assert traces[0] == traces[1]
+    assert traces[0] != traces[2]
+
+
+def test_deadlock_is_told_while_running_with_what_waits_for_what() -> None:
+    report, trace = run_cell("one_robot_mc_late", 10)
+    assert report.state is State.DEADLOCK
+    assert {"robot.put_mc", "mc.release", "system.loading", "system.processing"} <= set(report.situation.marking)
+    told = {blocked.transition: blocked for blocked in report.situation.blocked}
+    assert told["G4"].empty == ("mc.free",)
+    assert "robot.free" in told["G6"].empty
+    assert str(told["G6"]).startswith("G6 waits for a token on robot.free")
+    assert trace.end is not None
+    assert trace.end.reason == "deadlock"
+
+
+def test_robot_that_does_not_wait_crashes_into_the_full_machine() -> None:
+    impatient = replace_text("one_robot_mc_late", ", when_full: wait", "")
+    report, trace = run_cell("one_robot_mc_late", 10, plant=impatient)
+    assert report.state is State.FAULT
+    assert report.situation.message.endswith("pushes workpiece 2 onto mc_table, where workpiece 1 lies")
+    assert [event.data["message"] for event in trace.events if isinstance(event, Noted) and event.note == "fault"] == [
+        report.situation.message
+    ]
+
+
+def replace_text(cell: str, old: str, new: str) -> PlantModel:
+    text = catalogue_path(cell).with_name(f"{cell}.plant.yaml").read_text("utf-8")
+    assert old in text
+    return parse_plant(text.replace(old, new))
+
+
+def test_command_that_never_completes_is_a_fault_and_not_a_deadlock() -> None:
+    report, _ = run_cell("one_robot", 5, disturbances=[NeverCompletes("MC", "CLAMP", 2)], overdue_seconds=60.0)
+    assert report.state is State.FAULT
+    assert report.situation.message.startswith("'MC CLAMP' of 'mc.fix', sent at ")
+    assert "'mc.clamped' has not come within 60 s" in report.situation.message
+    assert {gate for blocked in report.situation.blocked for gate in blocked.gates} >= {("mc.clamped", True)}
+    assert len(report.delivered) == 1
+
+
+def test_slow_command_is_no_fault_within_its_limit() -> None:
+    slow = replace_text("one_robot", "takes_s: 12.0", "takes_s: 110")
+    assert run_cell("one_robot", 2, plant=slow)[0].state is State.DONE
+
+
+def test_stuck_sensor_leaves_the_cell_waiting_for_its_gate() -> None:
+    stuck = StuckSensor("conveyor.part_at_entry", value=False, from_seconds=30.0)
+    report, _ = run_cell("one_robot", 10, disturbances=[stuck])
+    assert report.state is State.WAITING
+    assert [(blocked.transition, blocked.gates) for blocked in report.situation.blocked] == [
+        ("G1", (("conveyor.part_at_entry", True),))
+    ]
+    assert 0 < len(report.delivered) < 10
+    assert report.lost == ()
+
+
+def test_stuck_sensor_of_a_completion_makes_the_command_overdue() -> None:
+    report, _ = run_cell("one_robot", 5, disturbances=[StuckSensor("robot.touch", value=False)])
+    assert report.state is State.FAULT
+    assert "'robot.touch' has not come" in report.situation.message
+
+
+def test_sensor_stuck_at_one_makes_the_cell_act_on_nothing_which_the_plant_tells() -> None:
+    report, _ = run_cell("one_robot", 2, disturbances=[StuckSensor("conveyor.part_at_entry", value=True)])
+    assert report.state is State.FAULT
+    assert "CV1 is to carry from cv1_entry, where no workpiece lies" in report.situation.message
+
+
+def firings(execution: Execution) -> int:
+    return sum(execution.recorder.firings.values())
+
+
+def test_nothing_fires_during_a_pause_and_everything_goes_on_after_it() -> None:
+    async def operator(execution: Execution) -> None:
+        await asyncio.sleep(33.3)
+        execution.pause()
+        await execution.quiet()
+        before = firings(execution)
+        await asyncio.sleep(100.0)
+        assert firings(execution) == before > 0
+        assert execution.situation().state is State.PAUSED
+        execution.resume()
+
+    report, trace = run_cell("one_robot", 5, operator=operator, overdue_seconds=1000.0)
+    assert report.state is State.DONE
+    assert report.delivered == (1, 2, 3, 4, 5)
+    assert [event.note for event in trace.events if isinstance(event, Noted)] == ["paused", "resumed"]
+    times = [event.at_seconds for event in trace.events if isinstance(event, Fired)]
+    assert not [at for at in times if 33.3 < at < 133.3]
+
+
+def test_single_step_fires_one_transition_at_a_time() -> None:
+    stepped: list[str] = []
+
+    async def operator(execution: Execution) -> None:
+        execution.pause()
+        while len(stepped) < 15:
+            before = firings(execution)
+            name = await execution.step()
+            if name is None:
+                assert firings(execution) == before
+                await asyncio.sleep(0.5)
+            else:
+                assert firings(execution) == before + 1
+                stepped.append(name)
+        execution.resume()
+
+    report, trace = run_cell("one_robot", 3, operator=operator)
+    assert report.state is State.DONE
+    assert [event.transitions[0] for event in trace.events if isinstance(event, Fired)][:15] == stepped
+    assert {"G1", "G2", "G3", "t1-a"} <= set(stepped)
+
+
+def test_step_is_for_a_paused_run() -> None:
+    async def operator(execution: Execution) -> None:
+        assert await execution.step() is None
+
+    assert run_cell("one_robot", 1, operator=operator)[0].state is State.DONE
+
+
+def test_after_a_stop_nothing_fires_and_every_machine_stands_still() -> None:
+    kept: list[Execution] = []
+
+    async def operator(execution: Execution) -> None:
+        kept.append(execution)
+        await asyncio.sleep(41.0)
+        execution.stop()
+        execution.resume()  # a stop is final
+
+    report, trace = run_cell("one_robot", 50, operator=operator)
+    assert report.state is State.STOPPED
+    assert report.simulated_seconds == pytest.approx(41.0)
+    assert report.inside
+    notes = [i for i, event in enumerate(trace.events) if isinstance(event, Noted)]
+    assert not [event for event in trace.events[notes[0] :] if isinstance(event, Fired | CommandSent)]
+    assert all(machine.busy is None for machine in kept[0].driver.plant.machines.values())  # type: ignore[attr-defined]
+
+
+def test_stop_at_the_end_of_the_cycle_leaves_an_empty_cell() -> None:
+    async def operator(execution: Execution) -> None:
+        await asyncio.sleep(60.0)
+        execution.stop(at_end_of_cycle=True)
+
+    report, _ = run_cell("one_robot", 50, operator=operator)
+    assert report.state is State.STOPPED
+    assert report.inside == ()
+    assert report.delivered == tuple(range(1, len(report.delivered) + 1))
+    assert 1 < len(report.delivered) < 50
+
+
+def test_cancelled_run_is_an_operators_stop() -> None:
+    async def cancelled(execution: Execution) -> None:
+        await asyncio.sleep(20.0)
+        main.append(next(task for task in asyncio.all_tasks() if task.get_coro().__name__ == "main"))  # type: ignore[union-attr]
+        main[0].cancel()
+
+    main: list[asyncio.Task[object]] = []
+    report, _ = run_cell("one_robot", 5, operator=cancelled)
+    assert report.state is State.STOPPED
+
+
+def test_operators_mistake_ends_the_run() -> None:
+    async def operator(execution: Execution) -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        run_cell("one_robot", 5, operator=operator)
+
+
+def test_situation_while_running_names_the_gates_that_are_waited_for() -> None:
+    seen = []
+
+    async def operator(execution: Execution) -> None:
+        await asyncio.sleep(1e-3)
+        while firings(execution) < 1:
+            await asyncio.sleep(0.01)
+        await execution.quiet()
+        seen.append(execution.situation())
+
+    run_cell("one_robot", 1, operator=operator)
+    assert seen[0].state is State.WAITING
+    assert str(seen[0]) == "waiting\n  G2 waits for conveyor.part_at_end"
+
+
+def test_real_time_runs_as_virtual_time_does() -> None:
+    report, trace = run_cell("one_robot", 1, speed=400.0, overdue_seconds=1e6)
+    virtual, virtual_trace = run_cell("one_robot", 1)
+    assert report.state is State.DONE
+    assert report.firings == virtual.firings
+    assert [e.transitions for e in trace.events if isinstance(e, Fired)] == [
+        e.transitions for e in virtual_trace.events if isinstance(e, Fired)
+    ]
+
+
+def test_net_that_runs_in_circles_without_its_cell_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.executor.execution.FIRINGS_AT_ONCE_MAX", 500)
+    net = Net(
+        "circle",
+        (Place("a.p", "a", marked=True), Place("a.q", "a")),
+        (Transition("t", ("a.p",), ("a.q",)), Transition("u", ("a.q",), ("a.p",))),
+        controllers=(Controller("a"),),
+    )
+    plant = parse_plant(
+        "firable_plant: 1\nplant: none\nstations: [s]\nmachines: {}\n"
+        "arrivals: {station: s, every_s: 1}\ndepartures: {station: s}\n"
+    )
+    report = execute(split(net), plant, workpieces=1)
+    assert report.state is State.FAULT
+    assert "fire without end" in report.situation.message
+
+
+def test_command_order_of_a_wrong_net_crashes_in_the_cell() -> None:
+    text = catalogue_path("one_robot").read_text("utf-8")
+    # The robot's task to unload is begun while the workpiece is still clamped.
+    wrong = text.replace("{send: {machine: MC, command: UNCLAMP},             until: released, ", "{")
+    assert wrong != text
+    net = parse_net(wrong)
+    report = execute(split(net), plant_of("one_robot"), workpieces=2)
+    assert report.state is State.FAULT
+    assert "R pulls at a workpiece that is clamped on mc_table" in report.situation.message
+
+
+# The right to run
+
+
+def proved_bundle(cell: str = "one_robot") -> Bundle:
+    decomposition = decomposition_of(cell)
+    names = dict.fromkeys(required_verdicts(decomposition))
+    return Bundle(decomposition, tuple(Verdict(name, Status.PROVED, "holds", "by hand") for name in names))
+
+
+def test_proved_bundle_is_loaded_and_run(tmp_path: Path) -> None:
+    write_bundle(tmp_path / "cell.bundle", proved_bundle())
+    report = run(
+        load(tmp_path / "cell.bundle"), plant_of("one_robot"), workpieces=3, trace_path=tmp_path / "trace.jsonl"
+    )
+    assert report.delivered == (1, 2, 3)
+    assert report.to_json()["state"] == "done"
+    replayed = replay(catalogue_net("one_robot"), parse_trace((tmp_path / "trace.jsonl").read_text("utf-8")))
+    assert (replayed.firings, replayed.complete) == (45, True)
+
+
+@pytest.mark.parametrize("status", [Status.UNKNOWN, Status.VIOLATED])
+def test_bundle_with_an_unproved_verdict_is_refused(status: Status, tmp_path: Path) -> None:
+    bundle = proved_bundle()
+    verdicts = (*bundle.verdicts[:-1], replace(bundle.verdicts[-1], status=status))
+    write_bundle(tmp_path / "cell.bundle", replace(bundle, verdicts=verdicts))
+    with pytest.raises(InputError) as refusal:
+        load(tmp_path / "cell.bundle")
+    assert {problem.code for problem in refusal.value.diagnostics} == {"F5002"}
+    with pytest.raises(InputError):
+        run(replace(bundle, verdicts=verdicts), plant_of("one_robot"), workpieces=1)
+
+
+def test_bundle_without_a_verdict_is_refused(tmp_path: Path) -> None:
+    write_bundle(tmp_path / "cell.bundle", replace(proved_bundle(), verdicts=()))
+    with pytest.raises(InputError) as refusal:
+        load(tmp_path / "cell.bundle")
+    assert {problem.code for problem in refusal.value.diagnostics} == {"F5002"}
+
+
+def test_changed_bundle_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cell.bundle"
+    write_bundle(path, proved_bundle())
+    data = path.read_bytes()
+    for at in range(0, len(data), len(data) // 37):
+        path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+        with pytest.raises(InputError) as refusal:
+            load(path)
+        assert [problem.code for problem in refusal.value.diagnostics] == ["F5001"]
+
+
+def test_plant_of_another_cell_is_refused() -> None:
+    with pytest.raises(InputError) as refusal:
+        run(proved_bundle(), plant_of("two_robots_shared"), workpieces=1)
+    assert {problem.code for problem in refusal.value.diagnostics} == {"F5003"}
+
+
+def test_trace_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "no" / "trace.jsonl"):
+        with pytest.raises(InputError) as refusal:
+            run(proved_bundle(), plant_of("one_robot"), workpieces=1, trace_path=path)
+        assert [problem.code for problem in refusal.value.diagnostics] == ["F1017"]
+
+
+def test_executor_runs_without_solvers_and_without_the_rooms_that_prove(tmp_path: Path) -> None:
+    write_bundle(tmp_path / "cell.bundle", proved_bundle())
+    program = f"""
+import sys
+from firable.executor.plant_file import read_plant
+from firable.executor.run import load, run
+plant = read_plant({str(catalogue_path("one_robot").with_name("one_robot.plant.yaml"))!r})
+assert run(load({str(tmp_path / "cell.bundle")!r}), plant, workpieces=2).delivered == (1, 2)
+heavy = {{"z3", "networkx", "sympy", "numpy", "firable.analysis", "firable.decompose", "firable.cli"}}
+print(sorted(heavy & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("[]\n", "")

@@ -1,0 +1,301 @@
+"""The simulated cell: the laws it obeys, the faults it raises, and the file that describes it."""
+
+from pathlib import Path
+
+import pytest
+
+from firable.executor.plant import (
+    CommandDone,
+    Disturbance,
+    NeverCompletes,
+    Plant,
+    PlantFault,
+    Report,
+    SensorChanged,
+    StuckSensor,
+)
+from firable.executor.plant_file import PlantModel, misfits, parse_plant, read_plant
+from firable.nets.catalogue import catalogue_net, catalogue_path
+from firable.nets.diagnostics import InputError
+
+TEXT = """\
+firable_plant: 1
+plant: bench
+stations: [entry, table, exit]
+arrivals:   {station: entry, every_s: 5}
+departures: {station: exit, after_s: 1}
+machines:
+  R:
+    hand: HOME
+    positions: {HOME: , ENTRY: entry, TABLE: table, EXIT: exit}
+    commands:
+      MOVE:  {does: move, takes_s: 2}
+      GRASP: {does: grasp, takes_s: 1}
+      PUT:   {does: put, takes_s: 1}
+      HOLD:  {does: put, takes_s: 1, when_full: wait}
+  M:
+    commands:
+      CLAMP:   {does: clamp, station: table, takes_s: 1}
+      RUN:     {does: process, station: table, takes_s: 3}
+      UNCLAMP: {does: release, station: table, takes_s: 1}
+  B:
+    commands:
+      RUN:  {does: carry, from: entry, to: table, takes_s: 4}
+      STOP: {does: stop}
+sensors:
+  entry: {occupied: entry}
+  hand:  {holding: R}
+"""
+
+CELLS = [
+    *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"),
+]
+
+
+def plant_path(cell: str) -> Path:
+    return catalogue_path(cell).with_name(f"{cell}.plant.yaml")
+
+
+def model(text: str = TEXT) -> PlantModel:
+    return parse_plant(text)
+
+
+class Bench:
+    """A plant with a clock; commands run to their end unless told otherwise."""
+
+    def __init__(self, *disturbances: Disturbance, workpieces: int = 2, text: str = TEXT) -> None:
+        self.plant = Plant(model(text), workpieces=workpieces, disturbances=disturbances)
+        self.now = 0.0
+        self.reports: list[Report] = self.plant.advance(0.0)
+        self.tickets = 0
+
+    def give(self, machine: str, command: str, **parameters: str) -> list[Report]:
+        self.tickets += 1
+        reports = self.plant.command(self.now, machine, command, parameters, self.tickets)
+        self.reports += reports
+        return reports
+
+    def wait(self, seconds: float) -> list[Report]:
+        self.now += seconds
+        reports = self.plant.advance(self.now)
+        self.reports += reports
+        return reports
+
+    def do(self, machine: str, command: str, **parameters: str) -> list[Report]:
+        return [*self.give(machine, command, **parameters), *self.wait(4.0)]
+
+    def fetch(self) -> None:
+        self.do("R", "MOVE", to="ENTRY")
+        self.do("R", "GRASP", at="ENTRY")
+
+    def load(self) -> None:
+        self.fetch()
+        self.do("R", "MOVE", to="TABLE")
+        self.do("R", "PUT", at="TABLE")
+
+    @property
+    def faults(self) -> list[str]:
+        return [f"{report.machine}: {report.message}" for report in self.reports if isinstance(report, PlantFault)]
+
+
+def test_workpiece_goes_through_and_is_delivered_once() -> None:
+    bench = Bench(workpieces=1)
+    bench.load()
+    for command in ("CLAMP", "RUN", "UNCLAMP"):
+        bench.do("M", command)
+    bench.do("R", "GRASP", at="TABLE")
+    bench.do("R", "MOVE", to="EXIT")
+    bench.do("R", "PUT", at="EXIT")
+    assert bench.faults == []
+    assert [(workpiece.id, workpiece.processed) for workpiece in bench.plant.delivered] == [(1, 1)]
+    assert bench.plant.inside == ()
+    assert bench.plant.next_seconds is None
+
+
+def test_command_is_acknowledged_when_its_time_is_over_and_not_before() -> None:
+    bench = Bench()
+    bench.give("R", "MOVE", to="ENTRY")
+    assert bench.wait(1.9) == []
+    assert bench.wait(0.2) == [CommandDone(1)]
+
+
+def test_sensor_is_seen_before_the_command_is_acknowledged() -> None:
+    bench = Bench(workpieces=1)
+    bench.do("R", "MOVE", to="ENTRY")
+    assert bench.do("R", "GRASP", at="ENTRY") == [
+        SensorChanged("entry", value=False),
+        SensorChanged("hand", value=True),
+        CommandDone(2),
+    ]
+
+
+def test_next_workpiece_waits_until_the_station_is_empty() -> None:
+    bench = Bench()
+    bench.wait(20.0)
+    assert bench.plant.entered == 1
+    bench.fetch()
+    assert bench.plant.entered == 2
+    assert bench.plant.inside == (1, 2)
+
+
+def test_putting_onto_an_occupied_station_is_a_fault() -> None:
+    bench = Bench()
+    bench.load()
+    bench.fetch()
+    bench.do("R", "MOVE", to="TABLE")
+    bench.do("R", "PUT", at="TABLE")
+    assert bench.faults == ["R: R pushes workpiece 2 onto table, where workpiece 1 lies"]
+
+
+def test_putting_with_patience_waits_until_the_station_is_empty() -> None:
+    bench = Bench(
+        text=TEXT.replace("  M:\n", "  S:\n    commands: {X: {does: carry, from: table, to: exit, takes_s: 1}}\n  M:\n")
+    )
+    bench.load()
+    for command in ("CLAMP", "RUN", "UNCLAMP"):
+        bench.do("M", command)
+    bench.fetch()
+    bench.do("R", "MOVE", to="TABLE")
+    assert bench.do("R", "HOLD", at="TABLE") == []
+    bench.do("S", "X")
+    assert bench.faults == []
+    assert bench.plant.stations["table"] is not None
+    assert bench.plant.stations["table"].id == 2
+
+
+@pytest.mark.parametrize(
+    ("commands", "fault"),
+    [
+        ([("R", "GRASP", {"at": "ENTRY"})], "R is to grasp at ENTRY, and its hand is at HOME"),
+        (
+            [("R", "MOVE", {"to": "TABLE"}), ("R", "GRASP", {"at": "TABLE"})],
+            "R grasps at TABLE, where no workpiece lies",
+        ),
+        ([("R", "MOVE", {"to": "TABLE"}), ("R", "PUT", {"at": "TABLE"})], "R is to put at TABLE and holds nothing"),
+        ([("R", "MOVE", {"to": "MOON"})], "R does not know the position MOON of MOVE"),
+        ([("M", "CLAMP", {})], "M clamps on table, where no workpiece lies"),
+        ([("M", "RUN", {})], "M is to machine on table, where no workpiece lies"),
+        ([("M", "DANCE", {})], "M does not know the command DANCE"),
+        ([("B", "RUN", {}), ("M", "RUN", {})], "M machines workpiece 1, which is not clamped"),
+        (
+            [("B", "RUN", {}), ("M", "CLAMP", {}), ("M", "RUN", {}), ("M", "RUN", {})],
+            "M machines workpiece 1 a second time",
+        ),
+        (
+            [("B", "RUN", {}), ("M", "CLAMP", {}), ("R", "MOVE", {"to": "TABLE"}), ("R", "GRASP", {"at": "TABLE"})],
+            "R pulls at a workpiece that is clamped on table",
+        ),
+        ([("B", "RUN", {}), ("B", "RUN", {})], "B pushes workpiece 2 onto table, where workpiece 1 lies"),
+    ],
+)
+def test_broken_law_is_a_fault_that_stops_the_cell(commands: list[tuple[str, str, dict[str, str]]], fault: str) -> None:
+    bench = Bench()
+    for machine, command, parameters in commands:
+        assert bench.faults == []
+        bench.do(machine, command, **parameters)
+        bench.wait(2.0)
+    assert bench.faults == [f"{commands[-1][0]}: {fault}"]
+    assert bench.plant.next_seconds is None
+    assert bench.give("R", "MOVE", to="HOME") == []
+
+
+def test_commanding_a_busy_machine_is_a_fault() -> None:
+    bench = Bench()
+    bench.give("R", "MOVE", to="ENTRY")
+    bench.give("R", "MOVE", to="HOME")
+    assert bench.faults == ["R: R is given MOVE while it is at MOVE"]
+
+
+def test_stop_ends_a_command_without_acknowledgement_and_the_part_stays_on_the_belt() -> None:
+    bench = Bench(workpieces=1)
+    bench.give("B", "RUN")
+    bench.wait(1.0)
+    assert bench.do("B", "STOP") == [CommandDone(2)]
+    assert bench.plant.inside == (1,)
+    bench.do("B", "RUN")
+    assert bench.plant.stations["table"] is not None
+
+
+def test_workpiece_that_leaves_unmachined_is_a_fault() -> None:
+    bench = Bench(workpieces=1)
+    bench.fetch()
+    bench.do("R", "MOVE", to="EXIT")
+    bench.do("R", "PUT", at="EXIT")
+    assert bench.faults == [": workpiece 1 leaves the cell without having been machined"]
+
+
+def test_disturbed_command_is_taken_and_never_done() -> None:
+    bench = Bench(NeverCompletes("R", "MOVE", occurrence=2))
+    assert bench.do("R", "MOVE", to="ENTRY") == [CommandDone(1)]
+    assert bench.do("R", "MOVE", to="HOME") == []
+
+
+def test_stuck_sensor_shows_one_value_from_its_time_on() -> None:
+    bench = Bench(StuckSensor("entry", value=False, from_seconds=3.0))
+    assert bench.plant.shown["entry"]
+    assert bench.wait(3.0) == [SensorChanged("entry", value=False)]
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_plant_of_the_catalogue_fits_its_net(cell: str) -> None:
+    assert misfits(read_plant(plant_path(cell)), catalogue_net(cell)) == ()
+
+
+def test_plant_of_another_cell_does_not_fit() -> None:
+    messages = [
+        problem.message for problem in misfits(read_plant(plant_path("two_robots_shared")), catalogue_net("one_robot"))
+    ]
+    assert "'robot.to_cv1' sends 'R MOVE to=CV1', and the plant has no such machine 'R'" in messages
+    assert "the net has no signal 'robots.r1_touch'" in messages
+
+
+def test_position_or_sensor_that_the_plant_lacks_is_a_misfit() -> None:
+    text = plant_path("one_robot").read_text("utf-8")
+    lacking = parse_plant(
+        text.replace("CV2: cv2_entry", "CV3: cv2_entry").replace("mc.part_present", "mc.part_presence")
+    )
+    codes = {(problem.code, problem.subject) for problem in misfits(lacking, catalogue_net("one_robot"))}
+    assert codes == {
+        ("F5003", ("places", "robot.to_cv2")),
+        ("F5003", ("places", "robot.put_cv2")),
+        ("F5003", ("signals", "mc.part_present")),
+        ("F5003", ("sensors", "mc.part_presence")),
+    }
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message"),
+    [
+        ("takes_s: 4}", "takes_s: soon}", 22, "'machines.B.commands.RUN.takes_s': Input should be a valid number"),
+        ("takes_s: 4}", "takes_s: nan}", 22, "'machines.B.commands.RUN.takes_s': Input should be"),
+        ("takes_s: 4}", "takes_s: -1}", 22, "'machines.B.commands.RUN.takes_s': Input should be greater"),
+        ("does: stop", "does: halt", 23, "'machines.B.commands.STOP': Input tag 'halt'"),
+        ("hand: HOME", "hand: MOON", 8, "there is no position 'MOON'"),
+        ("to: table", "to: tabel", 22, "there is no station 'tabel'"),
+        ("{station: exit,", "{station: exits,", 5, "there is no station 'exits'"),
+        ("    hand: HOME\n", "", 10, "'R' has no hand"),
+        ("{holding: R}", "{holding: Q}", 26, "there is no machine 'Q'"),
+        ("{holding: R}", "{}", 26, "a sensor sees one thing"),
+        ("plant: bench", "plant: bench\ncolour: red", 3, "'colour': Extra inputs are not permitted"),
+        ("firable_plant: 1", "firable_plant: 2", 1, "'firable_plant': Input should be 1"),
+    ],
+)
+def test_mistake_in_a_plant_file_is_refused_with_its_line(old: str, new: str, line: int, message: str) -> None:
+    assert old in TEXT
+    with pytest.raises(InputError) as refusal:
+        parse_plant(TEXT.replace(old, new, 1))
+    problem = refusal.value.diagnostics[0]
+    assert problem.code == "F5003"
+    assert message in problem.message
+    assert problem.span is not None
+    assert problem.span.line == line
+    assert problem.hint
+
+
+@pytest.mark.parametrize(("text", "code"), [("", "F1002"), ("- a", "F5003"), ("x", "F5003"), ("a: 1\na: 2", "F1006")])
+def test_file_that_is_no_plant_is_refused(text: str, code: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.plant.yaml"
+    path.write_text(text, "utf-8")
+    with pytest.raises(InputError) as refusal:
+        read_plant(path)
+    assert refusal.value.diagnostics[0].code == code
