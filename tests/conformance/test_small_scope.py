@@ -1,0 +1,87 @@
+"""Every net with up to two places and two transitions, all arcs, internal gates and markings: three texts, one meaning.
+
+The reference player gives the edges of every marking, under both disciplines. The engine's graph from every initial
+marking must be their closure, with the same numbers; the SMT encoding must have exactly these edges as its models,
+which z3 decides in one query: the relation and the list of edges differ nowhere.
+"""
+
+from collections.abc import Mapping
+
+import pytest
+import z3
+from support.small_scope import all_nets, net_with
+
+from firable.analysis.encoding import interleaving_relation, step_relation
+from firable.analysis.reachability import explore
+from firable.analysis.smt import Terms, to_z3
+from firable.nets.net import Marking, Net
+from firable.semantics.player import FiringSet, Player
+from firable.semantics.trace import Discipline
+
+Edges = Mapping[Marking, list[tuple[FiringSet, Marking]]]
+
+SCOPE = [(p, t, 0, 1) for p in range(3) for t in range(3) if (p, t) != (2, 2)] + [(2, 2, c, 16) for c in range(16)]
+
+
+def edges_of(net: Net, *, step: bool) -> Edges:
+    player = Player(net)
+    return {m: sorted(player.successors(m, step=step)) for m in range(1 << len(net.places))}
+
+
+def closure(edges: Edges, initial: Marking) -> set[Marking]:
+    seen, todo = {initial}, [initial]
+    while todo:
+        for _, successor in edges[todo.pop()]:
+            if successor not in seen:
+                seen.add(successor)
+                todo.append(successor)
+    return seen
+
+
+@pytest.mark.parametrize(("n_places", "n_transitions", "chunk", "chunks"), SCOPE)
+def test_the_engine_explores_what_the_reference_player_plays(
+    n_places: int, n_transitions: int, chunk: int, chunks: int
+) -> None:
+    seen = 0
+    for shapes in all_nets(n_places, n_transitions, chunk, chunks):
+        net = net_with(n_places, shapes)
+        for discipline in Discipline:
+            edges = edges_of(net, step=discipline is Discipline.STEP)
+            for initial in range(1 << n_places):
+                graph = explore(net_with(n_places, shapes, initial), discipline)
+                found = {
+                    graph.marking(i): sorted((fired, graph.marking(j)) for fired, j in graph.successors(i))
+                    for i in range(graph.n_markings)
+                }
+                expected = {marking: edges[marking] for marking in closure(edges, initial)}
+                assert found == expected, (shapes, initial, discipline)
+                assert graph.n_edges == sum(map(len, expected.values()))
+                seen += 1
+    assert seen > 0
+
+
+@pytest.mark.parametrize(("n_places", "n_transitions", "chunk", "chunks"), SCOPE)
+def test_the_encoding_has_exactly_the_edges_of_the_reference_player(
+    n_places: int, n_transitions: int, chunk: int, chunks: int
+) -> None:
+    solver = z3.SolverFor("QF_FD")
+    for shapes in all_nets(n_places, n_transitions, chunk, chunks):
+        net = net_with(n_places, shapes)
+        for step, relation_of in ((False, interleaving_relation), (True, step_relation)):
+            terms = Terms()
+            relation = relation_of(net, terms)
+            listed = terms.disjunction(
+                terms.conjunction(
+                    [
+                        relation.is_marking(marking),
+                        relation.is_firing(fired),
+                        relation.is_marking(successor, after=True),
+                    ]
+                )
+                for marking, edges in edges_of(net, step=step).items()
+                for fired, successor in edges
+            )
+            solver.push()
+            solver.add(to_z3([terms.differ(relation.term, listed)]))
+            assert solver.check() == z3.unsat, (shapes, step, solver.model())
+            solver.pop()

@@ -1,0 +1,36 @@
+"""Every net of a small scope: all arcs and internal gates over the places, up to the names of transitions."""
+
+from collections.abc import Iterator
+from itertools import combinations_with_replacement, product
+
+from firable.nets.net import Marking, Net, Place, Transition
+
+PLACES = ("p", "q")
+Shape = tuple[int, ...]
+"""For each place, the sides of a transition that meet it: bit 0 input, 1 output, 2 permissive, 3 inhibitive gate."""
+
+
+def shapes(n_places: int) -> list[Shape]:
+    """Every way in which one transition can be joined to the places: 16 for each place."""
+    return list(product(range(16), repeat=n_places))
+
+
+def transition(name: str, shape: Shape) -> Transition:
+    """The transition of this shape."""
+    inputs, outputs, permissive, inhibitive = (
+        tuple(place for place, sides in zip(PLACES, shape, strict=False) if sides >> side & 1) for side in range(4)
+    )
+    return Transition(name, inputs, outputs, permissive, inhibitive)
+
+
+def net_with(n_places: int, chosen: tuple[Shape, ...], initial: Marking = 0) -> Net:
+    """The net of these transitions and this initial marking."""
+    places = tuple(Place(place, marked=bool(initial >> i & 1)) for i, place in enumerate(PLACES[:n_places]))
+    return Net("small", places, tuple(transition(f"t{i}", shape) for i, shape in enumerate(chosen)))
+
+
+def all_nets(n_places: int, n_transitions: int, chunk: int = 0, chunks: int = 1) -> Iterator[tuple[Shape, ...]]:
+    """The shapes of every net with this many places and transitions, or of one chunk of them."""
+    for number, chosen in enumerate(combinations_with_replacement(shapes(n_places), n_transitions)):
+        if number % chunks == chunk:
+            yield chosen
