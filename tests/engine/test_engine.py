@@ -103,17 +103,30 @@ class Naive:
 
 
 @st.composite
-def nets(draw: st.DrawFn, *, max_places: int = 5, max_transitions: int = 5) -> Drawn:
-    """Small nets, their places spread over one to several words."""
-    count = draw(st.integers(0, max_places))
+def nets(draw: st.DrawFn) -> Drawn:
+    """Small nets, their places spread over one to several words.
+
+    Most transitions are drawn so that they are firable in M0 or after another, else conflicts hardly ever show.
+    """
+    count = draw(st.integers(0, 6))
     spread = draw(st.sampled_from([1, 1, 13, 30, 45, 62, 100, 200]))
-    places = st.lists(st.integers(0, count - 1).map(lambda p: p * spread), max_size=2) if count else st.just([])
-    few: st.SearchStrategy[list[int]] = st.one_of(st.just([]), places)
-    literals = st.lists(st.tuples(st.integers(0, 2), st.booleans()), max_size=2)
-    row = st.tuples(places, places, few, few, st.one_of(st.just([]), literals))
-    rows = draw(st.lists(row, max_size=max_transitions))
-    initial = draw(st.lists(st.integers(0, count - 1).map(lambda p: p * spread), max_size=count)) if count else []
-    return Drawn(count * spread, rows, initial)
+    everywhere = [p * spread for p in range(count)]
+    initial = [p for p in everywhere if draw(st.booleans())]
+    empty = [p for p in everywhere if p not in initial]
+
+    def some(places: list[int], most: int) -> list[int]:
+        return draw(st.lists(st.sampled_from(places), max_size=most)) if places else []
+
+    def row() -> Row:
+        kind = draw(st.integers(0, 4))
+        inputs, outputs = {0: (everywhere, everywhere), 1: (empty, initial)}.get(kind, (initial, empty))
+        gated = draw(st.integers(0, 3)) == 0
+        permissive, inhibitive = (some(everywhere, 2), some(everywhere, 1)) if gated else ([], [])
+        gates = draw(st.lists(st.tuples(st.integers(0, 2), st.booleans()), max_size=2))
+        literals = gates if draw(st.booleans()) else []
+        return some(inputs, 2), some(outputs, 2), permissive, inhibitive, literals
+
+    return Drawn(count * spread, [row() for _ in range(draw(st.integers(0, 5)))], initial)
 
 
 def explore(

@@ -49,8 +49,6 @@ pub struct Space {
     pub table: Table,
     /// The index at which each level begins.
     pub levels: Vec<u32>,
-    /// Where the last level that was begun ends: what was found beyond it, in an incomplete graph, is one level farther.
-    pub levels_end: u32,
     /// Edges that each transition takes part in.
     pub fired: Vec<u64>,
     /// How many edges.
@@ -120,7 +118,6 @@ impl Space {
             step: limits.step,
             table,
             levels: Vec::new(),
-            levels_end: 1,
             fired: vec![0; count],
             edges: 0,
             contacts: vec![0; count],
@@ -178,7 +175,6 @@ impl Space {
                 return Ok(false);
             }
             self.memory.push(&mut self.levels, next as u32)?;
-            self.levels_end = *end as u32;
         }
         Ok(true)
     }

@@ -1,7 +1,7 @@
 //! Firing sequences and backward reach, from the markings alone.
 //!
-//! A shortest sequence from M0 is found backwards under interleaving: the rule is run in reverse and a predecessor on
-//! the level before is taken, so a path costs its length times the number of transitions. Under steps the parent
+//! A shortest sequence from M0 is found backwards under interleaving: the rule is run in reverse and the lowest
+//! predecessor is taken, so a path costs its length times the number of transitions. Under steps the parent
 //! was stored. Between two markings it is a breadth-first search. Backward reach (which markings can still get
 //! there: doomed markings are the complement) runs the rule in reverse, 64 markings at a time, and so needs no edges;
 //! under steps, where the rule has no simple reverse, it turns the stored edges round (`scc.rs`).
@@ -50,14 +50,8 @@ pub fn path_to(space: &Space, index: u32, watch: &mut Watch<'_>) -> Result<Seque
     sequence(space, &path, &memory, watch)
 }
 
-/// A predecessor on the level before; by the order of exploration every marking but M0 has one.
+/// The lowest predecessor: markings are numbered level by level, so it stands on the level before.
 fn predecessor(space: &Space, index: u32) -> u32 {
-    // Where the level of the marking begins; its predecessors of interest lie before.
-    let here = if index >= space.levels_end {
-        space.levels_end
-    } else {
-        space.levels[space.levels.partition_point(|&start| start <= index) - 1]
-    };
     let words = space.net.words;
     let marking = space.marking(index as usize);
     let mut before = vec![0; words];
@@ -67,11 +61,11 @@ fn predecessor(space: &Space, index: u32) -> u32 {
         for k in 0..words {
             before[k] = marking[k] ^ flip[k];
         }
-        if let Some(found) = space.find(&before).filter(|&found| found < here) {
+        if let Some(found) = space.find(&before) {
             best = best.min(found);
         }
     }
-    assert_ne!(best, NONE, "a marking beyond M0 was found by firing from the level before");
+    assert_ne!(best, NONE, "a marking other than M0 was found by a firing");
     best
 }
 

@@ -468,4 +468,26 @@ mod tests {
             &[(&[0], &[10], &[(0, true), (1, true)]), (&[1], &[11], &[(0, false)]), (&[2], &[12], &[(1, false)])];
         assert_eq!(steps(rows), [vec![0], vec![1], vec![1, 2], vec![2]]);
     }
+
+    #[test]
+    fn satisfiability_agrees_with_every_valuation_tried() {
+        let mut seed = 11_u64;
+        let mut below = |n: u64| {
+            seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            (crate::marking::mix(seed) % n) as usize
+        };
+        let (mut yes, mut no) = (0, 0);
+        for _ in 0..3000 {
+            let clauses: Vec<Clause> =
+                (0..below(14)).map(|_| (0..=below(3)).map(|_| (below(4), below(2) == 1)).collect()).collect();
+            let expected = (0..16_u32).any(|valuation| {
+                clauses.iter().all(|clause| clause.iter().any(|&(s, value)| (valuation >> s & 1 == 1) == value))
+            });
+            let mut poll = || false;
+            let mut watch = Watch::new(None, &mut poll);
+            assert_eq!(satisfiable(&clauses, vec![None; 4], &mut watch), Ok(expected), "{clauses:?}");
+            if expected { yes += 1 } else { no += 1 }
+        }
+        assert!(yes > 500 && no > 500);
+    }
 }

@@ -346,4 +346,22 @@ mod tests {
         assert_eq!(table.insert(Fixed::<1>, &[2], 2, 1, &memory), Err(Stop::Markings));
         assert_eq!(table.store.len(), 1);
     }
+
+    #[test]
+    fn markings_of_one_hash_stay_apart() {
+        let memory = Memory::new(1 << 20);
+        let mut table = Table::new(2, &memory).expect("fits");
+        let mut batch = Candidates::new(2);
+        for round in 0..2 {
+            for i in 0..40_u64 {
+                assert!(!batch.push(Fixed::<2>, &[i, 0], &[0, 7], 5));
+            }
+            table.insert_batch(Fixed::<2>, &mut batch, usize::MAX, &memory).expect("fits");
+            assert_eq!(table.store.len(), 40, "after round {round}");
+        }
+        for i in 0..40_u64 {
+            assert_eq!(table.find(Fixed::<2>, &[i, 7], 5), Some(i as u32));
+        }
+        assert_eq!(table.find(Fixed::<2>, &[40, 7], 5), None);
+    }
 }
