@@ -1,0 +1,66 @@
+"""Public benchmark nets come out with the figures that two independent explorers and the model-checking contest give.
+
+The nets are not part of the repository. `FIRABLE_NETS` names the folder that holds them and their `expected.tsv`; make
+sets it where the folder stands beside the checkout. Without it these tests are skipped, and say so. Nets with more than
+`MARKINGS_MAX` markings are left to the benchmarks.
+"""
+
+import csv
+import os
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from firable.analysis.behaviour import Behaviour
+from firable.analysis.reachability import explore
+from firable.nets.pnml import read_pnml
+
+FOLDER = os.environ.get("FIRABLE_NETS", "")
+MARKINGS_MAX: Final = 200_000
+
+Row = dict[str, str]
+
+
+def rows() -> list[Row]:
+    if not FOLDER:
+        return []
+    with (Path(FOLDER) / "expected.tsv").open(encoding="utf-8", newline="") as stream:
+        table = list(csv.DictReader(stream, delimiter="\t"))
+    return [row for row in table if row["markings_contact_rule"] and int(row["markings_contact_rule"]) <= MARKINGS_MAX]
+
+
+def by_family() -> dict[str, list[Row]]:
+    families: dict[str, list[Row]] = {}
+    for row in rows():
+        families.setdefault(row["family"], []).append(row)
+    return families
+
+
+@pytest.mark.skipif(not FOLDER, reason="FIRABLE_NETS does not name the folder of the public nets")
+@pytest.mark.parametrize("family", sorted(by_family()))
+def test_the_figures_of_public_nets(family: str) -> None:
+    for row in by_family()[family]:
+        graph = explore(read_pnml(Path(FOLDER) / row["file"]).net)
+        behaviour = Behaviour(graph)
+        found = {
+            "markings_contact_rule": graph.n_markings,
+            "deadlocks_contact_rule": int(graph.deadlocks.sum()),
+        }
+        if row["one_safe"] == "yes":
+            assert not behaviour.contacts, row["file"]
+            found |= {
+                "markings": graph.n_markings,
+                "edges": graph.n_edges,
+                "deadlock_markings": int(graph.deadlocks.sum()),
+                "dead_transitions": len(behaviour.dead),
+                "live_transitions": len(behaviour.live),
+            }
+            if row["reversible"]:
+                assert behaviour.reversible is (row["reversible"] == "yes"), row["file"]
+            if row["live"]:
+                assert (not behaviour.nonlive) is (row["live"] == "yes"), row["file"]
+        else:
+            assert row["one_safe"] != "no" or behaviour.contacts, row["file"]
+        for key, figure in found.items():
+            assert row[key] == "" or int(row[key]) == figure, (row["file"], key, row[key], figure)
