@@ -28,6 +28,7 @@ import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 from firable.analysis.smt import Term, Terms
@@ -319,7 +320,7 @@ class _Sides:
         statement = f"whatever is enabled, '{name}' grants a maximal set without conflict, as the central arbiter does"
         return self.obligation(f"arbitration.{name}", statement, tuple(members), (), terms.conjunction(claims))
 
-    @property
+    @cached_property
     def rivals_in_subnets(self) -> Mapping[str, set[str]]:
         """The conflicts that the subnets show: parts of the two share an input or an output place there."""
         found: dict[str, set[str]] = {}

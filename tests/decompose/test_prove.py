@@ -17,6 +17,7 @@ from firable.decompose.obligations import greedy
 from firable.decompose.prove import ProofReport, prove
 from firable.decompose.split import split
 from firable.nets.bundle import Bundle, required_verdicts, unproved
+from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition, Part
 from firable.nets.diagnostics import InputError
 from firable.nets.net import (
@@ -90,9 +91,9 @@ def by_cvc5(text: str) -> str:
     return answer.strip()
 
 
-@pytest.fixture(scope="module")
-def cell() -> ProofReport:
-    return prove(split(load_net("cell1")))
+@pytest.fixture(scope="module", params=["reference", "catalogue"])
+def cell(request: pytest.FixtureRequest) -> ProofReport:
+    return prove(split(load_net("cell1") if request.param == "reference" else catalogue_net("one_robot")))
 
 
 @pytest.mark.parametrize("name", SPLITTABLE)
@@ -118,7 +119,7 @@ def test_file_says_what_it_proves_in_the_names_of_the_net(cell: ProofReport) -> 
     head = [line for line in text.splitlines() if line.startswith(";")]
     assert "'G2' is firable in the central net iff each of its parts is firable" in head[1]
     assert "`unsat`" in head[2]
-    assert "(declare-const |c1.Robot| Bool)" in text
+    assert "(declare-const |c1.Robot| Bool)" in text or "(declare-const |robot.free| Bool)" in text
     assert "(set-logic QF_UF)" in text
 
 
@@ -332,11 +333,12 @@ def test_granted_term_is_what_the_arbiter_decides(data: st.DataObject) -> None:
 
 
 def check_verdicts(net: Net) -> list[Verdict]:
-    return [Verdict(name, Status.PROVED, "by exploration", "explicit") for name in ("contact-free", "deadlock-free")]
+    names = ("contact-free", "deadlock-free", *(f"property.{prop.name}" for prop in net.properties))
+    return [Verdict(name, Status.PROVED, "by exploration", "explicit") for name in names]
 
 
 def test_cell_is_bundled_with_all_its_proofs() -> None:
-    net = load_net("cell1")
+    net = catalogue_net("one_robot")
     bundle = make_bundle(net, check_verdicts(net))
     assert unproved(bundle) == ()
     assert Bundle.from_bytes(bundle.to_bytes()) == bundle

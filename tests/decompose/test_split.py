@@ -8,6 +8,7 @@ from support.reference import load_net
 from firable.decompose.join import join
 from firable.decompose.split import participants, split, unowned
 from firable.decompose.table import table_text
+from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.decomposition import Decomposition, Part
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Arbiter, Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
@@ -45,6 +46,18 @@ def codes(net: Net) -> list[tuple[str, tuple[str, ...]]]:
 
 def test_coordinator_table_of_the_cell_is_the_published_one() -> None:
     assert table_text(split(load_net("cell1"))) == PUBLISHED
+
+
+def test_coordinator_table_of_the_cell_in_the_catalogue_is_the_published_one() -> None:
+    decomposition = split(catalogue_net("one_robot"))
+    assert table_text(decomposition) == PUBLISHED
+    assert [subnet.name for subnet in decomposition.subnets] == ["system", "robot", "mc", "conveyor"]
+
+
+@pytest.mark.parametrize("name", catalogue_names())
+def test_every_net_of_the_catalogue_is_split_and_joined_back(name: str) -> None:
+    net = catalogue_net(name)
+    assert join(split(net)) == net
 
 
 def test_net_without_global_transitions_has_an_empty_table() -> None:
