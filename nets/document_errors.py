@@ -18,6 +18,8 @@ from firable.nets.source import Source, quoted
 from firable.nets.text_positions import bounded
 from firable.nets.yaml_tree import Mapping, Node, Path, Scalar, Sequence, node_span, nodes_along
 
+ERRORS_MAX: Final = 200  # enough to join and to read; a file of noise has millions
+
 _KEYS: Final[dict[tuple[str, ...], tuple[str, ...]]] = {
     path: tuple(field.alias or name for name, field in model.model_fields.items())
     for path, model in (
@@ -60,7 +62,7 @@ def version_problem(source: Source, tree: Node) -> Diagnostic | None:
 def document_problems(source: Source, tree: Node, error: ValidationError) -> list[Diagnostic]:
     """The errors of a validation as diagnostics in the order of the text."""
     problems: dict[tuple[int, int, str], Diagnostic] = {}
-    for one in error.errors(include_url=False, include_input=False):
+    for one in error.errors(include_url=False, include_input=False)[:ERRORS_MAX]:
         problem = _problem(source, tree, tuple(one["loc"]), one["type"], one["msg"], one.get("ctx", {}))
         span = problem.span
         if span is not None:

@@ -107,7 +107,8 @@ class _Token:
 def _tokens(text: str) -> list[_Token]:
     tokens = []
     position = 0
-    while text[position:].strip():
+    end = len(text.rstrip())
+    while position < end:
         match = _TOKEN.match(text, position)
         if match is None:  # unreachable: every non-blank character is a symbol or part of a name
             raise FormulaError(f"unexpected {text[position:]!r}", position)

@@ -46,6 +46,7 @@ from firable.nets.text_positions import Positions
 from firable.nets.yaml_tree import Node, data, parse_tree
 
 SIZE_BYTES_MAX: Final = 16 * 1024 * 1024
+PROBLEMS_MAX: Final = 100  # enough to join and to read; a file of noise has millions
 
 
 def read_net(path: str | Path) -> Net:
@@ -108,6 +109,10 @@ class _Reading:
             _Scope(None, (), document.start, document.inputs, document.places or {}),
         ]
 
+    def problem(self, problem: Diagnostic) -> None:
+        if len(self.problems) < PROBLEMS_MAX:
+            self.problems.append(problem)
+
     def net(self) -> Net:
         document = self.document
         places = tuple(place for scope in self.scopes for place in self.places(scope))
@@ -137,9 +142,9 @@ class _Reading:
         for local in scope.start:
             subject: Subject = (*scope.path, "start", local)
             if local not in scope.places:
-                self.problems.append(_unknown_start(scope, local, subject))
+                self.problem(_unknown_start(scope, local, subject))
             elif local in marked:
-                self.problems.append(
+                self.problem(
                     Diagnostic(
                         "F2006", f"'{local}' stands twice in `start`", "a place holds one token at most", subject
                     )
@@ -172,7 +177,7 @@ class _Reading:
         for name, body in (self.document.transitions or {}).items():
             transition = body or doc.TransitionDocument()
             for both in sorted(set(transition.inputs) & set(transition.outputs)):
-                self.problems.append(
+                self.problem(
                     Diagnostic(
                         "F2009",
                         f"'{both}' is both in `from` and in `to` of '{name}', which can then never fire",
@@ -221,7 +226,7 @@ class _Reading:
                 "write places joined by and, or, not, -> and brackets",
                 subject,
             )
-            self.problems.append(replace(problem, span=self.positions.in_formula(subject, error.column)))
+            self.problem(replace(problem, span=self.positions.in_formula(subject, error.column)))
             return None
 
 

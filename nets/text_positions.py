@@ -28,6 +28,10 @@ _SECOND: Final = frozenset({"F2001", "F2006", "F2007"})
 _UNKNOWN: Final = frozenset({"F2002", "F2003", "F2004"})
 
 
+_Found = Node | tuple[Scalar, int, int]
+"""A node, or a part of a scalar: the scalar, the index of the part (from 0) and its length."""
+
+
 class Positions:
     """Where the subjects of one net file stand in its text."""
 
@@ -45,13 +49,17 @@ class Positions:
         """The span of the subject, or of its longest prefix that has one."""
         first, second = self._table
         subject = problem.subject
-        if problem.code in _SECOND and subject in second:
-            return second[subject]
-        while subject:
-            if subject in first:
-                return first[subject]
+        found = second.get(subject) if problem.code in _SECOND else None
+        while found is None and subject:
+            found = first.get(subject)
             subject = subject[:-1]
-        return node_span(self.source, self.tree)
+        match found:
+            case None:
+                return node_span(self.source, self.tree)
+            case (formula, at, length):
+                return self._inside(formula, at, length)
+            case _:
+                return node_span(self.source, found)
 
     def in_formula(self, subject: Subject, column: int) -> Span:
         """The span of a character (from 0) of the formula whose text is the value at this path."""
@@ -71,18 +79,14 @@ class Positions:
         return self.source.span(node.line, begin + column + 1, length)
 
     @cached_property
-    def _table(self) -> tuple[dict[Subject, Span], dict[Subject, Span]]:
-        first: dict[Subject, Span] = {}
-        second: dict[Subject, Span] = {}
+    def _table(self) -> tuple[dict[Subject, _Found], dict[Subject, _Found]]:
+        first: dict[Subject, _Found] = {}
+        second: dict[Subject, _Found] = {}
         for subject, found in self._walk():
-            span = found if isinstance(found, Span) else node_span(self.source, found)
-            if subject in first:
-                second.setdefault(subject, span)
-            else:
-                first[subject] = span
+            (second if subject in first else first).setdefault(subject, found)
         return first, second
 
-    def _walk(self) -> Iterator[tuple[Subject, Node | Span]]:
+    def _walk(self) -> Iterator[tuple[Subject, _Found]]:
         for name, key, controller in _entries(self.tree, "controllers"):
             yield ("controllers", name), key
             yield from self._scope(controller, ("controllers", name), f"{name}.")
@@ -105,10 +109,9 @@ class Positions:
             for formula in _scalars(body):
                 # A formula names its places without quotes, between blanks and brackets.
                 for match in re.finditer(r"[^\s()]+", formula.text):
-                    span = self._inside(formula, match.start(), len(match.group()))
-                    yield ("properties", name, match.group()), span
+                    yield ("properties", name, match.group()), (formula, match.start(), len(match.group()))
 
-    def _scope(self, scope: Node, path: Subject, prefix: str) -> Iterator[tuple[Subject, Node | Span]]:
+    def _scope(self, scope: Node, path: Subject, prefix: str) -> Iterator[tuple[Subject, _Found]]:
         for item in _names(scope, "start"):
             yield (*path, "start", item.text), item
         for item in _names(scope, "inputs"):

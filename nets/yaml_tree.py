@@ -27,7 +27,7 @@ from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.source import Source, quoted
 
 DEPTH_MAX: Final = 32
-NODES_MAX: Final = 3_000_000
+NODES_MAX: Final = 2_000_000
 
 Data = str | bool | None | list["Data"] | dict[str, "Data"]
 """What a tree says, without positions."""
