@@ -1,1 +1,1 @@
-"""firable.cli"""
+"""The commands of `firable`: one file each; the only room that prints."""

@@ -1,0 +1,63 @@
+"""`firable bundle`: make the one file that may run on a cell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from firable.cli import text
+from firable.cli.options import analysis_options, answer, budget, format_option, load_net, net_argument
+from firable.cli.prove import table_json
+from firable.cli.report import Report
+
+
+@click.command(short_help="Check and prove a net, and seal it in a bundle that may run.")
+@net_argument
+@click.option("-o", "--output", metavar="FILE", required=True, help="The bundle to write.")
+@analysis_options
+@format_option
+def bundle(net: str, output: str, format_: str, **limits: Any) -> int:
+    """Check NET, split it, prove the split, and write subnets, table, verdicts and evidence as one sealed file.
+
+    Nothing is written unless everything that the net must prove is proved. `firable run` refuses a bundle of which any
+    byte was changed.
+    """
+    return answer("bundle", format_, lambda: _report(net, output, limits), _show)
+
+
+def _report(argument: str, output: str, limits: dict[str, Any]) -> Report:
+    from firable.analysis.check import check
+    from firable.decompose.bundling import make_bundle
+    from firable.nets.bundle import write_bundle
+    from firable.nets.verdict import Status, overall
+
+    net, notes = load_net(argument)
+    found = check(net, budget=budget(**limits))
+    if overall(found.verdicts) is not Status.PROVED:
+        return Report("bundle", argument, net, found.verdicts, figures=found.figures.to_json(), notes=notes)
+    made = make_bundle(net, found.verdicts)
+    write_bundle(output, made)
+    return Report(
+        "bundle",
+        argument,
+        net,
+        made.verdicts,
+        figures={**found.figures.to_json(), "bundle_digest": made.digest},
+        notes=notes,
+        table=table_json(made.decomposition),
+        files=(output,),
+    )
+
+
+def _show(report: Report) -> None:
+    for note in report.notes:
+        text.show_diagnostic(note)
+    text.heading(report.net, report.input)
+    if not report.files:
+        text.show_verdicts(report.net, [v for v in report.verdicts if not v.holds])
+    text.show_summary(report)
+    if report.files:
+        click.echo(f"  bundle {report.files[0]}, identity {report.figures['bundle_digest'][:16]}…")
+    else:
+        click.echo("  no bundle was made: only what is proved may run")

@@ -1,0 +1,39 @@
+"""`firable convert`: between the net file and PNML."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from firable.cli import text
+from firable.cli.options import load_net, write_text
+
+
+@click.command(short_help="Convert a net between *.firable.yaml and PNML.")
+@click.argument("source", metavar="NET")
+@click.option(
+    "-o", "--output", metavar="FILE", required=True, help="*.firable.yaml or *.pnml: the extension says which."
+)
+def convert(source: str, output: str) -> int:
+    """Convert NET to the format of the file named by --output.
+
+    What the other format cannot carry is said, never dropped in silence.
+    """
+    from firable.nets.load import PNML_SUFFIXES, TEXT_SUFFIXES
+    from firable.nets.pnml import write_pnml
+    from firable.nets.printing import format_net
+
+    suffix = Path(output).suffix.lower()
+    if suffix not in PNML_SUFFIXES | TEXT_SUFFIXES:
+        raise click.UsageError(f"cannot tell the format of '{output}': name a file *.firable.yaml or *.pnml")
+    net, notes = load_net(source)
+    if suffix in TEXT_SUFFIXES:
+        written, lost = format_net(net), notes
+    else:
+        written, more = write_pnml(net)
+        lost = (*notes, *more)
+    write_text(output, written)
+    for note in lost:
+        text.show_diagnostic(note)
+    return 0

@@ -1,0 +1,50 @@
+"""`firable draw`: the net as a picture."""
+
+from __future__ import annotations
+
+import click
+
+from firable.cli.options import load_net, net_argument, write_text
+
+
+@click.command(short_help="Draw a net as SVG.")
+@net_argument
+@click.option(
+    "-o", "--output", metavar="FILE.svg", default="-", help="The file to write; - is standard output.  [default: -]"
+)
+@click.option(
+    "--marking", metavar="PLACES", help="Show the tokens on these places, separated by commas, instead of M0."
+)
+@click.option("--trace", metavar="FILE", help="Show the marking where this trace ends, and which step fired what.")
+def draw(net: str, output: str, marking: str | None, trace: str | None) -> int:
+    """Draw NET in the conventions of the field: a lane for each controller, transitions as bars across them.
+
+    Circles are places and bars transitions; permissive gates are dashed with a black dot at the transition, inhibitive
+    ones with a hollow circle; external gates are stubs; a small arrow leads from a place to its command.
+    """
+    from firable.nets.drawing import draw_net
+
+    if marking is not None and trace is not None:
+        raise click.UsageError("--marking and --trace both say which tokens to show: leave one out")
+    loaded, _ = load_net(net)
+    if trace is not None:
+        from firable.semantics.trace import Fired, read_trace
+        from firable.semantics.trace import replay as play
+
+        read = read_trace(trace)
+        done = play(loaded, read)
+        firings = [event.transitions for event in read.events if isinstance(event, Fired)]
+        caption = f"after {done.firings} firings of {trace}"
+        write_text(output, draw_net(loaded, marking=done.marking, firings=firings, caption=caption))
+        return 0
+    shown = None
+    if marking is not None:
+        names = [name.strip() for name in marking.split(",") if name.strip()]
+        if unknown := [name for name in names if name not in loaded.place_index]:
+            from firable.nets.diagnostics import did_you_mean
+
+            hint = did_you_mean(unknown[0], list(loaded.place_index))
+            raise click.UsageError(f"the net has no place '{unknown[0]}'. {hint}".strip())
+        shown = loaded.marking(names)
+    write_text(output, draw_net(loaded, marking=shown))
+    return 0

@@ -1,0 +1,120 @@
+"""The command `firable`, and what every ending of it means.
+
+Exit codes: 0 all hold, 1 a property is violated, 2 usage or input error, 3 unknown or out of budget, 4 internal error.
+Unknown never passes. Whatever an input does, the answer is one clear error; a traceback is our own fault and shown only
+to who asks for it (`--traceback`).
+
+Every command imports what it needs when it runs: `firable --help` loads neither pydantic nor a solver.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+import click
+
+from firable import __version__
+from firable.cli import bundle, check, convert, draw, prove, replay, run, schema
+from firable.cli.report import ExitCode
+from firable.cli.text import show_errors
+
+_EXTRA = frozenset({"z3", "networkx", "numpy", "sympy"})
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, message="%(prog)s %(version)s")
+@click.option("--traceback", is_flag=True, help="Show the traceback of an internal error.")
+@click.pass_context
+def firable(context: click.Context, traceback: bool) -> None:  # noqa: ARG001 - read from the context by `main`
+    """Check, prove, split and run the control of robotic cells, written as extended Petri nets.
+
+    A NET is a net file (*.firable.yaml), PNML, a bundle, or catalogue:NAME for an example, such as catalogue:one_robot.
+
+    Exit codes: 0 all hold, 1 a property is violated, 2 usage or input error, 3 unknown or out of budget, 4 internal
+    error.
+    """
+    if os.environ.get("NO_COLOR"):
+        context.color = False
+
+
+for _command in (
+    check.check,
+    prove.prove,
+    bundle.bundle,
+    run.run,
+    replay.replay,
+    draw.draw,
+    convert.convert,
+    schema.schema,
+):
+    firable.add_command(_command)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")  # a terminal that knows no '✓' shows '?' instead of failing
+    try:
+        code = firable.main(arguments, prog_name="firable", standalone_mode=False)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read our output has gone (`firable ... | head`). What is still buffered has no reader.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return ExitCode.UNKNOWN
+    except Exception as error:  # the edge of the program: every ending becomes an exit code and a message
+        return _ended_by(error, arguments)
+    except KeyboardInterrupt:
+        click.echo("interrupted: nothing is known yet", err=True)
+        return ExitCode.UNKNOWN
+    return int(code or 0)
+
+
+def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
+    from firable.nets.diagnostics import InputError
+
+    match error:
+        case click.exceptions.NoArgsIsHelpError():
+            error.show()
+            return ExitCode.INPUT_ERROR
+        case click.Abort():
+            click.echo("interrupted: nothing is known yet", err=True)
+            return ExitCode.UNKNOWN
+        case click.ClickException():
+            error.show()
+            return ExitCode.INPUT_ERROR
+        case InputError():
+            show_errors(error.diagnostics)
+            return ExitCode.INPUT_ERROR
+        case ModuleNotFoundError() if error.name and error.name.partition(".")[0] in _EXTRA:
+            click.echo(
+                f"error: this command needs '{error.name}', which is not installed\n"
+                "  hint: pip install 'firable[prove]' installs all that checking and proving need",
+                err=True,
+            )
+            return ExitCode.INPUT_ERROR
+        case MemoryError():
+            click.echo("unknown: the memory of this machine is used up\n  hint: --max-memory sets a bound", err=True)
+            return ExitCode.UNKNOWN
+    if "--traceback" in arguments:
+        import traceback
+
+        traceback.print_exception(error)
+    click.echo(
+        f"error[F9001]: internal error: {type(error).__name__}: {error}\n"
+        "  hint: this is our fault, not yours; please report it with the output of `firable --traceback ...`",
+        err=True,
+    )
+    return ExitCode.INTERNAL_ERROR
+
+
+def run_as_script() -> None:
+    """The entry point of the installed command."""
+    sys.exit(main())
+
+
+if __name__ == "__main__":
+    run_as_script()

@@ -1,0 +1,188 @@
+"""What several commands share: the NET argument, the options for budgets and formats, and the file that is written.
+
+A file is written beside its place and renamed into it, so it is there whole or not at all.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from firable.cli.report import ExitCode, Report, document, worst
+
+if TYPE_CHECKING:
+    from firable.analysis.reachability import Budget
+    from firable.nets.diagnostics import Diagnostic
+    from firable.nets.net import Net
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+CATALOGUE = "catalogue:"
+_MEBIBYTE = 2**20
+
+net_argument = click.argument("net", metavar="NET")
+format_option = click.option(
+    "--format",
+    "format_",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="How to print the report; `firable schema report` prints the schema of the JSON.",
+)
+
+
+def analysis_options(command: F) -> F:
+    """The options of everything that explores a net."""
+    for option in (
+        click.option(
+            "--max-seconds", type=click.FloatRange(min=0), metavar="SECONDS", help="Give up after so much time."
+        ),
+        click.option(
+            "--max-memory",
+            type=click.IntRange(min=1),
+            default=2048,
+            show_default=True,
+            metavar="MIB",
+            help="Give up when the markings take so many MiB.",
+        ),
+        click.option(
+            "--max-markings",
+            type=click.IntRange(min=1),
+            default=20_000_000,
+            show_default=True,
+            metavar="N",
+            help="Give up after so many markings.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def budget(max_markings: int, max_memory: int, max_seconds: float | None) -> Budget:
+    """The budget that the options name."""
+    from firable.analysis.reachability import Budget
+
+    return Budget(max_markings, max_memory * _MEBIBYTE, max_seconds)
+
+
+def load_net(argument: str) -> tuple[Net, tuple[Diagnostic, ...]]:
+    """The net that an argument names, and what of its file it does not carry.
+
+    The argument is a file (net file, PNML or bundle) or `catalogue:NAME`. Raises `InputError` as the readers do.
+    """
+    from firable.nets.bundle import read_bundle
+    from firable.nets.load import load
+
+    if argument.startswith(CATALOGUE):
+        return load(catalogue_file(argument, "")).net, ()
+    if _is_archive(argument):
+        return read_bundle(argument).net, ()
+    loaded = load(argument)
+    return loaded.net, loaded.notes
+
+
+def catalogue_file(argument: str, kind: str) -> Path:
+    """The file of a `catalogue:NAME` argument; with `kind` "plant", its plant file."""
+    from firable.nets.catalogue import catalogue_names, catalogue_path
+
+    name = argument.removeprefix(CATALOGUE)
+    if name not in catalogue_names():
+        raise click.UsageError(f"the catalogue has no '{name}'; it has: {', '.join(catalogue_names())}")
+    path = catalogue_path(name)
+    return path.with_name(f"{name}.plant.yaml") if kind == "plant" else path
+
+
+def _is_archive(path: str) -> bool:
+    try:
+        with Path(path).open("rb") as stream:
+            return stream.read(4) == b"PK\x03\x04"
+    except (OSError, ValueError):  # the reader finds it again, and says it well
+        return False
+
+
+def write_text(path: str, text: str) -> None:
+    """Write a file whole or not at all, or to standard output for `-`; raises `InputError` F1017."""
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.source import printable
+
+    if path == "-":
+        click.echo(text, nl=False)
+        return
+    target = Path(path)
+    unfinished = target.with_name(f".{target.name[:200]}.{os.getpid()}.unfinished") if target.name else target
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(None, "this is a directory")
+        with unfinished.open("x", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+        unfinished.replace(target)
+    except (OSError, ValueError) as error:
+        with suppress(OSError, ValueError):
+            unfinished.unlink()
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        message = f"{printable(path)}: cannot be written: {reason}"
+        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
+
+
+def write_folder(folder: str, files: dict[str, str]) -> tuple[str, ...]:
+    """Write files into a folder, made if it is missing; returns their paths. Raises `InputError` F1017."""
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.source import printable
+
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        message = f"{printable(folder)}: the folder cannot be made: {reason}"
+        raise InputError([Diagnostic("F1017", message, "name a folder that you may write to")]) from None
+    paths = []
+    for name, text in files.items():
+        paths.append(str(Path(folder) / name))
+        write_text(paths[-1], text)
+    return tuple(paths)
+
+
+def answer(
+    command: str,
+    format_: str,
+    make: Callable[[], Report],
+    show: Callable[[Report], None],
+) -> int:
+    """Make one report, print it, and return its exit code; a refused input is reported in the same format."""
+    return answer_all(command, format_, [make], show)
+
+
+def answer_all(
+    command: str,
+    format_: str,
+    makers: Sequence[Callable[[], Report]],
+    show: Callable[[Report], None],
+) -> int:
+    """Make several reports, printing each as text as soon as it is there, or all as one JSON document."""
+    import json
+
+    from firable.cli.text import show_errors
+    from firable.nets.diagnostics import InputError
+
+    reports: list[Report] = []
+    errors: list[Diagnostic] = []
+    for make in makers:
+        try:
+            report = make()
+        except InputError as error:
+            errors += error.diagnostics
+            if format_ == "text":
+                show_errors(error.diagnostics)
+            continue
+        reports.append(report)
+        if format_ == "text":
+            show(report)
+    code = worst([*(report.exit_code for report in reports), *([ExitCode.INPUT_ERROR] if errors else [])])
+    if format_ == "json":
+        click.echo(json.dumps(document(command, reports, errors, code), indent=2, ensure_ascii=False))
+    return code

@@ -1,0 +1,110 @@
+"""`firable prove`: split a net over its controllers and prove that the parts together are the whole."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from firable.cli import text
+from firable.cli.options import answer, format_option, load_net, net_argument, write_folder
+from firable.cli.report import Report
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from firable.nets.decomposition import Decomposition
+    from firable.nets.verdict import Verdict
+
+_FAMILIES = {
+    "eq7": "Eq. (7)      a transition is firable iff all its parts are",
+    "eq8": "Eq. (8)      its external gates are open iff those of all its parts are",
+    "eq9-10": "Eq. (9)-(10) the next token of a place is the same in its subnet",
+    "arbitration": "arbitration  conflicts are decided as in the central net",
+}
+
+
+@click.command(short_help="Split a net over its controllers, and prove the parts equal to the whole.")
+@net_argument
+@click.option("--smt-dir", metavar="DIR", help="Write each obligation as an SMT-LIB 2 file, for another solver.")
+@click.option(
+    "--timeout",
+    type=click.FloatRange(min=0.001),
+    default=60.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Give up an obligation after so much time.",
+)
+@format_option
+def prove(net: str, smt_dir: str | None, timeout: float, format_: str) -> int:
+    """Split NET by ownership, print the coordinator table, and discharge every obligation with z3.
+
+    Eq. (7) and (8) for every transition, (9)-(10) for every place, ownership, initial marking, commands and
+    arbitration. A violated obligation shows the values of the net's own names that refute it.
+    """
+    return answer("prove", format_, lambda: _report(net, smt_dir, timeout), _show)
+
+
+def table_json(decomposition: Decomposition) -> list[dict[str, Any]]:
+    """The coordinator table as JSON data."""
+    return [
+        {
+            "name": row.name,
+            "parts": [{"controller": part.controller, "name": part.name} for part in row.parts],
+            "description": row.description,
+        }
+        for row in decomposition.table
+    ]
+
+
+def show_obligations(net_verdicts: Sequence[Verdict]) -> None:
+    """Print how many obligations of each family are proved."""
+    families: dict[str, list[Verdict]] = {}
+    for verdict in net_verdicts:
+        family = verdict.name.partition(".")[0]
+        families.setdefault(family if family in _FAMILIES else verdict.name, []).append(verdict)
+    for family, some in families.items():
+        proved = sum(verdict.holds for verdict in some)
+        symbol, colour = ("✓", "green") if proved == len(some) else ("✗", "red")
+        words = _FAMILIES.get(family) or f"{family:<12} {some[0].statement}"
+        click.echo(f"  {click.style(symbol, fg=colour)} {proved:>3} of {len(some):<3} {words}")
+
+
+def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
+    from firable.decompose.prove import prove as prove_split
+    from firable.decompose.split import split
+
+    net, notes = load_net(argument)
+    decomposition = split(net)
+    found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)))
+    files = write_folder(smt_dir, dict(found.files)) if smt_dir is not None else ()
+    return Report("prove", argument, net, found.verdicts, notes=notes, table=table_json(decomposition), files=files)
+
+
+def show_table(rows: Sequence[Any]) -> None:
+    """Print the coordinator table from its JSON data."""
+    parts = [", ".join(part["name"] for part in row["parts"]) for row in rows]
+    width_name = max((len(row["name"]) for row in rows), default=0) + 1
+    width_parts = max(map(len, parts), default=0)
+    for row, named in zip(rows, parts, strict=True):
+        click.echo(f"  {row['name'] + ':':<{width_name}} {named:<{width_parts}}   {row['description']}".rstrip())
+
+
+def _show(report: Report) -> None:
+    for note in report.notes:
+        text.show_diagnostic(note)
+    text.heading(report.net, report.input)
+    click.echo(f"\n{click.style('coordinator table', bold=True)}")
+    show_table(report.table)
+    if not report.table:
+        click.echo("  no transition has more than one participant")
+    click.echo(f"\n{click.style('obligations', bold=True)}")
+    show_obligations(report.verdicts)
+    refuted = [verdict for verdict in report.verdicts if not verdict.holds]
+    if refuted:
+        text.show_verdicts(report.net, refuted)
+    text.show_summary(report)
+    if report.files:
+        from pathlib import Path
+
+        click.echo(f"  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")

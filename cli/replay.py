@@ -1,0 +1,97 @@
+"""`firable replay`: is this trace a trace of the net?"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from firable.cli import text
+from firable.cli.options import answer, format_option, load_net
+from firable.cli.report import Report
+
+if TYPE_CHECKING:
+    from firable.nets.net import Net
+    from firable.nets.verdict import Verdict
+    from firable.semantics.trace import Trace
+
+_TOLD_MAX = 40
+
+
+@click.command(short_help="Play a trace by the reference player: is it one of the net?")
+@click.argument("trace", metavar="TRACE")
+@click.option("--net", "of", metavar="NET", required=True, help="The net, or the bundle, that the trace is of.")
+@format_option
+def replay(trace: str, of: str, format_: str) -> int:
+    """Play TRACE, a log of `firable run` or a counterexample of `firable check`, token by token.
+
+    Every firing must be firable with its gates open as recorded, every command sent exactly once, and the marking at
+    the end the one shown. A trace that was cut off is unknown.
+    """
+    return answer("replay", format_, lambda: _report(trace, of), _show)
+
+
+def _report(file: str, argument: str) -> Report:
+    from firable.nets.interchange import net_digest
+    from firable.semantics.trace import Fired, read_trace
+
+    net, notes = load_net(argument)
+    trace = read_trace(file)
+    firings = [event.transitions for event in trace.events if isinstance(event, Fired)]
+    verdict, marking = _verdict(net, trace)
+    same = not trace.header.digest or trace.header.digest == net_digest(net)
+    return Report(
+        "replay",
+        file,
+        net,
+        (verdict,),
+        notes=notes,
+        run={
+            "firings": {name: sum(name in fired for fired in firings) for name in net.transition_index},
+            "marking": list(marking),
+            "told": [list(fired) for fired in firings] if len(firings) <= _TOLD_MAX and verdict.holds else [],
+            "recorded_on_this_net": same,
+        },
+    )
+
+
+def _verdict(net: Net, trace: Trace) -> tuple[Verdict, tuple[str, ...]]:
+    from firable.nets.diagnostics import InputError
+    from firable.nets.verdict import Status, Verdict
+    from firable.semantics.trace import replay as play
+
+    name, method = "trace", "replay by the reference player"
+    try:
+        done = play(net, trace)
+    except InputError as error:
+        found = error.diagnostics[0]
+        where = f"line {found.span.line}: " if found.span else ""
+        statement = f"the trace is a trace of '{net.name}'"
+        hint = f"{where}{found.message}; {found.hint}"
+        return Verdict(name, Status.VIOLATED, statement, method, code=found.code, hint=hint), ()
+    statement = f"the trace is a trace of '{net.name}': {text.counted(done.firings, 'firing')}"
+    if done.commands:
+        statement += f", {text.counted(done.commands, 'command')}"
+    status = Status.PROVED if done.complete else Status.UNKNOWN
+    bound = "" if done.complete else "the trace was cut off; all its lines so far are of the net"
+    return Verdict(name, status, statement, method, bound=bound), net.names(done.marking)
+
+
+def _show(report: Report) -> None:
+    for note in report.notes:
+        text.show_diagnostic(note)
+    text.heading(report.net, report.input)
+    if not report.run["recorded_on_this_net"]:
+        click.echo("  recorded on another version of this net")
+    if report.run["told"]:
+        click.echo()
+        for line in text.told_steps(report.net, report.run["told"]):
+            click.echo(f"  {line}")
+    text.show_verdicts(report.net, report.verdicts)
+    if report.run["marking"]:
+        click.echo(f"\n  in the end hold a token: {', '.join(report.run['marking'])}")
+        marking = report.net.marking(report.run["marking"])
+        from firable.semantics.player import Player
+
+        if Player(report.net).deadlocked(marking):
+            click.echo(f"  {click.style('deadlock', fg='red')}: nothing is firable here, whatever the gates")

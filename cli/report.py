@@ -1,0 +1,114 @@
+"""The report: what every command says, as one record, printed as text or as JSON.
+
+`check`, `prove`, `bundle`, `run` and `replay` all answer with verdicts on a net, so they share one shape, and a program
+that reads one reads all. The JSON is published as `report.schema.json`, and holds no measured times: the same input
+gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from firable.nets.diagnostics import Diagnostic
+    from firable.nets.net import Net
+    from firable.nets.verdict import Verdict
+
+VERSION = 1
+
+
+class ExitCode(IntEnum):
+    """What the exit code of a command means."""
+
+    ALL_HOLD = 0
+    VIOLATED = 1
+    INPUT_ERROR = 2
+    UNKNOWN = 3
+    INTERNAL_ERROR = 4
+
+
+@dataclass(frozen=True)
+class Report:
+    """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON."""
+
+    command: str
+    input: str
+    net: Net
+    verdicts: Sequence[Verdict]
+    discipline: str = ""
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    notes: Sequence[Diagnostic] = ()
+    table: Sequence[Mapping[str, Any]] = ()
+    files: Sequence[str] = ()
+    run: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """The exit code that these verdicts mean."""
+        from firable.nets.verdict import Status, overall
+
+        codes = {
+            Status.PROVED: ExitCode.ALL_HOLD,
+            Status.VIOLATED: ExitCode.VIOLATED,
+            Status.UNKNOWN: ExitCode.UNKNOWN,
+        }
+        return codes[overall(self.verdicts)]
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as JSON data."""
+        from firable.nets.interchange import net_digest
+        from firable.nets.verdict import overall
+
+        data: dict[str, Any] = {
+            "input": self.input,
+            "cell": self.net.name,
+            "digest": net_digest(self.net),
+            "status": overall(self.verdicts).value,
+        }
+        for key in ("discipline", "figures", "table", "files", "run"):
+            if value := getattr(self, key):
+                data[key] = list(value) if isinstance(value, tuple) else value
+        if self.notes:
+            data["notes"] = [diagnostic_to_json(note) for note in self.notes]
+        data["verdicts"] = [verdict.to_json() for verdict in self.verdicts]
+        return data
+
+
+def diagnostic_to_json(diagnostic: Diagnostic) -> dict[str, Any]:
+    """A diagnostic as JSON data."""
+    data: dict[str, Any] = {
+        "code": diagnostic.code,
+        "severity": diagnostic.severity.value,
+        "message": diagnostic.message,
+    }
+    if diagnostic.hint:
+        data["hint"] = diagnostic.hint
+    if diagnostic.span is not None:
+        data |= {"file": diagnostic.span.file, "line": diagnostic.span.line, "column": diagnostic.span.column}
+    return data
+
+
+def worst(codes: Iterable[ExitCode]) -> ExitCode:
+    """The exit code of several reports together: an input error outweighs a violation, and that what is unknown."""
+    order = (ExitCode.INPUT_ERROR, ExitCode.VIOLATED, ExitCode.UNKNOWN)
+    found = set(codes)
+    return next((code for code in order if code in found), ExitCode.ALL_HOLD)
+
+
+def document(
+    command: str, reports: Sequence[Report], errors: Sequence[Diagnostic], exit_code: ExitCode
+) -> dict[str, Any]:
+    """What `--format json` prints."""
+    from firable import __version__
+
+    return {
+        "firable_report": VERSION,
+        "firable": __version__,
+        "command": command,
+        "exit_code": int(exit_code),
+        "reports": [report.to_json() for report in reports],
+        "errors": [diagnostic_to_json(error) for error in errors],
+    }

@@ -1,0 +1,177 @@
+"""`firable run`: run a bundle on the simulated cell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from firable.cli import text
+from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option
+from firable.cli.report import Report
+
+if TYPE_CHECKING:
+    from firable.executor.execution import Execution
+    from firable.executor.plant_file import PlantModel
+    from firable.executor.run import Operator, RunReport
+    from firable.nets.bundle import Bundle
+    from firable.nets.verdict import Verdict
+
+_SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
+
+
+@click.command(short_help="Run a bundle on the simulated cell.")
+@click.argument("bundle", metavar="BUNDLE")
+@click.option("--plant", metavar="FILE", help="The plant file of the cell, or catalogue:NAME.  [default: by its name]")
+@click.option(
+    "--workpieces", type=click.IntRange(min=1), default=10, show_default=True, help="How many to carry through."
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="The seed of the cell's delays.")
+@click.option(
+    "--speed",
+    type=click.Choice(list(_SPEEDS)),
+    default="max",
+    show_default=True,
+    help="Times real time; max is virtual time, where a run is a function of bundle, plant and seed.",
+)
+@click.option("--trace", metavar="FILE", help="Write what happens, for `firable replay`.")
+@click.option("--step", is_flag=True, help="Fire one transition at a time: Enter for the next, r to run on, q to stop.")
+@format_option
+def run(
+    bundle: str,
+    plant: str | None,
+    workpieces: int,
+    seed: int,
+    speed: str,
+    trace: str | None,
+    step: bool,
+    format_: str,
+) -> int:
+    """Run BUNDLE: a coordinator and a controller for each subnet, on a simulated cell of machines and workpieces.
+
+    A bundle that is changed or not proved is refused. Ctrl-C stops the machines and the run in order.
+    """
+
+    def make() -> Report:
+        from firable.executor.run import load
+        from firable.executor.run import run as run_bundle
+
+        loaded = load(bundle)
+        report = run_bundle(
+            loaded,
+            _plant(loaded, plant),
+            workpieces=workpieces,
+            seed=seed,
+            speed=_SPEEDS[speed],
+            trace_path=trace,
+            operator=_stepping(_SPEEDS[speed]) if step else None,
+        )
+        return Report(
+            "run",
+            bundle,
+            loaded.net,
+            _verdicts(report, workpieces, seed),
+            files=(trace,) if trace else (),
+            run={**report.to_json(), "workpieces": workpieces, "seed": seed},
+        )
+
+    return answer("run", format_, make, _show)
+
+
+def _plant(bundle: Bundle, argument: str | None) -> PlantModel:
+    """The plant that the option names, or the one of the catalogue that bears the name of the cell."""
+    from firable.executor.plant_file import read_plant
+    from firable.nets.catalogue import catalogue_names
+
+    if argument is None:
+        name = bundle.net.name.replace("-", "_")
+        argument = f"{CATALOGUE}{name}"
+        if name not in catalogue_names() or not catalogue_file(argument, "plant").exists():
+            raise click.UsageError(
+                f"say with --plant on which cell to run: none in the catalogue is '{bundle.net.name}'"
+            )
+    return read_plant(catalogue_file(argument, "plant") if argument.startswith(CATALOGUE) else argument)
+
+
+def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, ...]:
+    from firable.executor.situation import State
+    from firable.nets.verdict import Status, Verdict
+
+    method = f"run on the simulated cell, seed {seed}"
+    through = len(report.delivered)
+    ended = {State.DONE: Status.PROVED, State.STOPPED: Status.UNKNOWN}.get(report.state, Status.VIOLATED)
+    intact = not report.lost and not report.doubled
+    return (
+        Verdict(
+            "workpieces-carried-through",
+            ended,
+            f"{workpieces} workpieces go through the cell",
+            method,
+            bound=f"{through} went through" if ended is Status.UNKNOWN else "",
+            hint=report.situation.message if ended is Status.VIOLATED else "",
+            subjects=tuple(map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),
+        ),
+        Verdict(
+            "workpieces-intact",
+            Status.PROVED if intact else Status.VIOLATED,
+            "no workpiece is lost, none doubled",
+            method,
+            subjects=tuple(f"workpiece {i}" for i in (*report.lost, *report.doubled)),
+        ),
+    )
+
+
+def _stepping(speed: float | None) -> Operator:
+    """The operator who fires one transition at a time from the terminal."""
+    import asyncio
+
+    from firable.executor.situation import State
+
+    async def asked() -> str:
+        prompt = "  next [Enter], run on [r], stop [q]: "
+        try:
+            # In virtual time no time passes while the person thinks; in real time the machines must go on.
+            return (input(prompt) if speed is None else await asyncio.to_thread(input, prompt)).strip().lower()
+        except EOFError:
+            return "q"
+
+    async def operate(execution: Execution) -> None:
+        execution.pause()
+        while True:
+            fired = await execution.step()
+            if fired is not None:
+                click.echo(f"{execution.now_seconds():8.1f} s  {fired}  {execution.net.transition(fired).description}")
+                match await asked():
+                    case "q":
+                        execution.stop()
+                        return
+                    case "r":
+                        execution.resume()
+                        return
+            elif execution.situation().state in {State.DEADLOCK, State.FAULT, State.DONE, State.STOPPED}:
+                execution.resume()
+                return
+            else:
+                await asyncio.sleep(0.05)
+
+    return operate
+
+
+def _show(report: Report) -> None:
+    text.heading(report.net, report.input)
+    done = report.run
+    click.echo(
+        f"  {done['state']} after {done['simulated_seconds']:,.0f} s in the cell: "
+        f"{text.counted(len(done['delivered']), 'workpiece')} carried through, {len(done['lost'])} lost, "
+        f"{len(done['doubled'])} doubled, {len(done['inside'])} still inside"
+    )
+    click.echo(
+        f"  {text.counted(sum(done['firings'].values()), 'firing')}, {text.counted(done['commands'], 'command')} to "
+        f"machines, {text.counted(done['messages'], 'message')} between coordinator and controllers"
+    )
+    refuted = [verdict for verdict in report.verdicts if not verdict.holds]
+    if refuted:
+        text.show_verdicts(report.net, refuted)
+    text.show_summary(report)
+    for file in report.files:
+        click.echo(f"  trace {file}")

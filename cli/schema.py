@@ -1,0 +1,34 @@
+"""`firable schema`: the JSON Schemas of what firable reads and prints."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from typing import Any
+
+import click
+
+
+@click.command(short_help="Print the JSON Schema of net files, plant files or reports.")
+@click.argument("kind", type=click.Choice(["net", "plant", "report"]))
+def schema(kind: str) -> int:
+    """Print the JSON Schema of a net file, a plant file, or of what --format json prints.
+
+    Editors complete and check net files by it.
+    """
+    click.echo(json.dumps(_schema(kind), indent=2, ensure_ascii=False))
+    return 0
+
+
+def _schema(kind: str) -> Any:
+    match kind:
+        case "net":
+            from firable.nets.document import json_schema
+
+            return json_schema()
+        case "plant":
+            from firable.executor.plant_file import PlantModel
+
+            return PlantModel.model_json_schema()
+        case _:
+            return json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))

@@ -1,0 +1,156 @@
+"""Reports as text for a person: a symbol and a word for each verdict, and counterexamples told step by step.
+
+A witness is told in the words of the cell: each transition by its name and description, and in the end the places that
+hold a token. A sequence that several verdicts share is told once. Colours are for terminals only, and switched off by
+NO_COLOR; the words say everything that the colours say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from firable.cli.report import Report
+    from firable.nets.diagnostics import Diagnostic
+    from firable.nets.net import Net
+    from firable.nets.verdict import Verdict, Witness
+
+_HEADINGS = {"required": "must hold", "warning": "warnings", "information": "for information"}
+
+
+def show_errors(diagnostics: Iterable[Diagnostic]) -> None:
+    """Print why an input is refused, to standard error."""
+    for diagnostic in diagnostics:
+        show_diagnostic(diagnostic)
+
+
+def show_diagnostic(diagnostic: Diagnostic) -> None:
+    """Print one diagnostic, to standard error: its first line stands out."""
+    first, _, rest = str(diagnostic).partition("\n")
+    colour = "red" if diagnostic.severity.value == "error" else "yellow"
+    click.echo(click.style(first, fg=colour) + (f"\n{rest}" if rest else ""), err=True)
+
+
+def heading(net: Net, where: str) -> None:
+    """Print which net the report is about."""
+    click.echo(f"{click.style(net.name or 'the net', bold=True)}  {click.style(where, dim=True)}")
+    counts = [(len(net.places), "place"), (len(net.transitions), "transition"), (len(net.controllers), "controller")]
+    click.echo("  " + ", ".join(counted(n, word) for n, word in counts if n or word != "controller"))
+
+
+def counted(n: int, word: str) -> str:
+    """A number with its noun.
+
+    >>> counted(1, "place"), counted(1200, "marking")
+    ('1 place', '1,200 markings')
+    """
+    return f"{n:,} {word}{'' if n == 1 else 's'}"
+
+
+def show_verdicts(net: Net, verdicts: Sequence[Verdict], *, verbose: bool = False) -> None:
+    """Print all verdicts, those that must hold first, with the witnesses of what is violated.
+
+    The witnesses of warnings, and of what is reachable and shall be, are told only if `verbose`.
+    """
+    told: dict[tuple[object, ...], str] = {}
+    width = max((len(verdict.name) for verdict in verdicts), default=0)
+    for weight, title in _HEADINGS.items():
+        some = [verdict for verdict in verdicts if verdict.weight.value == weight]
+        if some:
+            click.echo(f"\n{click.style(title, bold=True)}")
+        for verdict in some:
+            click.echo(verdict_line(verdict, width))
+            for line in _reasons(net, verdict, told, verbose):
+                click.echo(f"      {line}")
+
+
+def verdict_line(verdict: Verdict, width: int = 0) -> str:
+    """The line of a verdict: symbol, word, name, statement."""
+    symbol, word, colour = _mark(verdict)
+    return f"  {click.style(f'{symbol} {word:<8}', fg=colour)}  {verdict.name:<{width}}  {verdict.statement}"
+
+
+def _mark(verdict: Verdict) -> tuple[str, str, str | None]:
+    weight, status = verdict.weight.value, verdict.status.value
+    if status == "proved":
+        return "✓", "yes" if weight == "information" else "proved", "green"
+    if status == "unknown":
+        return "?", "unknown", "yellow"
+    match weight:
+        case "required":
+            return "✗", "violated", "red"
+        case "warning":
+            return "!", "warning", "yellow"
+        case _:
+            return "·", "no", None
+
+
+def _reasons(net: Net, verdict: Verdict, told: dict[tuple[object, ...], str], verbose: bool) -> Iterator[str]:
+    status = verdict.status.value
+    if status == "unknown" and verdict.bound:
+        yield f"reached: {verdict.bound}"
+    if status == "violated" and verdict.subjects:
+        more = f" and {len(verdict.subjects) - 12} more" if len(verdict.subjects) > 12 else ""
+        yield f"about: {', '.join(verdict.subjects[:12])}{more}"
+    if verdict.witness is not None and (verbose or (status == "violated" and verdict.weight.value == "required")):
+        yield from _witness(net, verdict.name, verdict.witness, told)
+    if status != "proved" and verdict.hint:
+        code = f"[{verdict.code}] " if verdict.code else ""
+        yield f"hint: {code}{verdict.hint}"
+
+
+def _witness(net: Net, name: str, witness: Witness, told: dict[tuple[object, ...], str]) -> Iterator[str]:
+    if witness.assignment:
+        yield "refuted by: " + ", ".join(f"{of} = {int(value)}" for of, value in witness.assignment)
+        if witness.note:
+            yield f"then {witness.note}"
+        return
+    key = (witness.firings, witness.cycle)
+    if key in told:
+        yield f"by the same firings as {told[key]}" + (f": {witness.note}" if witness.note else "")
+        return
+    told[key] = name
+    if witness.firings:
+        yield "from the initial marking fire:"
+        yield from (f"  {line}" for line in told_steps(net, witness.firings))
+    else:
+        yield "already in the initial marking:"
+    if witness.note:
+        yield witness.note
+    if witness.marking:
+        yield f"then hold a token: {', '.join(witness.marking)}"
+    if witness.cycle:
+        yield "and then for ever again:"
+        yield from (f"  {line}" for line in told_steps(net, witness.cycle, len(witness.firings) + 1))
+
+
+def told_steps(net: Net, firings: Sequence[Sequence[str]], first: int = 1) -> Iterator[str]:
+    """A firing sequence as numbered steps, each transition with its description."""
+    width = max((len(name) for fired in firings for name in fired), default=0)
+    for k, fired in enumerate(firings, start=first):
+        for i, name in enumerate(fired):
+            number = f"{k:>3}." if i == 0 else "   +"
+            yield f"{number} {name:<{width}}  {net.transition(name).description}".rstrip()
+
+
+def show_summary(report: Report) -> None:
+    """Print the last line: how it ended, and how many verdicts there are of each kind."""
+    required = [verdict for verdict in report.verdicts if verdict.weight.value == "required"]
+    parts = []
+    for status in ("violated", "unknown", "proved"):
+        if n := sum(verdict.status.value == status for verdict in required):
+            parts.append(f"{n} {status}")
+    warnings = sum(v.weight.value == "warning" and v.status.value != "proved" for v in report.verdicts)
+    if warnings:
+        parts.append(counted(warnings, "warning"))
+    word, colour = {0: ("all hold", "green"), 1: ("violated", "red")}.get(report.exit_code, ("not decided", "yellow"))
+    click.echo(f"\n{click.style(word, fg=colour, bold=True)}: {', '.join(parts) or 'there is nothing to hold'}")
+
+
+def show_files(files: Sequence[str], words: str) -> None:
+    """Print where files were written."""
+    for file in files:
+        click.echo(f"  {words} {file}")
