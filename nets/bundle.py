@@ -191,7 +191,24 @@ def _bundle(members: Mapping[str, bytes]) -> Bundle:
     evidence = {
         name.removeprefix("evidence/"): data.decode() for name, data in files.items() if name.startswith("evidence/")
     }
-    return Bundle(decomposition, tuple(map(Verdict.from_json, judged["verdicts"])), evidence)
+    bundle = Bundle(decomposition, tuple(map(Verdict.from_json, judged["verdicts"])), evidence)
+    if not _is_well_typed(bundle):
+        raise _DamageError("its content is not that of a bundle")
+    return bundle
+
+
+def _is_well_typed(bundle: Bundle) -> bool:
+    """Whether names are texts and numbers are numbers, so that whoever reads the bundle need not ask."""
+    texts: list[Any] = []
+    for verdict in bundle.verdicts:
+        texts += [verdict.name, verdict.statement, verdict.method, verdict.code, verdict.hint, verdict.bound]
+        texts += [*verdict.subjects, *verdict.evidence]
+    for row in bundle.decomposition.coordinated:
+        texts += [row.name, row.description, *(name for part in row.parts for name in (part.controller, part.name))]
+    for group in bundle.decomposition.groups:
+        texts += [group.name, *group.sequence, *group.rest, *([] if group.controller is None else [group.controller])]
+    numbers: list[Any] = [row.number for row in bundle.decomposition.coordinated]
+    return all(isinstance(text, str) for text in texts) and all(n is None or type(n) is int for n in numbers)
 
 
 def _refuse(file: str, reason: str) -> NoReturn:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from support.reference import load_net
+from support.reference import Case, cases, load_net
 
 from firable.decompose.join import join
 from firable.decompose.split import participants, split, unowned
@@ -58,6 +58,19 @@ def test_coordinator_table_of_the_cell_in_the_catalogue_is_the_published_one() -
 def test_every_net_of_the_catalogue_is_split_and_joined_back(name: str) -> None:
     net = catalogue_net(name)
     assert join(split(net)) == net
+
+
+@pytest.mark.parametrize("case", [case for case in cases() if "table" in case.expect], ids=str)
+def test_coordinator_table_is_that_of_the_case(case: Case) -> None:
+    table = {row.name: [part.name for part in row.parts] for row in split(case.net()).table}
+    assert table == case.expect["table"]
+
+
+@pytest.mark.parametrize("case", [case for case in cases() if "unowned" in case.expect], ids=str)
+def test_transitions_without_participants_are_those_of_the_case(case: Case) -> None:
+    assert list(unowned(case.net())) == case.expect["unowned"]
+    with pytest.raises(InputError, match="F4001"):
+        split(case.net())
 
 
 def test_net_without_global_transitions_has_an_empty_table() -> None:

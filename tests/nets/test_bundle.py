@@ -142,6 +142,27 @@ def test_other_spelling_of_the_same_content_is_refused() -> None:
     assert refused(with_new_hashes({**members, "verdicts.json": spaced}))
 
 
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("verdicts.json", b'"name":"ownership"', b'"name":["ownership"]'),
+        ("verdicts.json", b'"statement":"it holds"', b'"statement":7'),
+        ("verdicts.json", b'"proved"', b'"sure"'),
+        ("table.json", b'"number":1', b'"number":"1"'),
+        ("table.json", b'"number":1', b'"number":true'),
+        ("table.json", b'"controller":null', b'"controller":0'),
+        ("table.json", b'"t0-1"', b"0"),
+    ],
+)
+def test_content_of_another_type_is_refused_though_every_hash_is_right(name: str, old: bytes, new: bytes) -> None:
+    members = unpack(BUNDLE.to_bytes())
+    assert old in members[name]
+    files = {**members, name: members[name].replace(old, new)}
+    judged = json.loads(files["verdicts.json"])
+    judged["of"] = {file: hashlib.sha256(files[file]).hexdigest() for file in judged["of"]}
+    assert refused(with_new_hashes({**files, "verdicts.json": canonical_json(judged)}))
+
+
 @pytest.mark.parametrize("data", [b"", b"[]", b"{}", b"\xff", b"[" * 100_000, b"null", b'{"firable_bundle":2}'])
 def test_manifest_of_another_kind_is_refused(data: bytes) -> None:
     assert refused(pack({**unpack(BUNDLE.to_bytes()), "manifest.json": data}))
