@@ -1,0 +1,222 @@
+"""The properties of a net file against their definitions; leads_to against every set of recurring markings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import chain, combinations
+
+import networkx as nx
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from support.generate_sparse import sparse_nets
+
+from firable.analysis.properties import decide_property, statement
+from firable.analysis.reachability import Budget, ReachabilityGraph, explore
+from firable.nets.formula import Formula, parse_formula
+from firable.nets.net import Fairness, Marking, Net, Place, Property, PropertyKind, Transition
+from firable.nets.verdict import Status, Verdict
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import FiringSet, Player, holds_in
+from firable.semantics.trace import Discipline
+
+FORMULAS = st.sampled_from(
+    ["a", "b", "not a", "a and not b", "a or b", "start", "deadlock", "firable(t0)", "not firable(t1)", "false", "true"]
+).map(parse_formula)
+SITUATIONS = st.tuples(sparse_nets(signals=True), st.sampled_from(Discipline)).filter(
+    lambda drawn: len(drawn[0].transitions) > 1
+)
+
+
+def prop(kind: PropertyKind, p: Formula, q: Formula | None = None, fairness: Fairness = Fairness.WEAK) -> Property:
+    return Property("x", kind, p, q, fairness)
+
+
+def satisfying(net: Net, formula: Formula, markings: set[Marking]) -> set[Marking]:
+    return {m for m in markings if evaluate(BOOL, net, formula, holds_in(m))}
+
+
+def graph_of(net: Net, discipline: Discipline) -> nx.MultiDiGraph[Marking]:
+    graph: nx.MultiDiGraph[Marking] = nx.MultiDiGraph()
+    for marking, edges in Player(net).reachable(step=discipline is Discipline.STEP).items():
+        graph.add_node(marking)
+        for fired, target in edges:
+            graph.add_edge(marking, target, fired=fired)
+    return graph
+
+
+@settings(max_examples=150, deadline=None)
+@given(SITUATIONS, FORMULAS)
+def test_properties_of_markings_are_decided_by_their_definitions(
+    situation: tuple[Net, Discipline], formula: Formula
+) -> None:
+    net, discipline = situation
+    truth, graph = graph_of(net, discipline), explore(net, discipline)
+    markings = set(truth)
+    good = satisfying(net, formula, markings)
+    may_come_back = {m for m in markings if (nx.descendants(truth, m) | {m}) & good}
+    away = nx.single_source_shortest_path_length(truth, net.initial_marking)
+    for kind, shown in (
+        (PropertyKind.NEVER, good),
+        (PropertyKind.ALWAYS, markings - good),
+        (PropertyKind.REACHABLE, good),
+        (PropertyKind.ALWAYS_POSSIBLE, markings - may_come_back),
+    ):
+        verdict = decide_property(graph, prop(kind, formula))
+        holds = bool(shown) if kind is PropertyKind.REACHABLE else not shown
+        assert verdict.status is (Status.PROVED if holds else Status.VIOLATED)
+        assert (verdict.witness is not None) == bool(shown)
+        if verdict.witness is not None:
+            assert net.marking(verdict.witness.marking) in shown
+            assert len(verdict.witness.firings) == min(away[m] for m in shown)
+
+
+def recurs(net: Net, truth: nx.MultiDiGraph[Marking], among: frozenset[Marking], fairness: Fairness) -> bool:
+    """Whether a fair run may visit exactly these markings again and again."""
+    part = truth.subgraph(among)
+    if not part.number_of_edges() or not nx.is_strongly_connected(part):
+        return False
+    fired: set[int] = set()
+    for _, _, data in part.edges(data=True):
+        fired.update(data["fired"])
+    enabled = [set(Player(net).may_fire(m)) for m in among]
+    owed = {Fairness.NONE: set[int](), Fairness.WEAK: set.intersection(*enabled), Fairness.STRONG: set.union(*enabled)}
+    return owed[fairness] <= fired
+
+
+def fails(net: Net, truth: nx.MultiDiGraph[Marking], p: Formula, q: Formula, fairness: Fairness) -> bool:
+    """Whether a fair run or a run into a deadlock meets p and then never q, by trying every set of markings."""
+    markings = set(truth)
+    without = markings - satisfying(net, q, markings)
+    part = truth.subgraph(without)
+    ends = {m for m in without if not truth.out_degree(m)}
+    sets = chain.from_iterable(combinations(sorted(without), n) for n in range(1, len(without) + 1))
+    for chosen in sets:
+        if not set(chosen) <= ends and recurs(net, truth, frozenset(chosen), fairness):
+            ends |= set(chosen)
+    return any((nx.descendants(part, m) | {m}) & ends for m in satisfying(net, p, without))
+
+
+@pytest.mark.parametrize("fairness", Fairness)
+@settings(max_examples=120, deadline=None)
+@given(situation=SITUATIONS, p=FORMULAS, q=FORMULAS)
+def test_leads_to_fails_iff_some_set_of_markings_recurs_fairly(
+    fairness: Fairness, situation: tuple[Net, Discipline], p: Formula, q: Formula
+) -> None:
+    net, discipline = situation
+    truth = graph_of(net, discipline)
+    assume(len(truth) <= 10)
+    verdict = decide_property(explore(net, discipline), prop(PropertyKind.LEADS_TO, p, q, fairness))
+    expected = Status.VIOLATED if fails(net, truth, p, q, fairness) else Status.PROVED
+    assert verdict.status is expected
+    if expected is Status.VIOLATED:
+        refutes(net, truth, verdict, (p, q, fairness))
+
+
+def refutes(net: Net, truth: nx.MultiDiGraph[Marking], verdict: Verdict, of: tuple[Formula, Formula, Fairness]) -> None:
+    """The witness is a run of the graph that meets p, never q from there on, and ends or recurs fairly."""
+    assert verdict.witness is not None
+    p, q, fairness = of
+
+    def along(marking: Marking, firings: tuple[tuple[str, ...], ...]) -> list[Marking]:
+        markings = [marking]
+        for names in firings:
+            label: FiringSet = tuple(sorted(net.transition_index[name] for name in names))
+            markings.append(next(to for _, to, d in truth.out_edges(markings[-1], data=True) if d["fired"] == label))
+        return markings
+
+    prefix = along(net.initial_marking, verdict.witness.firings)
+    cycle = along(prefix[-1], verdict.witness.cycle)
+    meets = [k for k, m in enumerate(prefix) if m in satisfying(net, p, {m})]
+    avoided = [k for k in meets if not satisfying(net, q, {*prefix[k:], *cycle})]
+    assert avoided
+    if not verdict.witness.cycle:
+        assert not truth.out_degree(prefix[-1])
+        return
+    assert cycle[0] == cycle[-1]
+    fired = {net.transition_index[name] for names in verdict.witness.cycle for name in names}
+    enabled = [set(Player(net).may_fire(m)) for m in cycle]
+    owed = {Fairness.NONE: set[int](), Fairness.WEAK: set.intersection(*enabled), Fairness.STRONG: set.union(*enabled)}
+    assert owed[fairness] <= fired
+
+
+def shuttle() -> Net:
+    """A token goes between a and b; from a it may leave to c; a second shuttle d-e never stops."""
+    places = tuple(Place(name, marked=name in "ad") for name in "abcde")
+    return Net(
+        "shuttle",
+        places,
+        (
+            Transition("go", ("a",), ("b",)),
+            Transition("back", ("b",), ("a",)),
+            Transition("leave", ("a",), ("c",)),
+            Transition("x", ("d",), ("e",)),
+            Transition("y", ("e",), ("d",)),
+        ),
+    )
+
+
+@pytest.mark.parametrize(
+    ("p", "q", "holds"),
+    [
+        ("a", "b or c", (False, True, True)),  # without fairness the other shuttle may run alone
+        ("a", "c", (False, False, True)),  # `leave` is enabled again and again, never for ever
+        ("c", "a", (False, False, False)),  # what has left does not come back
+        ("false", "false", (True, True, True)),
+    ],
+)
+def test_weak_fairness_serves_what_stays_enabled_and_strong_fairness_what_recurs(
+    p: str, q: str, holds: tuple[bool, bool, bool]
+) -> None:
+    graph = explore(shuttle())
+    of = [prop(PropertyKind.LEADS_TO, parse_formula(p), parse_formula(q), fairness) for fairness in Fairness]
+    assert tuple(decide_property(graph, each).holds for each in of) == holds
+
+
+def test_a_deadlock_after_p_and_before_q_refutes_leads_to_under_any_fairness() -> None:
+    net = Net("n", (Place("a", marked=True), Place("b")), (Transition("t", ("a",), ("b",)),))
+    for fairness in Fairness:
+        verdict = decide_property(
+            explore(net), prop(PropertyKind.LEADS_TO, parse_formula("b"), parse_formula("a"), fairness)
+        )
+        assert verdict.status is Status.VIOLATED
+        assert verdict.witness is not None
+        assert (verdict.witness.firings, verdict.witness.cycle) == ((("t",),), ())
+
+
+def test_the_statement_says_which_fairness_and_that_gates_open() -> None:
+    of = prop(PropertyKind.LEADS_TO, parse_formula("a"), parse_formula("b"), Fairness.STRONG)
+    assert "strong fairness" in statement(of)
+    assert "external gates do open" in statement(of)
+    assert "weak fairness" in statement(replace(of, fairness=Fairness.WEAK))
+
+
+def chain_of(length: int) -> ReachabilityGraph:
+    """A token that goes down a chain of places, explored to its third marking."""
+    places = tuple(Place(f"p{i}", marked=i == 0) for i in range(length))
+    moves = tuple(Transition(f"t{i}", (f"p{i}",), (f"p{i + 1}",)) for i in range(length - 1))
+    return explore(Net("chain", places, moves), budget=Budget(markings=3))
+
+
+@pytest.mark.parametrize(
+    ("kind", "p", "expected"),
+    [
+        (PropertyKind.NEVER, "p2", Status.VIOLATED),
+        (PropertyKind.NEVER, "p7", Status.UNKNOWN),
+        (PropertyKind.ALWAYS, "p0", Status.VIOLATED),
+        (PropertyKind.ALWAYS, "not p7", Status.UNKNOWN),
+        (PropertyKind.REACHABLE, "p1", Status.PROVED),
+        (PropertyKind.REACHABLE, "p7", Status.UNKNOWN),
+        (PropertyKind.ALWAYS_POSSIBLE, "true", Status.UNKNOWN),
+        (PropertyKind.LEADS_TO, "p0", Status.UNKNOWN),
+    ],
+)
+def test_from_a_part_of_the_graph_only_what_a_marking_shows_is_concluded(
+    kind: PropertyKind, p: str, expected: Status
+) -> None:
+    q = parse_formula("true") if kind is PropertyKind.LEADS_TO else None
+    verdict = decide_property(chain_of(9), prop(kind, parse_formula(p), q))
+    assert verdict.status is expected
+    assert (verdict.code == "F3004") == (expected is Status.UNKNOWN)
+    assert ("3 markings" in verdict.bound) == (expected is Status.UNKNOWN)
