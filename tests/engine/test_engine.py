@@ -120,11 +120,13 @@ def nets(draw: st.DrawFn) -> Drawn:
     def row() -> Row:
         kind = draw(st.integers(0, 4))
         inputs, outputs = {0: (everywhere, everywhere), 1: (empty, initial)}.get(kind, (initial, empty))
-        gated = draw(st.integers(0, 3)) == 0
-        permissive, inhibitive = (some(everywhere, 2), some(everywhere, 1)) if gated else ([], [])
-        gates = draw(st.lists(st.tuples(st.integers(0, 2), st.booleans()), max_size=2))
-        literals = gates if draw(st.booleans()) else []
-        return some(inputs, 2), some(outputs, 2), permissive, inhibitive, literals
+        takes, puts = some(inputs, 2), some(outputs, 2)
+        gated = draw(st.integers(0, 2)) == 0
+        permissive, inhibitive = (
+            (some(everywhere + 3 * takes, 2), some(everywhere + 3 * puts, 1)) if gated else ([], [])
+        )
+        literals = draw(st.lists(st.tuples(st.integers(0, 1), st.booleans()), max_size=2))
+        return takes, puts, permissive, inhibitive, literals
 
     return Drawn(count * spread, [row() for _ in range(draw(st.integers(0, 5)))], initial)
 
