@@ -32,6 +32,7 @@ __all__ = ["PnmlImport", "parse_pnml", "read_pnml", "write_pnml"]
 
 SIZE_BYTES_MAX: Final = 256 * 1024 * 1024
 KINDS_MAX: Final = 20
+PROBLEMS_MAX: Final = 100  # enough to read; a file of noise has millions
 
 _NORMAL: Final = frozenset({"", "normal", "timed", "arc", "ptarc", "directed", "flow", "regular", "default"})
 _READ: Final = frozenset({"read", "readarc", "test", "testarc", "activator"})
@@ -92,9 +93,9 @@ class _Import:
         self.capacities: list[str] = []
 
     def refuse(self, record: Record, code: str, message: str, hint: str) -> None:
-        self.problems.append(
-            Diagnostic(code, message, hint, span=self.source.span(record.line, record.column, len(record.tag) + 1))
-        )
+        if len(self.problems) < PROBLEMS_MAX:
+            span = self.source.span(record.line, record.column, len(record.tag) + 1)
+            self.problems.append(Diagnostic(code, message, hint, span=span))
 
     def net(self) -> Net:
         records = self.records
@@ -165,10 +166,10 @@ class _Import:
         """For each identifier that an arc may name, the identifier of the place or transition that is meant."""
         resolved: dict[str, str] = {}
         for start in nodes:
-            way: list[str] = []
+            way: dict[str, None] = {}  # ordered, and quick to ask on a long chain
             one = start
             while one not in resolved and one in nodes and nodes[one].tag.startswith("reference") and one not in way:
-                way.append(one)
+                way[one] = None
                 one = nodes[one].attributes.get("ref", "")
             target = resolved.get(one, one)
             kind = "place" if nodes[start].tag in {"place", "referencePlace"} else "transition"
@@ -188,7 +189,8 @@ class _Import:
                 continue
             ends = [record.attributes.get("source", ""), record.attributes.get("target", "")]
             if unknown := [end for end in ends if end not in nodes]:
-                hint = did_you_mean(unknown[0], list(nodes)) + "an arc names two identifiers of the file"
+                known = list(nodes) if len(self.problems) < PROBLEMS_MAX else []
+                hint = did_you_mean(unknown[0], known) + "an arc names two identifiers of the file"
                 message = f"{described(record)}: there is no place or transition {quoted(unknown[0])}"
                 self.refuse(record, "F2002", message, hint)
                 continue
