@@ -245,6 +245,7 @@ BOMB = '<!DOCTYPE x [<!ENTITY a "aa"><!ENTITY b "&a;&a;">]><pnml><net id="n"><pl
         (pnml('<place id="p"><initialMarking><text>2</text></initialMarking></place>'), "F2006"),
         (pnml('<place id="p"><initialMarking><text>-1</text></initialMarking></place>'), "F1013"),
         (pnml('<place id="p"><initialMarking><value>Default,1,red,1</value></initialMarking></place>'), "F1013"),
+        (pnml('<place id="p"><initialMarking><value>red,1</value></initialMarking></place>'), "F1013"),
         (pnml('<referencePlace id="r" ref="s"/><referencePlace id="s" ref="r"/>' + T + arc("r", "t")), "F1013"),
         (pnml('<referencePlace id="r" ref="t"/>' + T), "F1013"),
     ],
