@@ -44,8 +44,20 @@ def unowned(net: Net) -> tuple[str, ...]:
     return tuple(transition.name for transition in net.transitions if not participants(net, transition))
 
 
+def controller_numbers(net: Net) -> dict[str, int]:
+    """The number of each controller in the names of parts: 0 is the coordinator's own, the others count from 1.
+
+    >>> from firable.nets.net import Controller, Net
+    >>> controller_numbers(Net("n", controllers=(Controller("robot"), Controller("system", coordinator=True))))
+    {'system': 0, 'robot': 1}
+    """
+    others = (controller.name for controller in net.controllers if not controller.coordinator)
+    own = {net.coordinator.name: 0} if net.coordinator else {}
+    return own | {name: number for number, name in enumerate(others, start=1)}
+
+
 def part_name(controller: int, number: int) -> str:
-    """The name of the part of global transition `number` in the controller at this position of the net.
+    """The name of the part of global transition `number` in the controller of this number.
 
     >>> part_name(0, 2), part_name(3, 2)
     ('t0-2', 't3-23')
@@ -66,14 +78,15 @@ def split(net: Net) -> Decomposition:
         raise InputError(problems)
     taking_part = {transition.name: participants(net, transition) for transition in net.transitions}
     numbers = _numbers(net, [name for name, owners in taking_part.items() if len(owners) > 1])
-    positions = {controller.name: c for c, controller in enumerate(net.controllers)}
+    controllers = controller_numbers(net)
 
     parts: dict[str, tuple[Part, ...]] = {}
     for name, owners in taking_part.items():
         if len(owners) == 1:
             parts[name] = (Part(owners[0], name),)
         else:
-            parts[name] = tuple(Part(owner, part_name(positions[owner], numbers[name])) for owner in owners)
+            numbered = sorted((controllers[owner], owner) for owner in owners)
+            parts[name] = tuple(Part(owner, part_name(number, numbers[name])) for number, owner in numbered)
     if clashes := list(_clashes(parts)):
         raise InputError(clashes)
 

@@ -104,10 +104,10 @@ def test_controller_that_owns_only_a_gate_takes_part_without_moving_a_token() ->
     decomposition = split(net)
     assert participants(net, net.transition("l")) == ("c1", "c2")
     assert [row.parts for row in decomposition.table] == [
-        (Part("c1", "t0-1"), Part("c2", "t1-11")),
-        (Part("c1", "t0-2"), Part("c2", "t1-21")),
+        (Part("c1", "t1-11"), Part("c2", "t2-12")),
+        (Part("c1", "t1-21"), Part("c2", "t2-22")),
     ]
-    voter = decomposition.subnet("c2").transition("t1-11")
+    voter = decomposition.subnet("c2").transition("t2-12")
     assert (voter.inputs, voter.outputs, voter.inhibitive) == ((), (), ("c2.y",))
 
 
@@ -120,14 +120,14 @@ def test_signal_owner_takes_part() -> None:
         (Controller("a"), Controller("b")),
     )
     decomposition = split(net)
-    assert decomposition.table[0].parts == (Part("a", "t0-1"), Part("b", "t1-11"))
-    assert decomposition.subnet("b").transition("t1-11").external == (ExternalGate("b.s", wanted=False),)
+    assert decomposition.table[0].parts == (Part("a", "t1-11"), Part("b", "t2-12"))
+    assert decomposition.subnet("b").transition("t2-12").external == (ExternalGate("b.s", wanted=False),)
 
 
 def test_local_rival_of_a_global_transition_is_decided_by_the_coordinator() -> None:
     decomposition = split(load_net("local_conflict"))
     assert [(row.name, row.is_global, row.parts) for row in decomposition.coordinated] == [
-        ("G", True, (Part("c1", "t0-1"), Part("c2", "t1-11"))),
+        ("G", True, (Part("c1", "t1-11"), Part("c2", "t2-12"))),
         ("l", False, (Part("c1", "l"),)),
     ]
     assert [row.name for row in decomposition.table] == ["G"]
@@ -160,7 +160,7 @@ def test_unnumbered_global_transitions_get_the_next_free_numbers_in_order() -> N
     net = Net("n", places, (*map(across, names, names.values()), local), (), (Controller("a"), Controller("b")))
     decomposition = split(net)
     assert [(row.name, row.number) for row in decomposition.table] == [("g", 4), ("h", 1), ("i", 5), ("j", 3), ("k", 6)]
-    assert decomposition.table[0].parts == (Part("a", "t0-4"), Part("b", "t1-41"))
+    assert decomposition.table[0].parts == (Part("a", "t1-41"), Part("b", "t2-42"))
 
 
 def test_everything_without_an_owner_is_reported_at_once() -> None:
@@ -177,11 +177,11 @@ def test_local_transition_with_the_name_of_a_part_is_refused() -> None:
     places = (Place("a.p", "a", marked=True), Place("b.q", "b"))
     crossing = Transition("G", ("a.p",), ("b.q",))
     controllers = (Controller("a"), Controller("b"))
-    named = Net("n", places, (crossing, Transition("t1-11", ("b.q",))), controllers=controllers)
-    assert codes(named) == [("F4001", ("transitions", "t1-11"))]
+    named = Net("n", places, (crossing, Transition("t2-12", ("b.q",))), controllers=controllers)
+    assert codes(named) == [("F4001", ("transitions", "t2-12"))]
     # The name of the whole is not kept in the subnets, so a global transition may bear it.
-    whole = Net("n", places, (replace(crossing, name="t1-11"),), controllers=controllers)
-    assert split(whole).table[0].parts[1] == Part("b", "t1-11")
+    whole = Net("n", places, (replace(crossing, name="t2-12"),), controllers=controllers)
+    assert split(whole).table[0].parts[1] == Part("b", "t2-12")
 
 
 def test_completion_signal_of_another_controller_is_refused() -> None:
@@ -200,3 +200,11 @@ def test_negative_number_is_refused() -> None:
     crossing = Transition("G", ("a.p",), ("b.q",), number=-1)
     net = Net("n", places, (crossing,), controllers=(Controller("a"), Controller("b")))
     assert codes(net) == [("F4001", ("transitions", "G", "number"))]
+
+
+def test_the_coordinator_is_number_0_wherever_it_stands_in_the_file() -> None:
+    places = (Place("robot.p", "robot", marked=True), Place("system.q", "system"))
+    crossing = Transition("t", ("robot.p",), ("system.q",))
+    controllers = (Controller("robot"), Controller("system", coordinator=True))
+    row = split(Net("n", places, (crossing,), controllers=controllers)).table[0]
+    assert row.parts == (Part("system", "t0-1"), Part("robot", "t1-11"))
