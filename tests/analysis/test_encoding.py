@@ -1,11 +1,13 @@
-"""The transition relations have exactly the edges that the reference player plays."""
+"""The transition relations have exactly the edges that the reference player plays.
+
+The nets of a small scope are in `tests/conformance`; here are gates, models and size.
+"""
 
 from collections.abc import Callable, Iterator
 
 import pytest
 from hypothesis import given, settings
 from support.generate import nets
-from support.small_scope import all_nets, net_with
 
 from firable.analysis.encoding import Relation, interleaving_relation, step_relation
 from firable.analysis.smt import Answer, Term, Terms, decide, value
@@ -27,15 +29,6 @@ def played(net: Net, *, step: bool) -> set[Edge]:
     }
 
 
-def as_term(relation: Relation, edges: set[Edge]) -> Term:
-    return relation.terms.disjunction(
-        relation.terms.conjunction(
-            [relation.is_marking(before), relation.is_firing(fired), relation.is_marking(after, after=True)]
-        )
-        for before, fired, after in sorted(edges)
-    )
-
-
 def solved(relation: Relation) -> Iterator[Edge]:
     """The edges of all models of the relation, found one by one."""
     found: list[Term] = []
@@ -46,27 +39,6 @@ def solved(relation: Relation) -> Iterator[Edge]:
         seen = [relation.is_marking(before), relation.is_firing(fired), relation.is_marking(after, after=True)]
         found.append(terms.negation(terms.conjunction(seen)))
     assert decision.answer is Answer.UNSAT
-
-
-@pytest.mark.parametrize(("encode", "step"), DISCIPLINES)
-@pytest.mark.parametrize("n_transitions", [0, 1, 2])
-def test_relation_of_every_small_net_is_that_of_the_player(encode: Encoder, step: bool, n_transitions: int) -> None:
-    """All nets with two places and two transitions, some hundred of them in one question to the solver."""
-    terms = Terms()
-    asked: list[Term] = []
-
-    def differing() -> Answer:
-        return decide([terms.disjunction(asked)]).answer
-
-    for shapes in all_nets(2, n_transitions):
-        net = net_with(2, shapes)
-        relation = encode(net, terms)
-        asked.append(terms.differ(relation.term, as_term(relation, played(net, step=step))))
-        if len(asked) == 400:
-            assert differing() is Answer.UNSAT
-            asked.clear()
-            terms = Terms()
-    assert differing() is Answer.UNSAT
 
 
 @pytest.mark.parametrize(("encode", "step"), DISCIPLINES)
