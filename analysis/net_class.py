@@ -1,0 +1,113 @@
+"""The class of a net: state machine, marked graph, free choice and their extensions.
+
+The classes are conditions on the arcs alone, as in Murata (1989, "Petri nets: properties, analysis and applications"):
+
+- *state machine*: each transition has one input and one output place: choice, no synchronisation;
+- *marked graph*: each place has one producer and one consumer: synchronisation, no choice;
+- *free choice*: a place with several consumers is the only input of each;
+- *extended free choice*: places that share a consumer share all consumers;
+- *asymmetric choice*: of two places that share a consumer, one has all consumers of the other.
+
+Each is contained in the next of the last three. What makes a class worth knowing are its theorems (Commoner: a
+free-choice net is live iff each of its siphons holds a marked trap), and they are about ordinary nets. Gates put a
+net outside: an internal gate is a read or inhibitor arc, an external gate makes a choice that the class calls free
+depend on a signal. So does the contact rule, unless the net is contact-free. What stands in the way of the theorems
+is listed; the alternative, counting gates as arcs, would name a class whose theorems do not hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import networkx as nx
+
+from firable.nets.net import Net
+
+
+@dataclass(frozen=True, slots=True)
+class NetClass:
+    """The classes that the arcs of a net belong to, and what keeps their theorems from holding of it.
+
+    `pure`: no self-loops. `connected` and `strongly_connected` are of the graph of places and transitions, by arcs.
+    """
+
+    state_machine: bool
+    marked_graph: bool
+    free_choice: bool
+    extended_free_choice: bool
+    asymmetric_choice: bool
+    pure: bool
+    connected: bool
+    strongly_connected: bool
+    outside: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The narrowest class, in words."""
+        for holds, name in (
+            (self.state_machine and self.marked_graph, "state machine and marked graph"),
+            (self.state_machine, "state machine"),
+            (self.marked_graph, "marked graph"),
+            (self.free_choice, "free choice"),
+            (self.extended_free_choice, "extended free choice"),
+            (self.asymmetric_choice, "asymmetric choice"),
+        ):
+            if holds:
+                return name
+        return "general"
+
+
+def net_class(net: Net, *, contact_free: bool | None = None) -> NetClass:
+    """The classes of a net by its arcs; `contact_free` is what is known of that verdict (None: nothing).
+
+    >>> from firable.nets.net import Net, Place, Transition
+    >>> net = Net("n", (Place("p", marked=True), Place("q")),
+    ...           (Transition("t", ("p",), ("q",)), Transition("u", ("q",), ("p",))))
+    >>> net_class(net, contact_free=True).name
+    'state machine and marked graph'
+    """
+    graph = arcs(net)
+    consumers = [frozenset(transitions) for transitions in net.consumers]
+    sharing = [(a, b) for a, b in combinations(consumers, 2) if a & b]
+    empty = not graph.number_of_nodes()
+    return NetClass(
+        state_machine=all(len(t.inputs) == 1 == len(t.outputs) for t in net.transitions),
+        marked_graph=all(len(c) == 1 == len(p) for c, p in zip(net.consumers, net.producers, strict=True)),
+        free_choice=all(
+            len(net.transitions[t].inputs) == 1 for group in net.consumers if len(group) > 1 for t in group
+        ),
+        extended_free_choice=all(a == b for a, b in sharing),
+        asymmetric_choice=all(a <= b or b <= a for a, b in sharing),
+        pure=not any(set(t.inputs) & set(t.outputs) for t in net.transitions),
+        connected=empty or nx.is_weakly_connected(graph),
+        strongly_connected=empty or nx.is_strongly_connected(graph),
+        outside=tuple(_outside(net, contact_free)),
+    )
+
+
+def arcs(net: Net) -> nx.DiGraph[tuple[str, str]]:
+    """The places and transitions of a net as a directed graph, by arcs only; nodes are ("place", name) and so on."""
+    graph: nx.DiGraph[tuple[str, str]] = nx.DiGraph()
+    graph.add_nodes_from(("place", place.name) for place in net.places)
+    for transition in net.transitions:
+        node = ("transition", transition.name)
+        graph.add_node(node)
+        graph.add_edges_from((("place", place), node) for place in transition.inputs)
+        graph.add_edges_from((node, ("place", place)) for place in transition.outputs)
+    return graph
+
+
+def _outside(net: Net, contact_free: bool | None) -> Iterator[str]:
+    """Why the theorems of the classes do not hold of this net as it is."""
+    if any(t.permissive or t.inhibitive for t in net.transitions):
+        yield "it has internal gates, which are read and inhibitor arcs"
+    if any(t.external for t in net.transitions):
+        yield "it has external gates, on which choices depend"
+    if any(set(t.inputs) & set(t.outputs) for t in net.transitions):
+        yield "it has self-loops, which never fire here and would in an ordinary net"
+    if contact_free is False:
+        yield "it is not contact-free: an ordinary net would fire where this one may not"
+    elif contact_free is None:
+        yield "it is not known to be contact-free"

@@ -1,0 +1,117 @@
+"""Invariants: minimal, exact, complete; against exhaustive search on small nets and the figures of the cell."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+from hypothesis import given, settings
+from support.generate import nets
+from support.generate_sparse import sparse_nets
+from support.reference import load_net, reference_names
+
+from firable.analysis.invariants import incidence, p_invariants, rank, t_invariants
+from firable.nets.net import Net, Place, Transition
+from firable.semantics.player import Player
+
+
+def test_the_one_robot_cell_has_68_minimal_p_invariants_of_weight_one_that_cover_every_place() -> None:
+    net = load_net("cell1")
+    found = p_invariants(net)
+    assert (len(found.minimal), found.dimension, found.complete) == (68, 14, True)
+    assert {weight for invariant in found.minimal for _, weight in invariant.weights} == {1}
+    assert found.uncovered([place.name for place in net.places]) == ()
+
+
+@pytest.mark.parametrize("name", reference_names())
+def test_the_tokens_of_an_invariant_are_the_same_in_every_reachable_marking(name: str) -> None:
+    net = load_net(name)
+    markings = Player(net).reachable()
+    for invariant in p_invariants(net).minimal:
+        assert {invariant.tokens(net, marking) for marking in markings} == {invariant.tokens(net, net.initial_marking)}
+
+
+def brute_force(matrix: tuple[tuple[int, ...], ...], most: int) -> set[tuple[int, ...]]:
+    """The solutions of minimal support with entries up to `most` and no common divisor, by trying all vectors."""
+    solutions = [
+        y
+        for y in product(range(most + 1), repeat=len(matrix))
+        if any(y) and not any(sum(a * b for a, b in zip(y, c, strict=True)) for c in zip(*matrix, strict=True))
+    ]
+    supports = {frozenset(i for i, x in enumerate(y) if x) for y in solutions}
+    minimal = {s for s in supports if not any(other < s for other in supports)}
+    smallest: dict[frozenset[int], tuple[int, ...]] = {}
+    for y in sorted(solutions, key=sum):
+        smallest.setdefault(frozenset(i for i, x in enumerate(y) if x), y)
+    return {smallest[s] for s in minimal}
+
+
+def check_both_kinds(net: Net, most: int) -> None:
+    matrix = incidence(net)
+    places, transitions = [p.name for p in net.places], [t.name for t in net.transitions]
+    turned = tuple(tuple(row[t] for row in matrix) for t in range(len(transitions)))
+    for found, names, rows in ((p_invariants(net), places, matrix), (t_invariants(net), transitions, turned)):
+        vectors = {tuple(dict(invariant.weights).get(name, 0) for name in names) for invariant in found.minimal}
+        small = {vector for vector in vectors if max(vector) <= most}
+        assert found.complete
+        assert len(vectors) == len(found.minimal)
+        assert small == {y for y in brute_force(rows, most) if y in vectors or not dominated(y, vectors)}
+
+
+def dominated(y: tuple[int, ...], vectors: set[tuple[int, ...]]) -> bool:
+    """Whether a solution of larger entries, out of the search's reach, has a smaller support."""
+    support = {i for i, x in enumerate(y) if x}
+    return any(max(v) > 1 and {i for i, x in enumerate(v) if x} < support for v in vectors)
+
+
+@settings(max_examples=60, deadline=None)
+@given(nets(most_transitions=4))
+def test_minimal_invariants_are_those_that_exhaustive_search_finds(net: Net) -> None:
+    check_both_kinds(net, 3)
+
+
+@settings(max_examples=40, deadline=None)
+@given(sparse_nets())
+def test_minimal_invariants_of_rings_are_those_that_exhaustive_search_finds(net: Net) -> None:
+    check_both_kinds(net, 1 if len(net.places) + len(net.transitions) > 12 else 2)
+
+
+def test_a_self_loop_and_a_gate_leave_the_incidence_alone() -> None:
+    places = (Place("p"), Place("q"))
+    net = Net("n", places, (Transition("t", ("p",), ("p",), ("q",)),))
+    assert incidence(net) == ((0,), (0,))
+    assert [str(invariant) for invariant in p_invariants(net).minimal] == ["p", "q"]
+    assert [str(invariant) for invariant in t_invariants(net).minimal] == ["t"]
+
+
+def test_weights_larger_than_one_are_exact() -> None:
+    # One token of p becomes one of q and one of r, each becomes one of s, and two of s, one by way of u, make one of p.
+    places = tuple(Place(name) for name in "pqrsu")
+    moves = (
+        Transition("split", ("p",), ("q", "r")),
+        Transition("left", ("q",), ("s",)),
+        Transition("right", ("r",), ("s",)),
+        Transition("put_by", ("s",), ("u",)),
+        Transition("join", ("s", "u"), ("p",)),
+    )
+    found = p_invariants(Net("n", places, moves))
+    assert [str(invariant) for invariant in found.minimal] == ["2 p + q + r + s + u"]
+
+
+def test_past_the_bound_on_rows_the_result_says_that_it_is_incomplete_and_lists_only_minimal_ones() -> None:
+    net = load_net("cell1")
+    whole, part = p_invariants(net), p_invariants(net, rows_max=40)
+    assert not part.complete
+    assert part.dimension == whole.dimension
+    assert set(part.minimal) < set(whole.minimal)
+
+
+def test_the_empty_net_has_no_invariants() -> None:
+    for found in (p_invariants(Net("empty")), t_invariants(Net("empty"))):
+        assert (found.minimal, found.dimension, found.complete) == ((), 0, True)
+
+
+def test_the_rank_is_exact() -> None:
+    assert rank(((1, 2), (2, 4))) == 1
+    assert rank(((1, 2), (2, 5))) == 2
+    assert rank(()) == 0

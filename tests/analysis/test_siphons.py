@@ -1,0 +1,115 @@
+"""Siphons and traps against all sets of places; the deadlock-trap argument against the reachability graph."""
+
+from __future__ import annotations
+
+from itertools import chain, combinations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.generate import nets
+from support.generate_sparse import sparse_nets
+from support.reference import load_net, reference_names
+
+from firable.analysis.check import check
+from firable.analysis.siphons import deadlock_trap, largest_siphon, largest_trap, minimal_siphons, minimal_traps
+from firable.nets.net import Net, Place, Transition
+from firable.nets.verdict import Status
+from firable.semantics.player import Player
+
+NETS = st.one_of(nets(), sparse_nets())
+
+
+def subsets(net: Net) -> list[frozenset[str]]:
+    names = [place.name for place in net.places]
+    return [frozenset(s) for s in chain.from_iterable(combinations(names, n) for n in range(len(names) + 1))]
+
+
+def is_siphon(net: Net, places: frozenset[str]) -> bool:
+    return all(places & set(t.inputs) for t in net.transitions if places & set(t.outputs))
+
+
+def is_trap(net: Net, places: frozenset[str]) -> bool:
+    return all(places & set(t.outputs) for t in net.transitions if places & set(t.inputs))
+
+
+def minimal(sets: list[frozenset[str]]) -> set[frozenset[str]]:
+    return {s for s in sets if s and not any(other < s for other in sets if other)}
+
+
+@settings(max_examples=120, deadline=None)
+@given(NETS)
+def test_minimal_siphons_and_traps_are_those_among_all_sets_of_places(net: Net) -> None:
+    siphons, traps = minimal_siphons(net), minimal_traps(net)
+    assert siphons.complete
+    assert traps.complete
+    assert {frozenset(s) for s in siphons.minimal} == minimal([s for s in subsets(net) if is_siphon(net, s)])
+    assert {frozenset(s) for s in traps.minimal} == minimal([s for s in subsets(net) if is_trap(net, s)])
+
+
+@settings(max_examples=60, deadline=None)
+@given(NETS)
+def test_the_largest_siphon_and_trap_are_the_union_of_all_within(net: Net) -> None:
+    for places in subsets(net)[:16]:
+        inside = [s for s in subsets(net) if s <= places]
+        trap = frozenset[str]().union(*(s for s in inside if is_trap(net, s)))
+        siphon = frozenset[str]().union(*(s for s in inside if is_siphon(net, s)))
+        assert set(net.names(largest_trap(net, net.marking(places)))) == trap
+        assert set(net.names(largest_siphon(net, net.marking(places)))) == siphon
+
+
+@settings(max_examples=150, deadline=None)
+@given(sparse_nets(signals=True))
+def test_where_the_premises_hold_the_property_excludes_deadlock(net: Net) -> None:
+    report = check(net)
+    found = deadlock_trap(net, contact_free=report.verdict("contact-free").holds)
+    marked = [s for s in subsets(net) if is_trap(net, s) and net.marking(s) & net.initial_marking]
+    assert found.holds == all(any(trap <= s for trap in marked) for s in subsets(net) if s and is_siphon(net, s))
+    if found.excludes_deadlock:
+        assert report.verdict("deadlock-free").status is Status.PROVED
+
+
+@pytest.mark.parametrize("name", reference_names())
+def test_an_empty_siphon_stays_empty_and_a_marked_trap_marked_in_every_reference_net(name: str) -> None:
+    net = load_net(name)
+    graph = Player(net).reachable()
+    for siphon in minimal_siphons(net).minimal:
+        mask = net.marking(siphon)
+        assert not any(not m & mask and target & mask for m, edges in graph.items() for _, target in edges)
+    for trap in minimal_traps(net).minimal:
+        mask = net.marking(trap)
+        assert not any(m & mask and not target & mask for m, edges in graph.items() for _, target in edges)
+
+
+def test_the_cell_is_proved_free_of_deadlock_and_the_late_one_shows_the_siphon_that_runs_empty() -> None:
+    safe = deadlock_trap(load_net("cell1"), contact_free=True)
+    late = deadlock_trap(load_net("cell1_mc_late"), contact_free=True)
+    assert safe.excludes_deadlock
+    assert not late.holds
+    net = load_net("cell1_mc_late")
+    (deadlock,) = (marking for marking, edges in Player(net).reachable().items() if not edges)
+    assert any(not net.marking(siphon) & deadlock for siphon in late.without_marked_trap)
+
+
+def test_gates_contact_and_self_loops_are_missing_premises() -> None:
+    ring = (Transition("t", ("p",), ("q",)), Transition("u", ("q",), ("p",)))
+    places = (Place("p", marked=True), Place("q"))
+    assert deadlock_trap(Net("n", places, ring), contact_free=True).excludes_deadlock
+    assert not deadlock_trap(Net("n", places, ring)).excludes_deadlock
+    gated = (Transition("t", ("p",), ("q",), inhibitive=("p",)), ring[1])
+    found = deadlock_trap(Net("n", places, gated), contact_free=True)
+    assert found.holds
+    assert not found.excludes_deadlock
+    assert check(Net("n", places, gated)).figures.deadlocks == 1
+    assert not deadlock_trap(Net("n", places), contact_free=True).excludes_deadlock
+
+
+def test_past_the_bound_on_their_number_the_list_is_said_to_be_incomplete() -> None:
+    net = load_net("cell1")
+    whole, part = minimal_siphons(net), minimal_siphons(net, most=5)
+    assert whole.complete
+    assert not part.complete
+    assert len(part.minimal) == 5
+    assert set(part.minimal) < set(whole.minimal)
+    assert not deadlock_trap(net, contact_free=True, most=5).holds
+    assert minimal_siphons(net, most=len(whole.minimal)).complete
