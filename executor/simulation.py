@@ -4,7 +4,7 @@ Messages are delivered in any order, after any time, and if asked for lost or do
 signals change whenever they like. All of it is drawn from one seeded source, so a seed is a run. Checked in every run:
 
 - the joint trace is a trace of the central net (the caller replays it), with the marking that the controllers are in;
-- no progress is lost: once the network is quiet, something fires if anything is enabled.
+- no progress is lost: once the network is quiet, something fires if anything is enabled, and every sensor is read.
 
 The machines are passed in as classes, so that a test can plant a fault in one and see that this module finds it. The
 alternative, unit tests of single messages, only finds the orders of messages that somebody has thought of.
@@ -45,7 +45,7 @@ class Network:
 
 
 class ProgressLostError(AssertionError):
-    """A transition is enabled for good, the network is quiet, and nothing fires."""
+    """The network is quiet, and an enabled transition is not fired, or what a sensor shows is not taken in."""
 
 
 class Simulation:
@@ -180,6 +180,10 @@ class Simulation:
         return sum(isinstance(event, Fired) for event in self.events)
 
     def _check_progress(self) -> None:
+        for signal, value in self.values.items():
+            controller = self.controllers[self.owner_of[signal]]
+            if bool(controller.word & controller.player.signal_bit(signal)) != value:
+                raise ProgressLostError(f"'{signal}' is {int(value)}, and {controller.name} has not taken it in")
         enabled, before = self.enabled(), self._firings()
         if enabled:
             self._quieten(fire=True)

@@ -19,6 +19,7 @@ from firable.executor.messages import (
     Message,
     ProtocolError,
     Readiness,
+    Report,
     Sending,
     Taken,
     ToCoordinator,
@@ -30,7 +31,18 @@ from firable.executor.token_player import Compiled, TokenPlayer
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Arbiter, ArbitrationRule, Controller, Net, Place, Transition
+from firable.nets.net import (
+    Arbiter,
+    ArbitrationRule,
+    Command,
+    Controller,
+    ExternalGate,
+    Net,
+    Place,
+    Signal,
+    SignalKind,
+    Transition,
+)
 from firable.semantics.player import Player
 from firable.semantics.trace import replay
 
@@ -173,6 +185,13 @@ class ForgetsVotes(LocalController):
         return number in self.closed and number not in self.promises and number % 2 == 0
 
 
+class ForgetsSignals(LocalController):
+    """A signal that changed during a promise is never taken in."""
+
+    def _release(self) -> Iterator[Effect]:
+        yield from ()
+
+
 class StaleVotes(Coordinator):
     """O5 forgotten: a vote of an earlier round counts for the present one."""
 
@@ -248,7 +267,16 @@ def found(
 
 @pytest.mark.parametrize(
     "fault",
-    [NoLock, ReadsUnlocked, SignalsUnlocked, AppliesTwice, AppliesBlindly, VotesFromMemory, ForgetsVotes],
+    [
+        NoLock,
+        ReadsUnlocked,
+        SignalsUnlocked,
+        AppliesTwice,
+        AppliesBlindly,
+        VotesFromMemory,
+        ForgetsVotes,
+        ForgetsSignals,
+    ],
 )
 def test_planted_fault_in_a_controller_is_found(fault: Callable[[Decomposition, str], LocalController]) -> None:
     assert found(controller=fault)
@@ -375,6 +403,78 @@ def test_completion_of_an_earlier_command_is_stale() -> None:
     decided(controller, 0, "G2")
     assert controller.read("robot.at_cv1", value=True, entry=0) == []
     assert controller.read("robot.at_cv1", value=True, entry=1) == [Taken("robot.at_cv1", value=True)]
+
+
+def test_value_from_before_a_command_is_not_taken_for_its_completion() -> None:
+    done = Signal("a.done", "a", SignalKind.COMPLETION)
+    net = Net(
+        "net",
+        (Place("a.p", "a", marked=True), Place("a.q", "a", command=Command("A", "GO"), completion="a.done")),
+        (
+            Transition("G", ("a.p",), ("a.q",), external=(ExternalGate("a.done", wanted=False), ExternalGate("b.s"))),
+            Transition("back", ("a.q",), ("a.p",), external=(ExternalGate("a.done"),)),
+        ),
+        (done, Signal("b.s", "b")),
+        (Controller("a"), Controller("b")),
+    )
+    controller = LocalController(split(net), "a")
+    asked(controller, 0, "G")
+    assert controller.read("a.done", value=True) == []  # latched: the promise reads it
+    decided(controller, 0, "G")
+    assert controller.fire() == []
+    controller.read("a.done", value=True, entry=1)
+    assert controller.fire() == [Firing("back")]
+
+
+def test_rounds_side_by_side_never_meet_at_a_promise() -> None:
+    class Alone(LocalController):
+        def _vote(self, request: VoteRequest) -> Iterator[Effect]:
+            asked_for = [self.parts[name] for name in request.transitions]
+            if not self._is_closed(request.round) and request.round not in self.promises:
+                assert not any(self._disturbs_promises(part) for part in asked_for)
+            yield from super()._vote(request)
+
+    for seed in range(150):
+        check(Simulation(split(owned_net(seed)), seed, NETWORKS[seed % 4], controller=Alone), 300)
+
+
+def test_permit_for_one_firing_lets_one_of_two_open_rounds_commit() -> None:
+    places = ("a.p", "a.q", "a.r", "a.s", "b.p", "b.q", "b.r", "b.s")
+    both = (Transition("G", ("a.p", "b.p"), ("a.q", "b.q")), Transition("H", ("a.r", "b.r"), ("a.s", "b.s")))
+    decomposition = split(net_of(" ".join(places), "a.p b.p a.r b.r", *both))
+    coordinator = Coordinator(decomposition)
+    ready = Readiness(0, frozenset({"G", "H"}))
+    assert coordinator.receive(Report("a", ready)) == []
+    requests = coordinator.receive(Report("b", ready))
+    assert {(r.controller, r.transitions) for r in requests if isinstance(r, VoteRequest)} == {
+        (controller, (name,)) for controller in "ab" for name in "GH"
+    }
+    effects = coordinator.permit(1)
+    for request in requests:
+        if isinstance(request, VoteRequest):
+            vote = Vote(request.controller, request.round, frozenset(request.transitions), ready)
+            effects += coordinator.receive(vote)
+    assert [effect for effect in effects if isinstance(effect, Firing)] == [Firing("G")]
+    assert {effect.committed for effect in effects if isinstance(effect, Decision)} == {"G", None}
+
+
+def test_request_of_a_forgotten_round_gets_no_vote() -> None:
+    controller = LocalController(decomposition_of("ring"), "c1")
+    decided(controller, 0, None)
+    controller.receive(Decision("c1", 1, None, 1, -1))  # every round below 1 is closed
+    assert controller.closed == {1}
+    assert asked(controller, 0, "G") == []
+    assert controller.promises == {}
+
+
+def test_transition_that_is_always_enabled_does_not_keep_others_from_firing() -> None:
+    there_and_back = (
+        *(Transition("t", ("a.p",), ("a.q",)), Transition("u", ("a.q",), ("a.p",))),
+        *(Transition("v", ("a.r",), ("a.s",)), Transition("w", ("a.s",), ("a.r",))),
+    )
+    controller = LocalController(split(net_of("a.p a.q a.r a.s", "a.p a.r", *there_and_back)), "a")
+    fired = [effect.transition for _ in range(40) for effect in controller.fire() if isinstance(effect, Firing)]
+    assert sorted(fired) == sorted("tuvw" * 10)
 
 
 def test_closed_rounds_are_forgotten() -> None:
