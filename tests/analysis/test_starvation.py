@@ -1,0 +1,101 @@
+"""Starvation under the arbiters: the eager run, who is passed over, and when nothing can be said."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.generate_sparse import sparse_nets
+
+from firable.analysis.check import check
+from firable.analysis.reachability import explore
+from firable.analysis.starvation import EagerRun, GatesCannotBeOpenError, eager_run, starved
+from firable.nets.net import Arbiter, ArbitrationRule, ExternalGate, Net, Place, Signal, Transition
+from firable.nets.verdict import Status
+from firable.semantics.conflict import jointly_openable
+from firable.semantics.player import Player
+from firable.semantics.trace import Discipline
+
+
+def two_ways(*arbiters: Arbiter) -> Net:
+    """A token that goes from p by t1 to a or by t2 to b, and back."""
+    places = (Place("p", marked=True), Place("a"), Place("b"))
+    moves = (
+        Transition("t1", ("p",), ("a",)),
+        Transition("t2", ("p",), ("b",)),
+        Transition("t3", ("a",), ("p",)),
+        Transition("t4", ("b",), ("p",)),
+    )
+    return Net("two-ways", places, moves, arbiters=arbiters)
+
+
+def test_a_fixed_priority_starves_and_rotation_does_not() -> None:
+    priority = Arbiter("p", ("t2", "t1"), ArbitrationRule.PRIORITY)
+    verdict = check(two_ways(priority)).verdict("starvation")
+    assert (verdict.status, verdict.subjects) == (Status.VIOLATED, ("t1", "t3"))
+    assert verdict.witness is not None
+    assert verdict.witness.cycle == (("t2",), ("t4",))
+    rotation = Arbiter("p", ("t2", "t1"), ArbitrationRule.ROTATION)
+    assert check(two_ways(rotation)).verdict("starvation").holds
+
+
+def test_without_an_arbiter_the_order_of_the_file_is_the_priority() -> None:
+    assert check(two_ways()).verdict("starvation").subjects == ("t2", "t4")
+
+
+def test_a_specified_order_serves_each_as_often_as_it_is_named() -> None:
+    run = eager_run(two_ways(Arbiter("o", ("t1", "t1", "t2"), ArbitrationRule.ORDER)))
+    fired = [step[0] for step in run.first(12)]
+    assert fired == ["t1", "t3", "t1", "t3", "t2", "t4"] * 2
+
+
+def test_an_effective_conflict_warns_only_where_no_arbiter_names_it() -> None:
+    named = check(two_ways(Arbiter("p", ("t2", "t1")))).verdict("effective-conflicts")
+    unnamed = check(two_ways()).verdict("effective-conflicts")
+    assert (named.status, str(named.weight)) == (Status.VIOLATED, "information")
+    assert (unnamed.status, str(unnamed.weight)) == (Status.VIOLATED, "warning")
+    assert "t1 and t2" in unnamed.hint
+
+
+def test_gates_that_cannot_all_be_open_leave_starvation_unknown() -> None:
+    places = (Place("p", marked=True), Place("q"))
+    moves = (
+        Transition("t", ("p",), ("q",), external=(ExternalGate("s"),)),
+        Transition("u", ("p",), ("q",), external=(ExternalGate("s", wanted=False),)),
+        Transition("v", ("q",), ("p",)),
+    )
+    net = Net("n", places, moves, (Signal("s"),))
+    with pytest.raises(GatesCannotBeOpenError):
+        eager_run(net)
+    assert check(net).verdict("starvation").status is Status.UNKNOWN
+
+
+def test_a_run_that_is_cut_off_says_so() -> None:
+    run = eager_run(two_ways(), steps_max=1)
+    assert run == EagerRun((("t1",),), (), complete=False)
+
+
+@settings(max_examples=150, deadline=None)
+@given(sparse_nets(), st.sampled_from(Discipline))
+def test_the_witness_of_starvation_is_a_run_of_the_graph_that_recurs_without_the_starved(
+    net: Net, discipline: Discipline
+) -> None:
+    graph = explore(net, discipline)
+    verdict = check(net, discipline).verdict("starvation")
+    run, player = eager_run(net), Player(net)
+    marking = net.initial_marking
+    for step in run.first(30):
+        enabled = player.may_fire(marking)
+        assert jointly_openable(net, enabled)
+        assert tuple(sorted(net.transition_index[t] for t in step)) in player.maximal_steps(enabled)
+        marking = player.fire(marking, [net.transition_index[t] for t in step])
+    live = [net.transitions[t].name for t, live in enumerate(graph.engine.live()) if live]
+    assert verdict.subjects == starved(run, live)
+    if verdict.witness is None:
+        steps = [tuple(net.transition_index[t] for t in step) for step in (*run.prefix, *run.cycle)]
+        assert not verdict.subjects or not all(map(player.serialisable, steps))
+        return
+    fired = {name for step in verdict.witness.cycle for name in step}
+    assert not fired & set(verdict.subjects)
+    if discipline is Discipline.INTERLEAVING:
+        assert all(len(step) == 1 for step in (*verdict.witness.firings, *verdict.witness.cycle))
