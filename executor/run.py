@@ -132,6 +132,8 @@ def execute(
 
     Raises `InputError` F5003 where the plant does not fit the net.
     """
+    if workpieces < 0 or overdue_seconds <= 0 or (speed is not None and speed <= 0):
+        raise ValueError("workpieces must not be negative, times and speed must be positive")
     if problems := misfits(plant, decomposition.net):
         raise InputError(problems)
     cell = Plant(plant, workpieces=workpieces, seed=seed, disturbances=disturbances)

@@ -371,6 +371,17 @@ def test_plant_of_another_cell_is_refused() -> None:
     assert {problem.code for problem in refusal.value.diagnostics} == {"F5003"}
 
 
+@pytest.mark.parametrize("wrong", [{"workpieces": -1}, {"speed": 0.0}, {"overdue_seconds": 0.0}])
+def test_senseless_quantities_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="must"):
+        run_cell("one_robot", **{"workpieces": 1, **wrong})  # type: ignore[arg-type]
+
+
+def test_run_without_workpieces_is_done_at_once() -> None:
+    report, _ = run_cell("one_robot", 0)
+    assert (report.state, report.commands, report.simulated_seconds) == (State.DONE, 0, 0.0)
+
+
 def test_trace_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "no" / "trace.jsonl"):
         with pytest.raises(InputError) as refusal:
