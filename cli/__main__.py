@@ -1,5 +1,7 @@
 """`python -m firable.cli` is the command `firable`."""
 
-from firable.cli.main import run_as_script
+import sys
 
-run_as_script()
+from firable.cli.main import main
+
+sys.exit(main())

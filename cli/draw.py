@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 from firable.cli.options import load_net, net_argument, write_text
+from firable.cli.text import counted
 
 
 @click.command(short_help="Draw a net as SVG.")
@@ -34,7 +37,7 @@ def draw(net: str, output: str, marking: str | None, trace: str | None) -> int:
         read = read_trace(trace)
         done = play(loaded, read)
         firings = [event.transitions for event in read.events if isinstance(event, Fired)]
-        caption = f"after {done.firings} firings of {trace}"
+        caption = f"after {counted(done.firings, 'firing')} of {Path(trace).name}"
         write_text(output, draw_net(loaded, marking=done.marking, firings=firings, caption=caption))
         return 0
     shown = None

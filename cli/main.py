@@ -111,10 +111,5 @@ def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
     return ExitCode.INTERNAL_ERROR
 
 
-def run_as_script() -> None:
-    """The entry point of the installed command."""
-    sys.exit(main())
-
-
 if __name__ == "__main__":
-    run_as_script()
+    sys.exit(main())

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from firable.nets.verdict import Verdict
 
 _FAMILIES = {
-    "eq7": "Eq. (7)      a transition is firable iff all its parts are",
-    "eq8": "Eq. (8)      its external gates are open iff those of all its parts are",
-    "eq9-10": "Eq. (9)-(10) the next token of a place is the same in its subnet",
-    "arbitration": "arbitration  conflicts are decided as in the central net",
+    "eq7": "Eq. (7)          a transition is firable iff all its parts are",
+    "eq8": "Eq. (8)          its external gates are open iff those of all its parts are",
+    "eq9-10": "Eq. (9)-(10)     the next token of a place is the same in its subnet",
+    "arbitration": "arbitration      conflicts are decided as in the central net",
 }
 
 
@@ -66,7 +66,7 @@ def show_obligations(net_verdicts: Sequence[Verdict]) -> None:
     for family, some in families.items():
         proved = sum(verdict.holds for verdict in some)
         symbol, colour = ("✓", "green") if proved == len(some) else ("✗", "red")
-        words = _FAMILIES.get(family) or f"{family:<12} {some[0].statement}"
+        words = _FAMILIES.get(family) or f"{family:<16} {some[0].statement}"
         click.echo(f"  {click.style(symbol, fg=colour)} {proved:>3} of {len(some):<3} {words}")
 
 

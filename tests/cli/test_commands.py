@@ -1,0 +1,210 @@
+"""The commands as a person types them: what they print, what they write, and how they exit."""
+
+import json
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from firable.cli.main import main
+
+ROOT = Path(__file__).parents[2]
+SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A bundle of the one-robot cell."""
+    path = tmp_path_factory.mktemp("bundle") / "cell.bundle"
+    assert main(["bundle", "catalogue:one_robot", "-o", str(path)]) == 0
+    return str(path)
+
+
+def as_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, Any]:
+    """The exit code and the JSON of a command, which has to fit the published schema."""
+    capsys.readouterr()
+    code = main([*arguments, "--format", "json"])
+    data = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator(SCHEMA).validate(data)
+    assert data["exit_code"] == code
+    return code, data
+
+
+def test_the_published_schema_is_one() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+
+
+def test_the_schema_refuses_a_report_of_another_shape() -> None:
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft202012Validator(SCHEMA).validate({"firable_report": 2})
+
+
+def test_the_one_robot_cell_holds(capsys: pytest.CaptureFixture[str]) -> None:
+    code, data = as_json(capsys, "check", "catalogue:one_robot")
+    (report,) = data["reports"]
+    assert (code, report["status"]) == (0, "proved")
+    assert (report["figures"]["markings"], report["figures"]["edges"]) == (40, 70)
+
+
+def test_a_deadlock_is_told_step_by_step_and_replays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "catalogue:one_robot_mc_late", "--trace-dir", str(tmp_path / "traces")]) == 1
+    told = capsys.readouterr().out
+    assert "✗ violated  deadlock-free" in told
+    assert " 15. t1-b  arrived at MC with the workpiece" in told
+    trace = str(tmp_path / "traces" / "deadlock-free.trace.jsonl")
+    assert f"firable replay {trace} --net catalogue:one_robot_mc_late" in told
+    assert main(["replay", trace, "--net", "catalogue:one_robot_mc_late"]) == 0
+    assert "deadlock: nothing is firable here" in capsys.readouterr().out
+
+
+def test_every_counterexample_replays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for discipline in ("interleaving", "step"):
+        folder = tmp_path / discipline
+        arguments = ["check", "catalogue:one_robot_mc_late", "--discipline", discipline, "--trace-dir", str(folder)]
+        assert main(arguments) == 1
+        traces = sorted(folder.iterdir())
+        assert len(traces) >= 3
+        for trace in traces:
+            code, _ = as_json(capsys, "replay", str(trace), "--net", "catalogue:one_robot_mc_late")
+            assert code == 0, trace
+
+
+def test_several_nets_get_a_report_each_and_the_worst_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
+    code, data = as_json(capsys, "check", "catalogue:one_robot", "catalogue:one_robot_mc_late")
+    assert (code, [report["status"] for report in data["reports"]]) == (1, ["proved", "violated"])
+    code, data = as_json(capsys, "check", "catalogue:one_robot_mc_late", "no-such.firable.yaml")
+    assert (code, len(data["reports"]), [error["code"] for error in data["errors"]]) == (2, 1, ["F1001"])
+
+
+def test_a_budget_that_ends_is_unknown_and_never_passes(capsys: pytest.CaptureFixture[str]) -> None:
+    code, data = as_json(capsys, "check", "catalogue:one_robot", "--max-markings", "10")
+    (report,) = data["reports"]
+    assert (code, report["status"], report["figures"]["complete"]) == (3, "unknown", False)
+    assert report["figures"]["deadlocks"] is None
+    assert main(["check", "catalogue:one_robot", "--max-markings", "10"]) == 3
+    assert "? unknown   deadlock-free" in capsys.readouterr().out
+
+
+def test_the_same_input_gives_the_same_report(capsys: pytest.CaptureFixture[str]) -> None:
+    for format_ in ("text", "json"):
+        outputs = set()
+        for _ in range(2):
+            main(["check", "catalogue:one_robot_mc_late", "--format", format_])
+            outputs.add(capsys.readouterr().out)
+        assert len(outputs) == 1
+
+
+def test_the_coordinator_table_is_printed_as_published(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["prove", "catalogue:one_robot"]) == 0
+    output = capsys.readouterr().out
+    for row in (
+        "G1: t0-1, t3-13                 start of carrying in",
+        "G2: t0-2, t1-21, t2-22, t3-23   start of loading from CV1",
+        "G9: t0-6, t3-63                 end of carrying out",
+    ):
+        assert row in output
+    assert "15 of 15  Eq. (7)" in output
+    assert "28 of 28  Eq. (9)-(10)" in output
+
+
+def test_obligations_are_written_as_smtlib(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, data = as_json(capsys, "prove", "catalogue:one_robot", "--smt-dir", str(tmp_path / "smt"))
+    (report,) = data["reports"]
+    assert code == 0
+    assert len(report["files"]) == len(report["verdicts"]) == len(list((tmp_path / "smt").iterdir()))
+    assert all("(check-sat)" in Path(file).read_text() for file in report["files"])
+    assert len(report["table"]) == 9
+
+
+def test_a_net_that_may_deadlock_gets_no_bundle(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bundle", "catalogue:one_robot_mc_late", "-o", str(tmp_path / "late.bundle")]) == 1
+    assert "no bundle was made" in capsys.readouterr().out
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_leaves_a_trace_of_the_net(bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trace = str(tmp_path / "run.trace.jsonl")
+    code, data = as_json(capsys, "run", bundle, "--workpieces", "25", "--trace", trace)
+    run = data["reports"][0]["run"]
+    assert (code, run["state"], len(run["delivered"])) == (0, "done", 25)
+    assert run["lost"] == run["doubled"] == []
+    code, data = as_json(capsys, "replay", trace, "--net", bundle)
+    assert (code, data["reports"][0]["run"]["firings"]["G9"]) == (0, 25)
+
+
+def test_a_trace_with_one_firing_left_out_is_refuted(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = tmp_path / "run.trace.jsonl"
+    assert main(["run", bundle, "--workpieces", "1", "--trace", str(trace)]) == 0
+    lines = trace.read_text().splitlines()
+    trace.write_text("".join(f"{line}\n" for line in lines if '"G3"' not in line))
+    code, data = as_json(capsys, "replay", str(trace), "--net", bundle)
+    assert (code, data["reports"][0]["verdicts"][0]["code"]) == (1, "F5004")
+    trace.write_text("".join(f"{line}\n" for line in lines[:-1]))
+    code, _ = as_json(capsys, "replay", str(trace), "--net", bundle)
+    assert code == 3
+
+
+def test_a_bundle_with_one_changed_byte_does_not_run(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = bytearray(Path(bundle).read_bytes())
+    data[len(data) // 2] ^= 1
+    changed = tmp_path / "changed.bundle"
+    changed.write_bytes(data)
+    assert main(["run", str(changed)]) == 2
+    assert "F5001" in capsys.readouterr().err
+
+
+def test_steps_are_fired_one_by_one_until_the_operator_stops(bundle: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "firable.cli", "run", bundle, "--workpieces", "1", "--step"],
+        input="\n\nq\n",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 3, done.stdout + done.stderr
+    assert [name for name in ("G1", "G2", "t1-a", "G3") if f" s  {name}  " in done.stdout] == ["G1", "G2", "t1-a"]
+    assert "stopped" in done.stdout
+
+
+def test_a_net_survives_the_way_to_pnml_and_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pnml, back = str(tmp_path / "cell.pnml"), str(tmp_path / "back.firable.yaml")
+    assert main(["convert", "catalogue:conceptual_one_robot", "-o", pnml]) == 0
+    assert "warning[F1016]" in capsys.readouterr().err
+    assert main(["convert", pnml, "-o", back]) == 0
+    capsys.readouterr()
+    _, data = as_json(capsys, "check", back)
+    assert (data["reports"][0]["figures"]["markings"], data["reports"][0]["figures"]["edges"]) == (14, 23)
+
+
+def test_a_net_file_is_printed_as_it_means(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    copy = str(tmp_path / "copy.firable.yaml")
+    assert main(["convert", "catalogue:one_robot", "-o", copy]) == 0
+    digests = {as_json(capsys, "check", net)[1]["reports"][0]["digest"] for net in ("catalogue:one_robot", copy)}
+    assert len(digests) == 1
+
+
+def test_the_picture_in_the_documentation_is_the_one_that_is_drawn(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["draw", "catalogue:one_robot"]) == 0
+    assert capsys.readouterr().out == (ROOT / "docs" / "one-robot.svg").read_text(encoding="utf-8")
+
+
+def test_a_marking_is_drawn_instead_of_the_initial_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["draw", "catalogue:conceptual_one_robot", "--marking", "system.loading, system.cv2"]) == 0
+    # A token for each place named, and the one in the legend.
+    assert capsys.readouterr().out.count('class="token"') == 3
+
+
+@pytest.mark.parametrize("kind", ["net", "plant", "report"])
+def test_schemas_are_printed(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema", kind]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert schema["properties"]

@@ -1,0 +1,221 @@
+"""A newcomer's mistakes: one clear error, exit code 2, never a traceback, and nothing half-written."""
+
+import os
+import pty
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import firable.analysis.check
+from firable.cli.main import main
+
+NET = """\
+firable: 1
+cell: small
+controllers:
+  robot:
+    start: free
+    places: {free: , busy: }
+transitions:
+  begin: {from: robot.free, to: robot.busy}
+  end: {from: robot.busy, to: robot.free}
+"""
+
+MISTAKES: dict[str, tuple[Callable[[str], str], str]] = {
+    "a wrong name": (lambda text: text.replace("to: robot.busy}", "to: robot.buzy}"), "F2002"),
+    "wrong indentation": (lambda text: text.replace("    start", "   start"), "F1005"),
+    "a missing owner": (lambda text: text.replace("from: robot.free", "from: free"), "F2002"),
+    "an unknown gate": (lambda text: text.replace("to: robot.busy}", "to: robot.busy, if: robot.ready}"), "F2002"),
+    "a self-loop": (lambda text: text.replace("to: robot.busy}", "to: [robot.busy, robot.free]}"), "F2009"),
+    "a duplicate key": (lambda text: text + "  end: {from: robot.busy, to: robot.free}\n", "F1006"),
+    "an unknown key": (lambda text: text.replace("cell: small", "cell: small\nplaces_: {}"), "F1008"),
+    "a tab": (lambda text: text.replace("    start", "\tstart"), "F1005"),
+    "an empty file": (lambda _: "", "F1002"),
+    "another version": (lambda text: text.replace("firable: 1", "firable: 9"), "F1011"),
+}
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """What a command says on standard error that has to refuse its input."""
+    capsys.readouterr()
+    assert main(list(arguments)) == 2
+    streams = capsys.readouterr()
+    assert "Traceback" not in streams.out + streams.err
+    assert "F9001" not in streams.err
+    assert streams.err.strip()
+    return streams.err
+
+
+def test_the_net_without_a_mistake_holds(tmp_path: Path) -> None:
+    (tmp_path / "net.firable.yaml").write_text(NET)
+    assert main(["check", str(tmp_path / "net.firable.yaml")]) == 0
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_the_net_file_is_one_clear_error(
+    mistake: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change, code = MISTAKES[mistake]
+    path = tmp_path / "net.firable.yaml"
+    text = change(NET)
+    assert text != NET
+    path.write_text(text)
+    for command in (["check"], ["prove"], ["draw"]):
+        said = refused(capsys, *command, str(path))
+        assert f"error[{code}]" in said
+        assert f"{path}:" in said
+        assert said.count("error[") == 1
+        assert "hint: " in said
+
+
+def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    binary = tmp_path / "photo.firable.yaml"
+    binary.write_bytes(bytes(range(256)) * 64)
+    noise = tmp_path / "noise.firable.yaml"
+    with noise.open("wb") as stream:
+        for _ in range(100):
+            stream.write(os.urandom(1024 * 1024))
+    folder = tmp_path / "folder.firable.yaml"
+    folder.mkdir()
+    text_noise = tmp_path / "noise.txt"
+    text_noise.write_bytes(b"{[" * 500_000)
+    for path in (
+        binary,
+        noise,
+        folder,
+        text_noise,
+        tmp_path / "missing.yaml",
+        Path("/dev/null"),
+        tmp_path / ("x" * 300),
+    ):
+        for command in (["check"], ["prove"], ["bundle", "-o", str(tmp_path / "b")], ["run"], ["draw"]):
+            assert "error[F" in refused(capsys, *command, str(path))
+        assert "error[F" in refused(capsys, "replay", str(path), "--net", "catalogue:one_robot")
+        assert "error[F" in refused(capsys, "convert", str(path), "-o", str(tmp_path / "out.pnml"))
+    assert not (tmp_path / "b").exists()
+    assert not (tmp_path / "out.pnml").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "Usage:"),
+        (["chekc"], "No such command"),
+        (["check"], "Missing argument"),
+        (["check", "--disciplin", "step", "x"], "No such option"),
+        (["check", "--discipline", "steps", "x"], "is not one of"),
+        (["check", "--max-markings", "0", "x"], "Invalid value"),
+        (["check", "--max-markings", "many", "x"], "Invalid value"),
+        (["check", "--format", "xml", "x"], "is not one of"),
+        (["check", "catalogue:one_robt"], "the catalogue has no 'one_robt'"),
+        (["prove", "a", "b"], "unexpected extra argument"),
+        (["bundle", "catalogue:one_robot"], "Missing option"),
+        (["run", "x", "--workpieces", "-1"], "Invalid value"),
+        (["run", "x", "--speed", "100"], "is not one of"),
+        (["replay", "x"], "Missing option"),
+        (["draw", "catalogue:one_robot", "--marking", "robot.fre"], "no place 'robot.fre'"),
+        (["draw", "catalogue:one_robot", "--marking", "robot.free", "--trace", "x"], "leave one out"),
+        (["convert", "catalogue:one_robot", "-o", "net.docx"], "cannot tell the format"),
+        (["schema", "everything"], "is not one of"),
+    ],
+)
+def test_a_wrong_command_line_says_what_is_wrong(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert words.lower() in refused(capsys, *arguments).lower()
+
+
+def test_an_output_that_cannot_be_written_leaves_nothing_behind(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("kept")
+    (tmp_path / "folder").mkdir()
+    for output in (str(tmp_path / "no" / "x"), str(tmp_path / "file" / "x"), str(tmp_path / "folder")):
+        for command in (["draw", "catalogue:one_robot"], ["bundle", "catalogue:one_robot"]):
+            assert "error[F1017]" in refused(capsys, *command, "-o", output)
+    said = refused(capsys, "convert", "catalogue:one_robot", "-o", str(tmp_path / "no" / "x.pnml"))
+    assert "error[F1017]" in said
+    for option, maker in (("--trace-dir", "check"), ("--smt-dir", "prove")):
+        said = refused(capsys, maker, "catalogue:one_robot_mc_late", option, str(tmp_path / "file"))
+        assert "error[F1017]" in said
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
+    assert (tmp_path / "file").read_text() == "kept"
+    assert list((tmp_path / "folder").iterdir()) == []
+
+
+def test_a_plant_that_does_not_fit_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bundle = str(tmp_path / "cell.bundle")
+    assert main(["bundle", "catalogue:one_robot", "-o", bundle]) == 0
+    assert "error[F5003]" in refused(capsys, "run", bundle, "--plant", "catalogue:two_robots_shared")
+    assert "error[F1001]" in refused(capsys, "run", bundle, "--plant", str(tmp_path / "no.plant.yaml"))
+    said = refused(capsys, "run", bundle, "--workpieces", "1", "--trace", str(tmp_path / "no" / "trace"))
+    assert "error[F1017]" in said
+
+
+def test_an_internal_error_is_one_line_and_says_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(*arguments: object) -> None:
+        raise RuntimeError("planted")
+
+    monkeypatch.setattr(firable.analysis.check, "check", broken)
+    assert main(["check", "catalogue:one_robot"]) == 4
+    said = capsys.readouterr().err
+    assert "error[F9001]: internal error: RuntimeError: planted" in said
+    assert "Traceback" not in said
+    assert main(["--traceback", "check", "catalogue:one_robot"]) == 4
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def missing(*arguments: object) -> None:
+        raise ModuleNotFoundError("No module named 'numpy'", name="numpy")
+
+    monkeypatch.setattr(firable.analysis.check, "check", missing)
+    assert "pip install 'firable[prove]'" in refused(capsys, "check", "catalogue:one_robot")
+
+
+def test_a_reader_that_leaves_early_is_no_error() -> None:
+    command = f"{sys.executable} -m firable.cli schema net | head -1"
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, check=False)
+    assert done.stdout == "{\n"
+    assert done.stderr == ""
+
+
+def test_a_terminal_without_unicode_still_gets_the_words() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "firable.cli", "check", "catalogue:one_robot"],
+        env={**os.environ, "PYTHONIOENCODING": "latin-1"},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0
+    assert b"? proved    deadlock-free" in done.stdout
+
+
+def test_colours_are_for_terminals_and_switched_off_by_no_color() -> None:
+    command = [sys.executable, "-m", "firable.cli", "check", "catalogue:one_robot"]
+    clean = {key: value for key, value in os.environ.items() if key not in {"NO_COLOR", "FORCE_COLOR"}}
+
+    def on_a_terminal(**environment: str) -> bytes:
+        master, slave = pty.openpty()
+        with subprocess.Popen(command, env={**clean, "TERM": "xterm", **environment}, stdout=slave) as process:
+            os.close(slave)
+            shown = b""
+            while True:
+                try:
+                    shown += (some := os.read(master, 65536))
+                except OSError:  # the far side of a terminal that is closed
+                    some = b""
+                if not some:
+                    break
+        os.close(master)
+        assert process.returncode == 0
+        return shown
+
+    assert b"\x1b[32m" in on_a_terminal()
+    assert b"\x1b[" not in on_a_terminal(NO_COLOR="1")
+    assert b"\x1b[" not in subprocess.run(command, env=clean, capture_output=True, check=True).stdout

@@ -1,0 +1,126 @@
+"""Drawings: complete, deterministic, and readable by construction whatever the net."""
+
+import xml.etree.ElementTree as ET
+
+import pytest
+from hypothesis import given, settings
+from support.generate_nets import whole_nets
+
+from firable.nets.catalogue import catalogue_names, catalogue_net
+from firable.nets.drawing import draw_net
+from firable.nets.drawing.layout import LABEL_LEFT, RADIUS, layout
+from firable.nets.drawing.rows import lane_order, rows_of
+from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, Transition
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def elements(svg: str, tag: str, css: str) -> list[ET.Element]:
+    return [element for element in ET.fromstring(svg).iter(f"{SVG}{tag}") if element.get("class") == css]
+
+
+def texts(svg: str) -> set[str]:
+    return {"".join(element.itertext()) for element in ET.fromstring(svg).iter(f"{SVG}text")}
+
+
+@pytest.mark.parametrize("name", catalogue_names())
+def test_everything_of_a_cell_is_drawn(name: str) -> None:
+    net = catalogue_net(name)
+    svg = draw_net(net)
+    # One place and one token more stand in the legend.
+    assert len(elements(svg, "circle", "place")) == len(net.places) + 1
+    assert len(elements(svg, "circle", "token")) == sum(place.marked for place in net.places) + 1
+    arcs = sum(len(transition.inputs) + len(transition.outputs) for transition in net.transitions)
+    assert len(elements(svg, "path", "arc")) == len(elements(svg, "path", "head")) == arcs
+    shown = texts(svg)
+    assert {place.name.removeprefix(f"{place.owner}.") for place in net.places} <= shown
+    assert {transition.name for transition in net.transitions} <= shown
+    assert {str(place.command) for place in net.places if place.command} <= shown
+
+
+def test_the_same_net_gives_the_same_picture() -> None:
+    net = catalogue_net("one_robot")
+    assert draw_net(net) == draw_net(net)
+
+
+@settings(max_examples=200, deadline=None)
+@given(whole_nets())
+def test_no_arc_passes_through_a_place_or_a_bar_that_it_does_not_join(net: Net) -> None:
+    ET.fromstring(draw_net(net))
+    where = layout(net)
+    for edge in where.edges:
+        spot, bar = where.places[edge.place], where.bars[edge.transition]
+        assert any(start <= edge.x <= end for start, end in bar.segments)
+        low, high = sorted((spot.y, bar.y))
+        for p, other in enumerate(where.places):
+            if p != edge.place:
+                assert not (abs(other.x - edge.x) < RADIUS + 3 and low < other.y < high)
+        for t, other_bar in enumerate(where.bars):
+            if t != edge.transition and low < other_bar.y < high:
+                assert not any(start - 2 < edge.x < end + 2 for start, end in other_bar.segments)
+
+
+@settings(max_examples=200, deadline=None)
+@given(whole_nets())
+def test_places_and_bars_never_overlap_and_stay_in_their_lanes(net: Net) -> None:
+    where = layout(net)
+    spots = [(spot.x, spot.y) for spot in where.places]
+    for i, (x, y) in enumerate(spots):
+        assert all(abs(x - u) > 2 * RADIUS or abs(y - v) > 2 * RADIUS for u, v in spots[:i])
+        lane = next(lane for lane in where.lanes if lane.owner == net.places[i].owner)
+        assert lane.x < x - RADIUS
+        assert x + LABEL_LEFT < lane.x + lane.width
+    pieces = [(bar.y, segment) for bar in where.bars for segment in bar.segments]
+    for i, (y, (start, end)) in enumerate(pieces):
+        assert all(y != v or end < left or right < start for v, (left, right) in pieces[:i])
+    for first, second in zip(where.lanes, where.lanes[1:], strict=False):
+        assert first.x + first.width < second.x
+
+
+def test_a_token_cuts_a_cycle_so_work_runs_down_the_page() -> None:
+    places = (Place("free", marked=True), Place("load"), Place("work"))
+    transitions = (
+        Transition("c", ("work",), ("free",)),
+        Transition("a", ("free",), ("load",)),
+        Transition("b", ("load",), ("work",)),
+    )
+    assert rows_of(Net("n", places, transitions), [(0, 0)] * 3) == (3, 1, 2)
+
+
+def test_a_cycle_without_a_token_is_drawn_all_the_same() -> None:
+    net = Net("n", (Place("p"), Place("q")), (Transition("t", ("p",), ("q",)), Transition("u", ("q",), ("p",))))
+    assert sorted(rows_of(net, [(0, 0)] * 2)) == [1, 2]
+
+
+def test_lanes_that_work_together_stand_together() -> None:
+    assert lane_order([frozenset({0, 2}), frozenset({0, 2}), frozenset({1, 2})], 3) == (0, 2, 1)
+
+
+def test_gates_end_in_a_dot_or_a_hollow_circle() -> None:
+    net = Net(
+        "n",
+        (Place("p", marked=True), Place("q")),
+        (Transition("t", (), (), ("p",), ("q",), (ExternalGate("go"), ExternalGate("halt", wanted=False))),),
+        (Signal("go"), Signal("halt")),
+    )
+    svg = draw_net(net)
+    assert len(elements(svg, "path", "gate")) == 2 + 2  # and in the legend
+    assert len(elements(svg, "path", "stub")) == 2 + 2
+    assert len(elements(svg, "circle", "dot")) == 2 + 2
+    assert len(elements(svg, "circle", "hollow")) == 2 + 2
+    assert {"go", "halt"} <= texts(svg)
+
+
+def test_names_are_escaped() -> None:
+    command = Command("R<1>", "A&B")
+    net = Net('<script>"', (Place("a.p", "a", command=command),), controllers=(Controller("a", description="<b>"),))
+    svg = draw_net(net, caption="x < y & z")
+    assert {'<script>"', "R<1> A&B", "<b>", "x < y & z"} <= texts(svg)
+    assert "<script>" not in svg
+
+
+def test_firings_are_numbered_at_their_transitions() -> None:
+    net = catalogue_net("conceptual_one_robot")
+    svg = draw_net(net, firings=[["t1"], ["t2"], ["t1"]])
+    assert {"1, 3", "2"} <= texts(svg)
+    assert len(elements(svg, "rect", "fired")) >= 2
