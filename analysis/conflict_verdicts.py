@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from firable.analysis.question import Answer, Question, listed, no, yes
-from firable.analysis.reachability import ReachabilityGraph
+from firable.analysis.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
 from firable.nets.net import Net
 from firable.nets.verdict import Verdict, Weight
 from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts
@@ -133,7 +133,11 @@ def effective_conflict_free(analysis: ConflictAnalysis) -> Verdict:
     """
     net = analysis.graph.net
     decided = [set(arbiter.among) for arbiter in net.arbiters]
-    undecided = [pair for pair in analysis.met if not any(set(pair) <= among for among in decided)]
+    try:
+        competing = list(analysis.met)
+    except (IncompleteGraph, BudgetExceeded):
+        competing = list(analysis.structural.all)  # unknown: any of them may compete
+    undecided = [pair for pair in competing if not any(set(pair) <= among for among in decided)]
     question = Question(
         "effective-conflicts",
         "no two transitions compete for a place at a reachable marking",
