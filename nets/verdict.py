@@ -1,8 +1,8 @@
 """Verdicts: what is known about a property of a net, and what it rests on.
 
-A verdict is PROVED, VIOLATED or UNKNOWN, never a Boolean, so that "not decided" cannot be mistaken for either answer; it
-says by which method, at which cost, and carries its evidence: a firing sequence that the reference player replays, or
-the names of the files an independent checker reads. The record lies in this lowest room because `analysis` and
+A verdict is PROVED, VIOLATED or UNKNOWN, never a Boolean, so that "not decided" cannot be mistaken for either answer;
+it says by which method, at which cost, and carries its evidence: a firing sequence that the reference player replays,
+or the names of the files an independent checker reads. The record lies in this lowest room because `analysis` and
 `decompose` write it, bundles carry it, and the executor reads it without importing either.
 """
 
