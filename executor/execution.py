@@ -274,11 +274,14 @@ class Execution:
                     self._perform(controller.receive(message))
                 case SignalRead(signal, value, entry):
                     self._perform(controller.read(signal, value, entry))
-            if not self.paused and (effects := controller.fire()):
-                self._perform(effects)
+            fired = [] if self.paused else controller.fire()
+            if fired:
+                self._perform(fired)
                 self._post(name, Continue())
             self._perform(controller.report())
             self._handled()
+            if fired:
+                await asyncio.sleep(0)  # the others' turn, and the operator's, even where firing never ends
 
     async def _operate(self, operator: Callable[[Execution], Awaitable[None]]) -> None:
         await operator(self)

@@ -16,12 +16,13 @@ from firable.executor.execution import Execution
 from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.plant_file import PlantModel, parse_plant, read_plant
 from firable.executor.run import Operator, RunReport, execute, load, run
-from firable.executor.situation import State
+from firable.executor.situation import State, is_deadlock
+from firable.executor.token_player import TokenPlayer
 from firable.nets.bundle import Bundle, required_verdicts, write_bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status, Verdict
 from firable.semantics.trace import CommandSent, Fired, Noted, Trace, parse_trace, replay
@@ -287,21 +288,56 @@ def test_real_time_runs_as_virtual_time_does() -> None:
     ]
 
 
+def circles(*owners: str) -> Decomposition:
+    """A token that goes round in each controller, without any gate."""
+    return split(
+        Net(
+            "circles",
+            tuple(Place(f"{owner}.{p}", owner, marked=p == "p") for owner in owners for p in "pq"),
+            tuple(
+                Transition(f"{owner}-{p}", (f"{owner}.{p}",), (f"{owner}.{q}",))
+                for owner in owners
+                for p, q in ("pq", "qp")
+            ),
+            controllers=tuple(map(Controller, owners)),
+        )
+    )
+
+
+NO_MACHINES = parse_plant(
+    "firable_plant: 1\nplant: none\nstations: [s]\nmachines: {}\n"
+    "arrivals: {station: s, every_s: 1}\ndepartures: {station: s}\n"
+)
+
+
 def test_net_that_runs_in_circles_without_its_cell_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("firable.executor.execution.FIRINGS_AT_ONCE_MAX", 500)
-    net = Net(
-        "circle",
-        (Place("a.p", "a", marked=True), Place("a.q", "a")),
-        (Transition("t", ("a.p",), ("a.q",)), Transition("u", ("a.q",), ("a.p",))),
-        controllers=(Controller("a"),),
-    )
-    plant = parse_plant(
-        "firable_plant: 1\nplant: none\nstations: [s]\nmachines: {}\n"
-        "arrivals: {station: s, every_s: 1}\ndepartures: {station: s}\n"
-    )
-    report = execute(split(net), plant, workpieces=1)
+    report = execute(circles("a"), NO_MACHINES, workpieces=1)
     assert report.state is State.FAULT
     assert "fire without end" in report.situation.message
+
+
+def test_single_steps_take_turns_among_the_controllers() -> None:
+    stepped = []
+
+    async def operator(execution: Execution) -> None:
+        execution.pause()
+        for _ in range(6):
+            stepped.append(await execution.step())
+        execution.stop()
+
+    execute(circles("a", "b"), NO_MACHINES, workpieces=1, operator=operator)
+    assert [str(name)[0] for name in stepped] == ["a", "b"] * 3
+
+
+def test_transition_that_no_valuation_opens_is_not_waited_for() -> None:
+    gates = (ExternalGate("a.s"), ExternalGate("a.s", wanted=False))
+    places = (Place("a.p", "a", marked=True), Place("a.q", "a"))
+    never = Transition("t", ("a.p",), ("a.q",), external=gates)
+    net = Net("n", places, (never,), (Signal("a.s", "a"),), (Controller("a"),))
+    assert is_deadlock(TokenPlayer.of(net), net.initial_marking)
+    waiting = replace(never, external=gates[:1])
+    assert not is_deadlock(TokenPlayer.of(replace(net, transitions=(waiting,))), net.initial_marking)
 
 
 def test_command_order_of_a_wrong_net_crashes_in_the_cell() -> None:
