@@ -126,7 +126,7 @@ def parts(net: Net, names: Mapping[str, str], owners: Mapping[str, str]) -> dict
         return owners[of] if of is not None and owners else of
 
     def command(of: Command | None) -> tuple[object, ...] | None:
-        return of and (of.machine, of.command, frozenset(of.parameters))
+        return None if of is None else (of.machine, of.command, frozenset(of.parameters))
 
     return {
         "places": {(name(p.name), owner(p.owner), p.marked, command(p.command)) for p in net.places},
@@ -151,7 +151,8 @@ def parts(net: Net, names: Mapping[str, str], owners: Mapping[str, str]) -> dict
 def test_a_cell_of_the_catalogue_equals_its_reference(twin: Twin) -> None:
     reference = load_net(twin.reference)
     owners = {f"c{number}": controller for number, controller in enumerate(twin.controllers)}
-    own = {item.name: item.owner for item in (*reference.places, *reference.signals)}
+    own = {place.name: place.owner for place in reference.places}
+    own |= {signal.name: signal.owner for signal in reference.signals}
     names = {full: twin.names[full.removeprefix(f"{owner}.")] for full, owner in own.items()}
     assert parts(catalogue_net(twin.ours), {}, {}) == parts(reference, names, owners)
 
@@ -165,7 +166,9 @@ def test_a_net_of_the_catalogue_is_named_after_its_file_and_described(name: str)
     net = catalogue_net(name)
     assert net.name == name.replace("_", "-")
     assert net.description
-    assert all(item.description for item in (*net.controllers, *net.places, *net.transitions))
+    assert all(controller.description for controller in net.controllers)
+    assert all(place.description for place in net.places)
+    assert all(transition.description for transition in net.transitions)
     assert net.properties
     assert read_net(catalogue_path(name)) == net
 

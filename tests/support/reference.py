@@ -70,8 +70,8 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
     full = {name: _full(name, place.get("owner")) for name, place in places.items()}
 
     signals: dict[str, Signal] = {}
-    for name, transition in transitions.items():
-        for gate in transition.get("gates", ()):
+    for name, described in transitions.items():
+        for gate in described.get("gates", ()):
             if "ext" not in gate:
                 continue
             if "src" in gate:
