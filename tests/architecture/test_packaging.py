@@ -1,0 +1,76 @@
+"""What is shipped: a wheel built from the sdist, installed where no solver is, holds all that the rooms hold."""
+
+import subprocess
+import sys
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("nets", "semantics", "analysis", "decompose", "executor", "cli")
+
+
+def run(*command: str | Path, code: int = 0, cwd: Path | None = None) -> str:
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False, cwd=cwd)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel that `python -m build` makes, which is built from the sdist that it makes first."""
+    dist = tmp_path_factory.mktemp("dist")
+    run(sys.executable, "-m", "build", "--outdir", dist, ROOT)
+    (wheel,) = dist.glob("*.whl")
+    return wheel
+
+
+@pytest.fixture(scope="module")
+def thin(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The programs of a fresh environment with the wheel and its base dependencies, without the extra `prove`."""
+    folder = tmp_path_factory.mktemp("thin")
+    venv.create(folder, with_pip=True)
+    run(folder / "bin" / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
+    return folder / "bin"
+
+
+def test_the_wheel_holds_every_module_and_every_data_file(wheel: Path) -> None:
+    names = set(zipfile.ZipFile(wheel).namelist())
+    for room in ROOMS:
+        for path in (ROOT / room).rglob("*"):
+            if path.suffix in {".py", ".pyi", ".yaml"} or path.name.endswith(".schema.json"):
+                relative = path.relative_to(ROOT)
+                if "engine" not in relative.parts:
+                    assert f"firable/{relative}" in names
+    assert "firable/py.typed" in names
+    assert any(name.startswith("firable/analysis/_engine.") for name in names)
+    assert any(name.endswith("licenses/LICENSE") for name in names)
+    assert not any(name.split("/")[0] in ROOMS for name in names)
+    assert "-cp311-abi3-" in wheel.name
+
+
+def test_the_executor_and_the_help_need_no_solver(thin: Path, tmp_path: Path) -> None:
+    installed = run(thin / "python", "-m", "pip", "list", "--disable-pip-version-check").lower()
+    assert not any(solver in installed for solver in ("z3", "networkx", "sympy", "numpy"))
+    assert "Usage: firable" in run(thin / "firable", "--help", cwd=tmp_path)
+    modules = [f"firable.executor.{path.stem}" for path in (ROOT / "executor").glob("*.py") if path.stem != "__init__"]
+    run(thin / "python", "-c", f"import firable.executor, {', '.join(modules)}", cwd=tmp_path)
+    assert "<svg" in run(thin / "firable", "draw", "catalogue:one_robot", cwd=tmp_path)
+
+
+def test_a_bundle_made_elsewhere_runs_where_no_solver_is(thin: Path, tmp_path: Path) -> None:
+    bundle, trace = tmp_path / "cell.bundle", tmp_path / "trace"
+    run(sys.executable, "-m", "firable.cli", "bundle", "catalogue:one_robot", "-o", bundle)
+    assert "3 workpieces carried through" in run(
+        thin / "firable", "run", bundle, "--workpieces", "3", "--trace", trace, cwd=tmp_path
+    )
+    run(thin / "firable", "replay", trace, "--net", bundle, cwd=tmp_path)
+
+
+def test_checking_without_the_extra_says_how_to_install_it(thin: Path, tmp_path: Path) -> None:
+    for command in ("check", "prove"):
+        said = run(thin / "firable", command, "catalogue:one_robot", code=2, cwd=tmp_path)
+        assert "pip install 'firable[prove]'" in said
+        assert "Traceback" not in said
