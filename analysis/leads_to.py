@@ -68,7 +68,7 @@ def leads_to(graph: ReachabilityGraph, of: Property) -> Answer:
     tail, entry = _way(graph, start, fair.markings | stuck, without)
     prefix += tail
     cycle = fair.cycle(entry) if not stuck[entry] else []
-    _check_lasso(graph, of.formula, of.then, of.fairness, prefix, prefix_length, cycle)
+    check_lasso(graph, of.formula, of.then, of.fairness, prefix, prefix_length, cycle)
     after = f"after firing {prefix_length} of the sequence ({format_formula(of.formula)}) holds, and then "
     end = f"({format_formula(of.then)}) never comes: " + (
         "the cycle is fair" if cycle else "the sequence ends in a deadlock"
@@ -227,7 +227,7 @@ class _Walk:
         self.at = target
 
 
-def _check_lasso(
+def check_lasso(
     graph: ReachabilityGraph,
     p: Formula,
     q: Formula,

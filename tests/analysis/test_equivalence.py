@@ -65,6 +65,25 @@ def test_weak_bisimilarity_hides_steps_but_not_decisions(left: Net, right: Net, 
     assert weakly_bisimilar(explore(left), explore(right), visible, visible) is expected
 
 
+def test_a_visible_step_may_be_followed_by_hidden_ones() -> None:
+    # Milner's third law of the hidden step: x.(y + h.z) is x.(y + h.z) + x.z.
+    right = of(("x", "a", "b"), ("y", "b", "d"), ("h", "b", "c"), ("z", "c", "d"))
+    left = of(("x", "a", "b"), ("y", "b", "d"), ("h", "b", "c"), ("z", "c", "d"), ("x2", "a", "c"))
+    visible = {"x": "x", "x2": "x", "y": "y", "z": "z"}
+    assert weakly_bisimilar(explore(left), explore(right), visible, visible)
+    assert not weakly_bisimilar(explore(left), explore(right), {**visible, "h": "h"}, {**visible, "h": "h"})
+
+
+def test_graphs_that_join_in_different_places_are_not_isomorphic() -> None:
+    begin = (("s1", "a", "b"), ("s2", "a", "c"))
+    left = of(*begin, ("t", "b", "d"), ("v", "b", "d"), ("x", "c", "e"), ("y", "c", "f"))
+    right = of(*begin, ("t", "b", "d"), ("v", "b", "f"), ("x", "c", "e"), ("y", "c", "e"))
+    a, b = explore(left), explore(right)
+    assert (a.n_markings, a.n_edges) == (b.n_markings, b.n_edges) == (6, 6)
+    assert not isomorphic(a, b)
+    assert not isomorphic(b, a)
+
+
 @settings(max_examples=60, deadline=None)
 @given(sparse_nets(), st.sampled_from(Discipline), st.data())
 def test_a_complement_gives_an_isomorphic_graph_in_either_discipline(

@@ -98,6 +98,23 @@ def test_weights_larger_than_one_are_exact() -> None:
     assert [str(invariant) for invariant in found.minimal] == ["2 p + q + r + s + u"]
 
 
+def test_a_sum_of_two_invariants_is_not_minimal() -> None:
+    places = tuple(Place(name) for name in "abcd")
+    moves = (Transition("t1", ("b", "d"), ("a", "c")), Transition("t2", ("b", "c"), ("a", "d")))
+    found = p_invariants(Net("n", places, moves))
+    assert [str(invariant) for invariant in found.minimal] == ["a + b", "c + d"]
+
+
+def test_an_invariant_has_no_common_divisor() -> None:
+    places = tuple(Place(name) for name in "xyuv")
+    moves = (
+        Transition("t1", ("y",), ("x",)),
+        Transition("t2", ("u", "v"), ("x", "y")),
+        Transition("t3", ("v",), ("u",)),
+    )
+    assert [str(invariant) for invariant in p_invariants(Net("n", places, moves)).minimal] == ["x + y + u + v"]
+
+
 def test_past_the_bound_on_rows_the_result_says_that_it_is_incomplete_and_lists_only_minimal_ones() -> None:
     net = load_net("cell1")
     whole, part = p_invariants(net), p_invariants(net, rows_max=40)

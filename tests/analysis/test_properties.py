@@ -11,8 +11,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from support.generate_sparse import sparse_nets
 
+from firable.analysis.leads_to import check_lasso
 from firable.analysis.properties import decide_property, statement
-from firable.analysis.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.reachability import Budget, ReachabilityGraph, WitnessError, explore
 from firable.nets.formula import Formula, parse_formula
 from firable.nets.net import Fairness, Marking, Net, Place, Property, PropertyKind, Transition
 from firable.nets.verdict import Status, Verdict
@@ -220,3 +221,61 @@ def test_from_a_part_of_the_graph_only_what_a_marking_shows_is_concluded(
     assert verdict.status is expected
     assert (verdict.code == "F3004") == (expected is Status.UNKNOWN)
     assert ("3 markings" in verdict.bound) == (expected is Status.UNKNOWN)
+
+
+def pruned() -> Net:
+    """A loop in which `escape` is enabled only after a detour that a strongly fair run need not take.
+
+    Of the four markings of p / p2 and k / k2, `escape` is enabled where p and k2 hold a token. A run that goes
+    through the other three fires all the other transitions again and again. Beside it, chosen at the start, is a loop
+    of x and y.
+    """
+    places = tuple(Place(name, marked=name in {"s", "k"}) for name in ("s", "p", "p2", "k", "k2", "e", "x", "y"))
+    moves = (
+        Transition("into", ("s",), ("p",)),
+        Transition("beside", ("s",), ("x",)),
+        Transition("u", ("p",), ("p2",)),
+        Transition("r", ("p2",), ("p",)),
+        Transition("w", ("k",), ("k2",), ("p2",)),
+        Transition("w2", ("k2",), ("k",), ("p2",)),
+        Transition("escape", ("p", "k2"), ("e",)),
+        Transition("there", ("x",), ("y",)),
+        Transition("back", ("y",), ("x",)),
+    )
+    return Net("pruned", places, moves)
+
+
+def test_strong_fairness_looks_into_components_that_are_unfair_as_a_whole() -> None:
+    of = prop(PropertyKind.LEADS_TO, parse_formula("p"), parse_formula("e"), Fairness.STRONG)
+    net = pruned()
+    # In one of the two orders the component found in the second round has the number of one found in the first.
+    for order in (net.transitions, net.transitions[::-1]):
+        verdict = decide_property(explore(replace(net, transitions=order)), of)
+        assert verdict.status is Status.VIOLATED
+        assert verdict.witness is not None
+        assert {name for step in verdict.witness.cycle for name in step} == {"u", "r", "w", "w2"}
+
+
+def test_a_lasso_that_refutes_nothing_is_an_internal_error() -> None:
+    net, index = pruned(), pruned().transition_index
+    graph = explore(net)
+
+    def lasso(prefix: str, cycle: str, *, trigger: int = 1, fairness: Fairness = Fairness.STRONG, q: str = "e") -> None:
+        before: list[FiringSet] = [(index[name],) for name in prefix.split()]
+        around: list[FiringSet] = [(index[name],) for name in cycle.split()]
+        check_lasso(graph, parse_formula("p"), parse_formula(q), fairness, before, trigger, around)
+
+    lasso("into", "u w w2 r")
+    lasso("into", "u r", fairness=Fairness.WEAK)
+    with pytest.raises(WitnessError, match="not fair"):
+        lasso("into", "u r")  # w is enabled again and again
+    with pytest.raises(WitnessError, match="does not close"):
+        lasso("into", "u")
+    with pytest.raises(WitnessError, match="deadlock"):
+        lasso("into", "")
+    with pytest.raises(WitnessError, match=r"may not fire|not firable"):
+        lasso("into", "w w2")
+    with pytest.raises(WitnessError, match="does not refute"):
+        lasso("into", "u w w2 r", trigger=0)  # p does not hold there
+    with pytest.raises(WitnessError, match="does not refute"):
+        lasso("into", "u w w2 r", q="p2")

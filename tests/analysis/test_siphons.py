@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import chain, combinations
 
 import pytest
+import z3
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.generate import nets
@@ -113,3 +114,9 @@ def test_past_the_bound_on_their_number_the_list_is_said_to_be_incomplete() -> N
     assert set(part.minimal) < set(whole.minimal)
     assert not deadlock_trap(net, contact_free=True, most=5).holds
     assert minimal_siphons(net, most=len(whole.minimal)).complete
+
+
+def test_a_solver_that_gives_up_leaves_the_list_incomplete(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(z3.Solver, "check", lambda _: z3.unknown)
+    assert not minimal_siphons(load_net("fig2a")).complete
+    assert not deadlock_trap(load_net("fig2a"), contact_free=True).holds

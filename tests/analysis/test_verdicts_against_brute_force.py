@@ -12,7 +12,7 @@ from support.generate_sparse import sparse_nets
 from support.reference import cases
 
 from firable.analysis.check import Report, check
-from firable.nets.net import Marking, Net
+from firable.nets.net import Marking, Net, Place, Transition
 from firable.nets.verdict import Status, Witness
 from firable.semantics.conflict import gate_races, jointly_openable
 from firable.semantics.player import FiringSet, Player
@@ -171,3 +171,24 @@ def any_order_replays(player: Player, marking: Marking, fired: FiringSet) -> boo
 def test_an_isolated_transition_fires_for_ever_so_nothing_is_doomed(discipline: Discipline) -> None:
     case = next(case for case in cases() if case.id == "c02")
     assert check(case.net(), discipline).figures.doomed == 0
+
+
+def test_the_note_of_a_contact_names_the_full_places_outside_the_inputs() -> None:
+    places = tuple(Place(name, marked=name != "r") for name in "pqr")
+    verdict = check(Net("n", places, (Transition("t", ("p",), ("p", "q", "r")),))).verdict("contact-free")
+    assert verdict.witness is not None
+    assert verdict.witness.note == "the inputs of t are there and q is full"
+
+
+@pytest.mark.parametrize("discipline", Discipline)
+def test_two_transitions_that_close_each_others_gates_make_a_step_without_an_order(discipline: Discipline) -> None:
+    places = tuple(Place(name, marked=name in "ab") for name in "abxy")
+    swap = (Transition("t", ("a",), ("x",), ("b",)), Transition("u", ("b",), ("y",), ("a",)))
+    report = check(Net("swap", places, swap), discipline)
+    assert report.figures.gate_races == (("t", "u"), ("u", "t"))
+    if discipline is Discipline.STEP:
+        assert report.figures.nonserialisable == (("t", "u"),)
+        assert report.verdict("steps-serialisable").subjects == ("t + u",)
+    else:
+        with pytest.raises(KeyError):
+            report.verdict("steps-serialisable")
