@@ -32,11 +32,14 @@ def _report(argument: str, output: str, limits: dict[str, Any]) -> Report:
     from firable.nets.bundle import write_bundle
     from firable.nets.verdict import Status, overall
 
-    net, notes = load_net(argument)
-    found = check(net, budget=budget(**limits))
+    loaded = load_net(argument)
+    net = loaded.net
+    with loaded.placing():
+        found = check(net, budget=budget(**limits))
     if overall(found.verdicts) is not Status.PROVED:
-        return Report("bundle", argument, net, found.verdicts, figures=found.figures.to_json(), notes=notes)
-    made = make_bundle(net, found.verdicts)
+        return Report("bundle", argument, net, found.verdicts, figures=found.figures.to_json(), notes=loaded.notes)
+    with loaded.placing():
+        made = make_bundle(net, found.verdicts)
     write_bundle(output, made)
     return Report(
         "bundle",
@@ -44,7 +47,7 @@ def _report(argument: str, output: str, limits: dict[str, Any]) -> Report:
         net,
         made.verdicts,
         figures={**found.figures.to_json(), "bundle_digest": made.digest},
-        notes=notes,
+        notes=loaded.notes,
         table=table_json(made.decomposition),
         files=(output,),
     )

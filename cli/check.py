@@ -46,8 +46,10 @@ def check(
 def _report(argument: str, discipline: str, allowed: Budget, trace_dir: str | None, *, many: bool) -> Report:
     from firable.analysis.check import check as check_net
 
-    net, notes = load_net(argument)
-    found = check_net(net, discipline, allowed)
+    loaded = load_net(argument)
+    net = loaded.net
+    with loaded.placing():
+        found = check_net(net, discipline, allowed)
     files: tuple[str, ...] = ()
     if trace_dir is not None:
         from pathlib import Path
@@ -63,7 +65,7 @@ def _report(argument: str, discipline: str, allowed: Budget, trace_dir: str | No
         found.verdicts,
         discipline=discipline,
         figures=found.figures.to_json(),
-        notes=notes,
+        notes=loaded.notes,
         files=files,
     )
 

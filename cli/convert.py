@@ -27,12 +27,12 @@ def convert(source: str, output: str) -> int:
     suffix = Path(output).suffix.lower()
     if suffix not in PNML_SUFFIXES | TEXT_SUFFIXES:
         raise click.UsageError(f"cannot tell the format of '{output}': name a file *.firable.yaml or *.pnml")
-    net, notes = load_net(source)
+    loaded = load_net(source)
     if suffix in TEXT_SUFFIXES:
-        written, lost = format_net(net), notes
+        written, lost = format_net(loaded.net), loaded.notes
     else:
-        written, more = write_pnml(net)
-        lost = (*notes, *more)
+        written, more = write_pnml(loaded.net)
+        lost = (*loaded.notes, *more)
     write_text(output, written)
     for note in lost:
         text.show_diagnostic(note)

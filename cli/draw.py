@@ -29,7 +29,7 @@ def draw(net: str, output: str, marking: str | None, trace: str | None) -> int:
 
     if marking is not None and trace is not None:
         raise click.UsageError("--marking and --trace both say which tokens to show: leave one out")
-    loaded, _ = load_net(net)
+    loaded = load_net(net).net
     if trace is not None:
         from firable.semantics.trace import Fired, read_trace
         from firable.semantics.trace import replay as play

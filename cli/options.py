@@ -18,7 +18,7 @@ from firable.cli.report import ExitCode, Report, document, worst
 if TYPE_CHECKING:
     from firable.analysis.reachability import Budget
     from firable.nets.diagnostics import Diagnostic
-    from firable.nets.net import Net
+    from firable.nets.load import Loaded
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -70,20 +70,19 @@ def budget(max_markings: int, max_memory: int, max_seconds: float | None) -> Bud
     return Budget(max_markings, max_memory * _MEBIBYTE, max_seconds)
 
 
-def load_net(argument: str) -> tuple[Net, tuple[Diagnostic, ...]]:
-    """The net that an argument names, and what of its file it does not carry.
+def load_net(argument: str) -> Loaded:
+    """The net that an argument names, what of its file it does not carry, and where its parts stand in the file.
 
     The argument is a file (net file, PNML or bundle) or `catalogue:NAME`. Raises `InputError` as the readers do.
     """
     from firable.nets.bundle import read_bundle
-    from firable.nets.load import load
+    from firable.nets.load import Loaded, load
 
     if argument.startswith(CATALOGUE):
-        return load(catalogue_file(argument, "")).net, ()
+        return load(catalogue_file(argument, ""))
     if _is_archive(argument):
-        return read_bundle(argument).net, ()
-    loaded = load(argument)
-    return loaded.net, loaded.notes
+        return Loaded(read_bundle(argument).net)
+    return load(argument)
 
 
 def catalogue_file(argument: str, kind: str) -> Path:

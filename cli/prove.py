@@ -71,14 +71,25 @@ def show_obligations(net_verdicts: Sequence[Verdict]) -> None:
 
 
 def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
+    from firable.decompose.assumptions import assumptions
     from firable.decompose.prove import prove as prove_split
     from firable.decompose.split import split
 
-    net, notes = load_net(argument)
-    decomposition = split(net)
+    loaded = load_net(argument)
+    with loaded.placing():
+        decomposition = split(loaded.net)
     found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)))
     files = write_folder(smt_dir, dict(found.files)) if smt_dir is not None else ()
-    return Report("prove", argument, net, found.verdicts, notes=notes, table=table_json(decomposition), files=files)
+    return Report(
+        "prove",
+        argument,
+        loaded.net,
+        found.verdicts,
+        notes=loaded.notes,
+        table=table_json(decomposition),
+        assumptions=tuple(map(str, assumptions(decomposition))),
+        files=files,
+    )
 
 
 def show_table(rows: Sequence[Any]) -> None:
@@ -100,6 +111,10 @@ def _show(report: Report) -> None:
         click.echo("  no transition has more than one participant")
     click.echo(f"\n{click.style('obligations', bold=True)}")
     show_obligations(report.verdicts)
+    if report.assumptions:
+        click.echo(f"\n{click.style('assumed of the cell', bold=True)}")
+        for assumption in report.assumptions:
+            click.echo(f"  {assumption} [O4]")
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
     if refuted:
         text.show_verdicts(report.net, refuted)

@@ -35,7 +35,8 @@ def _report(file: str, argument: str) -> Report:
     from firable.nets.interchange import net_digest
     from firable.semantics.trace import Fired, read_trace
 
-    net, notes = load_net(argument)
+    loaded = load_net(argument)
+    net = loaded.net
     trace = read_trace(file)
     firings = [event.transitions for event in trace.events if isinstance(event, Fired)]
     verdict, marking = _verdict(net, trace)
@@ -45,7 +46,7 @@ def _report(file: str, argument: str) -> Report:
         file,
         net,
         (verdict,),
-        notes=notes,
+        notes=loaded.notes,
         run={
             "firings": {name: sum(name in fired for fired in firings) for name in net.transition_index},
             "marking": list(marking),

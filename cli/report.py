@@ -42,6 +42,7 @@ class Report:
     figures: Mapping[str, Any] = field(default_factory=dict)
     notes: Sequence[Diagnostic] = ()
     table: Sequence[Mapping[str, Any]] = ()
+    assumptions: Sequence[str] = ()
     files: Sequence[str] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
 
@@ -68,7 +69,7 @@ class Report:
             "digest": net_digest(self.net),
             "status": overall(self.verdicts).value,
         }
-        for key in ("discipline", "figures", "table", "files", "run"):
+        for key in ("discipline", "figures", "table", "assumptions", "files", "run"):
             if value := getattr(self, key):
                 data[key] = list(value) if isinstance(value, tuple) else value
         if self.notes:

@@ -20,7 +20,7 @@ from itertools import count
 
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.net import Controller, Net, Transition
+from firable.nets.net import Controller, Net, Place, Signal, Transition
 from firable.semantics.arbitration import Arbitration
 
 
@@ -119,15 +119,19 @@ def split(net: Net) -> Decomposition:
 
 def _problems(net: Net) -> Iterator[Diagnostic]:
     """Why the net cannot be split, before any name is given."""
-    for kind, items in (("places", net.places), ("signals", net.signals)):
-        for item in items:
-            if item.owner is None:
-                yield Diagnostic(
-                    "F2011",
-                    f"'{item.name}' has no owner, so no controller would keep it",
-                    "nest it under one of the `controllers`",
-                    (kind, item.name),
-                )
+    kinds: tuple[tuple[str, Sequence[Place | Signal]], ...] = (("places", net.places), ("signals", net.signals))
+    for kind, items in kinds:
+        orphans = [item.name for item in items if item.owner is None]
+        if orphans:
+            several = (
+                f"{len(orphans)} {kind} have no owner, first of them '{orphans[0]}': no controller would keep them"
+            )
+            yield Diagnostic(
+                "F2011",
+                several if orphans[1:] else f"'{orphans[0]}' has no owner, so no controller would keep it",
+                "nest what has no owner under one of the `controllers`",
+                (kind, orphans[0]),
+            )
     for name in unowned(net):
         transition = net.transition(name)
         if (

@@ -6,13 +6,16 @@ does not. Guessing from the content alone would let a broken PNML file be report
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from firable.nets import pnml, text
-from firable.nets.diagnostics import Diagnostic
+from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Net
+from firable.nets.text_positions import Positions
 
 PNML_SUFFIXES: Final = frozenset({".pnml", ".xml", ".tapn"})
 TEXT_SUFFIXES: Final = frozenset({".yaml", ".yml"})
@@ -20,10 +23,21 @@ TEXT_SUFFIXES: Final = frozenset({".yaml", ".yml"})
 
 @dataclass(frozen=True)
 class Loaded:
-    """A net, and what of its file it does not carry (nothing, for a net file)."""
+    """A net, what of its file it does not carry (nothing, for a net file), and where its parts stand in the file."""
 
     net: Net
     notes: tuple[Diagnostic, ...] = ()
+    positions: Positions | None = None
+
+    @contextmanager
+    def placing(self) -> Iterator[None]:
+        """Give the problems that are found with the net in this block their positions in its file."""
+        try:
+            yield
+        except InputError as error:
+            if self.positions is None:
+                raise
+            raise InputError(self.positions.place(error.diagnostics)) from None
 
 
 def load(path: str | Path) -> Loaded:
@@ -35,7 +49,8 @@ def load(path: str | Path) -> Loaded:
     if suffix in PNML_SUFFIXES or (suffix not in TEXT_SUFFIXES and _looks_like_xml(path)):
         imported = pnml.read_pnml(path)
         return Loaded(imported.net, imported.notes)
-    return Loaded(text.read_net(path))
+    net, positions = text.read_positioned(path)
+    return Loaded(net, positions=positions)
 
 
 def _looks_like_xml(path: str | Path) -> bool:

@@ -54,6 +54,14 @@ def read_net(path: str | Path) -> Net:
 
     Raises `InputError` with the position of every problem: F1001-F1012 for the text, F2001-F2019 for the net.
     """
+    return read_positioned(path)[0]
+
+
+def read_positioned(path: str | Path) -> tuple[Net, Positions]:
+    """Read a net file, and remember where everything stands: for problems that are found later, such as a split's.
+
+    Raises `InputError` as `read_net` does.
+    """
     return _parse(read_source(path, SIZE_BYTES_MAX))
 
 
@@ -68,10 +76,10 @@ def parse_net(text: str, file: str = "<text>") -> Net:
     source = Source(file, text)
     if len(text) > SIZE_BYTES_MAX:
         raise source.refuse("F1003", f"more than {SIZE_BYTES_MAX:,} characters", "is this the right text?")
-    return _parse(source)
+    return _parse(source)[0]
 
 
-def _parse(source: Source) -> Net:
+def _parse(source: Source) -> tuple[Net, Positions]:
     tree = parse_tree(source)
     if problem := version_problem(source, tree):
         raise InputError([problem])
@@ -79,7 +87,8 @@ def _parse(source: Source) -> Net:
         document = doc.NetDocument.model_validate(data(tree))
     except ValidationError as error:
         raise InputError(document_problems(source, tree, error)) from None
-    return _Reading(source, tree, document).net()
+    reading = _Reading(source, tree, document)
+    return reading.net(), reading.positions
 
 
 @dataclass(frozen=True)
