@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 MADE := $(VENV)/made
 CRATE := analysis/engine
 CARGO_OPTIONS := --locked --manifest-path $(CRATE)/Cargo.toml
-PYTEST_OPTIONS ?= -q -n 2
+PYTEST_OPTIONS ?= -q -n 2 --dist loadfile
 
 # Public nets to test against, where they stand beside the checkout; tests that miss them say so.
 ifneq ($(wildcard ../shared/nets),)
@@ -67,7 +67,7 @@ fmt: $(MADE)/develop $(MADE)/rust-tools ## format all code, and repair what the 
 	cargo fmt --manifest-path $(CRATE)/Cargo.toml
 
 bench: $(MADE)/develop ## measure; prints ratios against a reference in the same run
-	@for file in $(sort $(wildcard benchmarks/bench_*.py)); do $(BIN)/python $$file || exit 1; done
+	@for file in $(sort $(wildcard benchmarks/*.py)); do $(BIN)/python $$file || exit 1; done
 
 clean: ## remove what was built
 	rm -rf $(VENV) out build dist src/*.egg-info $(CRATE)/target .mypy_cache .ruff_cache .pytest_cache

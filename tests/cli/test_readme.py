@@ -1,0 +1,87 @@
+"""The README is executed: every command it shows is run, and must print what it shows.
+
+Blocks marked `console` hold commands after `$ ` and their output, in which a line `...` stands for any lines, and `...`
+within a line for any words. A `yaml` block is saved under the name that the sentence before it gives.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCK = re.compile(r"^```(console|yaml)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def session(text: str) -> list[tuple[str, str]]:
+    """The commands of a block, each with the output that it shows."""
+    return [(part.partition("\n")[0], part.partition("\n")[2]) for part in re.split(r"^\$ ", text, flags=re.M)[1:]]
+
+
+def fits(shown: str, printed: str) -> bool:
+    pattern = "".join("(?:.*\n)*" if line == "..." else words(line) + "\n" for line in shown.splitlines())
+    return re.fullmatch(pattern, printed) is not None
+
+
+def words(line: str) -> str:
+    return ".*".join(re.escape(part) for part in line.split("..."))
+
+
+def test_every_command_of_the_readme_prints_what_it_shows(tmp_path: Path) -> None:
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    status, commands = 0, 0
+    for match in BLOCK.finditer(README):
+        kind, text = match.groups()
+        if kind == "yaml":
+            (name,) = re.findall(r"Save this as `([^`]+)`", README[: match.start()].rpartition("```")[2])
+            (tmp_path / name).write_text(text, encoding="utf-8")
+            continue
+        for command, shown in session(text):
+            done = subprocess.run(
+                ["bash", "-c", f"(exit {status}); {command}"],
+                cwd=tmp_path,
+                env={**os.environ, "PATH": path, "NO_COLOR": "1", "COLUMNS": "120"},
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                check=False,
+            )
+            status, commands = done.returncode, commands + 1
+            assert fits(shown, done.stdout), f"$ {command}\n{done.stdout}"
+    assert commands >= 10
+
+
+@pytest.mark.parametrize(
+    ("shown", "printed", "fit"),
+    [
+        ("a\n", "a\n", True),
+        ("a\n", "a\nb\n", False),
+        ("a\n...\n", "a\nb\nc\n", True),
+        ("a ... c\n", "a b c\n", True),
+        ("a ... c\n", "a b d\n", False),
+        ("", "a\n", False),
+    ],
+)
+def test_the_comparison_is_strict(shown: str, printed: str, fit: bool) -> None:
+    assert fits(shown, printed) is fit
+
+
+@pytest.mark.parametrize("name", ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"])
+def test_links_and_paths_in_the_front_matter_exist(name: str) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#]+)\)", text):
+        assert target.startswith("https://") or (ROOT / target).exists(), f"{name} links to {target}"
+    for path in re.findall(r"`([a-z_]+/[\w/.-]*)`", text):
+        assert (ROOT / path).exists() or (ROOT / "src" / path).exists(), f"{name} names {path}"
+
+
+def test_every_make_target_that_is_named_exists() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([a-z-]+):", makefile, re.MULTILINE))
+    for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"):
+        named = set(re.findall(r"(?:^|`)make ([a-z-]+)", (ROOT / name).read_text(encoding="utf-8"), re.MULTILINE))
+        assert named <= targets, f"{name}: {named - targets}"
