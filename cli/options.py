@@ -97,9 +97,11 @@ def catalogue_file(argument: str, kind: str) -> Path:
 
 
 def _is_archive(path: str) -> bool:
+    from firable.nets.archive import SIGNATURE
+
     try:
         with Path(path).open("rb") as stream:
-            return stream.read(4) == b"PK\x03\x04"
+            return stream.read(len(SIGNATURE)) == SIGNATURE
     except (OSError, ValueError):  # the reader finds it again, and says it well
         return False
 

@@ -20,6 +20,9 @@ from zlib import crc32
 MEMBERS_MAX: Final = 65_000
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_.~%/-]{1,1000}")
+SIGNATURE: Final = b"PK\x03\x04"
+"""What every archive with a member begins with."""
+
 _LOCAL: Final = struct.Struct("<4s5H3I2H")
 _CENTRAL: Final = struct.Struct("<4s6H3I5H2I")
 _END: Final = struct.Struct("<4s4H2IH")
@@ -48,7 +51,7 @@ def pack(members: Mapping[str, bytes]) -> bytes:
         sizes = (crc32(data), len(data), len(data), len(spelled))
         directory += _CENTRAL.pack(b"PK\x01\x02", _VERSION, _VERSION, 0, 0, 0, _DATE, *sizes, 0, 0, 0, 0, 0, len(body))
         directory += spelled
-        body += _LOCAL.pack(b"PK\x03\x04", _VERSION, 0, 0, 0, _DATE, *sizes, 0) + spelled + data
+        body += _LOCAL.pack(SIGNATURE, _VERSION, 0, 0, 0, _DATE, *sizes, 0) + spelled + data
     end = _END.pack(b"PK\x05\x06", 0, 0, len(members), len(members), len(directory), len(body), 0)
     return bytes(body + directory + end)
 
@@ -57,7 +60,7 @@ def unpack(archive: bytes) -> dict[str, bytes]:
     """The members of an archive that `pack` made; raises `ArchiveError` for any other bytes."""
     members: dict[str, bytes] = {}
     position = 0
-    while archive[position : position + 4] == b"PK\x03\x04":
+    while archive[position : position + 4] == SIGNATURE:
         if position + _LOCAL.size > len(archive) or len(members) >= MEMBERS_MAX:
             raise ArchiveError("the archive is cut off or holds too many files")
         size_bytes, name_bytes = _LOCAL.unpack_from(archive, position)[8:10]

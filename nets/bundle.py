@@ -18,7 +18,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import stat
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -27,12 +26,12 @@ from pathlib import Path
 from typing import Any, Final, NoReturn
 from urllib.parse import quote
 
-from firable.nets.archive import ArchiveError, pack, unpack
+from firable.nets.archive import SIGNATURE, ArchiveError, pack, unpack
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.interchange import canonical_json, net_from_json, net_to_json
 from firable.nets.net import ArbitrationRule, Net
-from firable.nets.source import printable
+from firable.nets.source import printable, read_bytes
 from firable.nets.verdict import Verdict
 
 VERSION: Final = 1
@@ -222,24 +221,12 @@ def read_bundle(path: str | Path) -> Bundle:
     Raises `InputError`: F1001 where it cannot be read, F1003 where it is too large for a bundle, F5001 where it is
     damaged, changed, or none. Whether it may run is another question: `unproved`.
     """
-    path = Path(path)
-    name = printable(str(path))
-
-    def refuse(code: str, message: str, hint: str) -> InputError:
-        return InputError([Diagnostic(code, f"{name}: {message}", hint, span=Span(name, 1, 1))])
-
-    try:
-        mode, size_bytes = path.stat().st_mode, path.stat().st_size
-        if not stat.S_ISREG(mode):
-            kind = "a directory" if stat.S_ISDIR(mode) else "no regular file"
-            raise refuse("F1001", f"this is {kind}", "name a bundle file")
-        if size_bytes > SIZE_BYTES_MAX:
-            raise refuse("F1003", f"{size_bytes:,} bytes are more than a bundle has", "is this the right file?")
-        with path.open("rb") as stream:
-            archive = stream.read(SIZE_BYTES_MAX + 1)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise refuse("F1001", f"{reason}", "name a bundle file") from None
+    archive = read_bytes(path, SIZE_BYTES_MAX)
+    if not archive.startswith(SIGNATURE):
+        span = Span(printable(str(path)), 1, 1)
+        raise InputError(
+            [Diagnostic("F5001", "this is no bundle", "`firable bundle NET -o FILE` makes one", span=span)]
+        )
     return Bundle.from_bytes(archive, str(path))
 
 

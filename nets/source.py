@@ -91,7 +91,7 @@ def read_bytes(path: str | Path, size_bytes_max: int) -> bytes:
         if not stat.S_ISREG(status.st_mode):
             raise _refusal(path, "F1001", "this is not a regular file", "name a file that can be read twice")
         if status.st_size > size_bytes_max:
-            found = f"{status.st_size:,} bytes are more than a net of this format can need ({size_bytes_max:,})"
+            found = f"{status.st_size:,} bytes are more than such a file can need ({size_bytes_max:,})"
             raise _refusal(path, "F1003", found, "is this the right file?")
         with path.open("rb") as stream:
             data = stream.read(size_bytes_max + 1)
