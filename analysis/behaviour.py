@@ -173,13 +173,11 @@ def all_live(behaviour: Behaviour) -> Verdict:
         graph, nonlive = behaviour.graph, behaviour.nonlive
         if not nonlive:
             return yes()
-        lost = []
-        # A dead transition has its own verdict: show the loss of one that could fire, where there is one.
-        for name in [name for name in nonlive if name not in behaviour.dead] or nonlive:
-            index = first(~graph.backward(graph.may_fire(graph.net.transition_index[name])))
-            if index is not None:
-                lost.append((index, name))
-        index, name = min(lost)
+        # One is shown, as each costs a closure; a dead one only where there is no other, since it has its own verdict.
+        name = next((name for name in nonlive if name not in behaviour.dead), nonlive[0])
+        index = first(~graph.backward(graph.may_fire(graph.net.transition_index[name])))
+        if index is None:
+            raise WitnessError(f"{name} is not live and can fire again from everywhere")
         return no(nonlive, graph.witness(index, f"{name} can never fire after this"))
 
     return question.ask(behaviour.graph, find)
