@@ -32,7 +32,7 @@ from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.interchange import canonical_json, net_from_json, net_to_json
 from firable.nets.net import ArbitrationRule, Net
 from firable.nets.source import printable, read_bytes
-from firable.nets.verdict import Verdict
+from firable.nets.verdict import Verdict, Weight
 
 VERSION: Final = 1
 SIZE_BYTES_MAX: Final = 256 * 1024 * 1024
@@ -252,14 +252,18 @@ def write_bundle(path: str | Path, bundle: Bundle) -> None:
         raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
 
 
+CHECKED: Final = ("contact-free", "deadlock-free", "quasi-live", "conflicting-commands")
+"""The verdicts on every net, whatever its file states, without which it may not run."""
+
+
 def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
     """The names of the verdicts that must be PROVED before a net may run: derived from the net, not from what is there.
 
-    Contact-freeness and absence of deadlock, every property of the file, and of the decomposition Eq. (7) and (8) for
-    every transition, Eq. (9)-(10) for every place, ownership, M0, commands, and arbitration.
+    Of the net what `CHECKED` names and every property of the file; of the decomposition Eq. (7) and (8) for every
+    transition, Eq. (9)-(10) for every place, ownership, M0, commands, and arbitration.
     """
     net = decomposition.net
-    yield from ("contact-free", "deadlock-free")
+    yield from CHECKED
     yield from (f"property.{prop.name}" for prop in net.properties)
     yield from (f"{equation}.{t.name}" for t in net.transitions for equation in ("eq7", "eq8"))
     yield from (f"eq9-10.{place.name}" for place in net.places)
@@ -268,12 +272,16 @@ def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
 
 
 def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
-    """What keeps a bundle from running (F5002): nothing where every required verdict is PROVED, with its evidence."""
+    """What keeps a bundle from running (F5002): nothing where every required verdict is PROVED, with its evidence.
+
+    Required is what the net requires, and whatever else a verdict of the bundle says that it does.
+    """
     problems = []
     by_name: dict[str, list[Verdict]] = {}
     for verdict in bundle.verdicts:
         by_name.setdefault(verdict.name, []).append(verdict)
-    for name in dict.fromkeys(required_verdicts(bundle.decomposition)):
+    stated = (verdict.name for verdict in bundle.verdicts if verdict.weight is Weight.REQUIRED)
+    for name in dict.fromkeys((*required_verdicts(bundle.decomposition), *stated)):
         if name not in by_name:
             message = f"there is no verdict on '{name}'"
             problems.append(Diagnostic("F5002", message, _HINT, ("verdicts", name)))

@@ -16,7 +16,7 @@ from firable.decompose.bundling import make_bundle
 from firable.decompose.obligations import greedy
 from firable.decompose.prove import ProofReport, prove
 from firable.decompose.split import split
-from firable.nets.bundle import Bundle, required_verdicts, unproved
+from firable.nets.bundle import CHECKED, Bundle, required_verdicts, unproved
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition, Part
 from firable.nets.diagnostics import InputError
@@ -101,8 +101,7 @@ def test_every_obligation_of_a_split_is_proved(name: str) -> None:
     decomposition = split(load_net(name))
     report = prove(decomposition)
     assert report.holds
-    check = {"contact-free", "deadlock-free"}
-    assert {verdict.name for verdict in report.verdicts} == set(required_verdicts(decomposition)) - check
+    assert {verdict.name for verdict in report.verdicts} == set(required_verdicts(decomposition)) - set(CHECKED)
 
 
 def test_gated_net_is_proved() -> None:
@@ -333,7 +332,7 @@ def test_granted_term_is_what_the_arbiter_decides(data: st.DataObject) -> None:
 
 
 def check_verdicts(net: Net) -> list[Verdict]:
-    names = ("contact-free", "deadlock-free", *(f"property.{prop.name}" for prop in net.properties))
+    names = (*CHECKED, *(f"property.{prop.name}" for prop in net.properties))
     return [Verdict(name, Status.PROVED, "by exploration", "explicit") for name in names]
 
 

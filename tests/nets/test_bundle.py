@@ -230,10 +230,19 @@ def test_bundle_with_every_verdict_proved_may_run() -> None:
 
 def test_required_verdicts_follow_from_the_net() -> None:
     assert list(required_verdicts(DECOMPOSITION)) == [
-        *("contact-free", "deadlock-free", "property.apart"),
+        *("contact-free", "deadlock-free", "quasi-live", "conflicting-commands", "property.apart"),
         *("eq7.G", "eq8.G", "eq7.l", "eq8.l", "eq9-10.a.p", "eq9-10.b.q", "eq9-10.a.r"),
         *("ownership", "initial-marking", "commands", "arbitration", "arbitration.next"),
     ]
+
+
+def test_a_further_verdict_that_says_it_is_required_must_be_proved_too() -> None:
+    for status in (Status.UNKNOWN, Status.VIOLATED):
+        further = Verdict("reversible", status, "M0 can be reached again", "by hand", Weight.REQUIRED)
+        found = unproved(replace(BUNDLE, verdicts=(*VERDICTS, further)))
+        assert [(d.code, d.subject) for d in found] == [("F5002", ("verdicts", "reversible"))]
+        informing = replace(further, weight=Weight.INFORMATION)
+        assert unproved(replace(BUNDLE, verdicts=(*VERDICTS, informing))) == ()
 
 
 @pytest.mark.parametrize("name", [*required_verdicts(DECOMPOSITION)])
