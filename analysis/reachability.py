@@ -44,7 +44,6 @@ __all__ = [
     "explore",
     "first",
     "indexes",
-    "is_step",
 ]
 
 Column = npt.NDArray[np.bool_]
@@ -222,7 +221,7 @@ class ReachabilityGraph:
         Raises `WitnessError` where it is none of the net.
         """
         for fired in firings:
-            allowed = is_step(self.player, marking, fired) if self.discipline is Discipline.STEP else len(fired) == 1
+            allowed = self.player.is_step(marking, fired) if self.discipline is Discipline.STEP else len(fired) == 1
             if not allowed or not all(self.net.transitions[t].openable for t in fired):
                 raise WitnessError(f"{self._names(fired)} may not fire in {self.net.names(marking)}")
             try:
@@ -286,39 +285,6 @@ def explore(
         max_seconds=budget.seconds,
     )
     return ReachabilityGraph(net, discipline, budget, graph)
-
-
-def is_step(player: Player, marking: Marking, fired: FiringSet) -> bool:
-    """Whether a set is a maximal set without conflict of E(v), for some valuation v of the signals.
-
-    The player's own `steps` tries all valuations. Here one is searched for that opens the gates of the set and closes a
-    gate of every other transition that could fire with it, so that nets with many signals can be replayed too.
-    """
-    candidates, chosen, net = player.may_fire(marking), frozenset(fired), player.net
-    if not chosen or not chosen <= set(candidates) or not player.conflicts.free(chosen):
-        return False
-    valuation: dict[str, bool] = {}
-    for t in chosen:
-        for gate in net.transitions[t].external:
-            if valuation.setdefault(gate.signal, gate.wanted) != gate.wanted:
-                return False
-    to_close = [
-        tuple((gate.signal, not gate.wanted) for gate in net.transitions[t].external)
-        for t in candidates
-        if t not in chosen and not player.conflicts.rivals[t] & chosen
-    ]
-    return _satisfiable(to_close, valuation)
-
-
-def _satisfiable(clauses: list[tuple[tuple[str, bool], ...]], valuation: dict[str, bool]) -> bool:
-    """Whether a valuation that extends the given one makes a literal of every clause true, by branching."""
-    open_clauses = [c for c in clauses if not any(valuation.get(signal) is value for signal, value in c)]
-    if not open_clauses:
-        return True
-    clause = min(open_clauses, key=len)
-    return any(
-        _satisfiable(open_clauses, {**valuation, signal: value}) for signal, value in clause if signal not in valuation
-    )
 
 
 def _reader(rows: npt.NDArray[np.uint64]) -> Callable[[int], Column]:

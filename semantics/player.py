@@ -146,6 +146,25 @@ class Player:
             if step
         }
 
+    def is_step(self, marking: Marking, fired: Iterable[int]) -> bool:
+        """Whether the transitions are one of `steps`, without trying all valuations of the signals.
+
+        One valuation is searched for, by branching, that opens the gates of the set and closes a gate of every other
+        transition that could fire with it.
+        """
+        candidates, chosen = self.may_fire(marking), frozenset(fired)
+        if not chosen or not chosen <= set(candidates) or not jointly_openable(self.net, chosen):
+            return False
+        if not self.conflicts.free(chosen):
+            return False
+        valuation = {gate.signal: gate.wanted for t in chosen for gate in self.net.transitions[t].external}
+        to_close = [
+            tuple((gate.signal, not gate.wanted) for gate in self.net.transitions[t].external)
+            for t in candidates
+            if t not in chosen and not self.conflicts.rivals[t] & chosen
+        ]
+        return _satisfiable(to_close, valuation)
+
     def successors(self, marking: Marking, *, step: bool = False) -> Iterator[tuple[FiringSet, Marking]]:
         """What may fire, and the marking after it, under either discipline."""
         labels: Iterable[FiringSet] = sorted(self.steps(marking)) if step else ((t,) for t in self.may_fire(marking))
@@ -184,10 +203,14 @@ class Player:
             remaining -= set(free)
         return tuple(order)
 
-    def jointly_enabled(self, marking: Marking, transitions: Iterable[int]) -> bool:
-        """Whether all are firable at the marking and one valuation opens them all."""
-        wanted = tuple(transitions)
-        return set(wanted) <= set(self.firable(marking)) and jointly_openable(self.net, wanted)
-
     def _shown(self, marking: Marking) -> str:
         return "{" + ", ".join(self.net.names(marking)) + "}"
+
+
+def _satisfiable(clauses: list[tuple[tuple[str, bool], ...]], valuation: dict[str, bool]) -> bool:
+    """Whether a valuation that extends the given one makes a literal of every clause true."""
+    unmet = [c for c in clauses if not any(valuation.get(signal) is value for signal, value in c)]
+    if not unmet:
+        return True
+    clause = min(unmet, key=len)
+    return any(_satisfiable(unmet, {**valuation, signal: value}) for signal, value in clause if signal not in valuation)

@@ -337,7 +337,7 @@ class _Replayer:
         wanted = tuple(sorted(fired))
         if self.trace.header.signals:
             return wanted in self.player.maximal_steps(self.player.enabled(self.marking, self.signals))
-        return wanted in self.player.steps(self.marking)
+        return self.player.is_step(self.marking, wanted)
 
     def why_not(self, t: int) -> str:
         masks, names = self.net.masks[t], self.net.names

@@ -11,9 +11,9 @@ from support.reference import load_net
 
 from firable.analysis import reachability
 from firable.analysis.check import check
-from firable.analysis.reachability import Budget, IncompleteGraph, WitnessError, explore, first, is_step
+from firable.analysis.reachability import Budget, IncompleteGraph, WitnessError, explore, first
 from firable.nets.formula import parse_formula
-from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
+from firable.nets.net import Net, Place, Transition
 from firable.nets.verdict import Status
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
@@ -53,29 +53,6 @@ def test_columns_reach_over_more_than_64_places() -> None:
     for i in (0, 63, 64, 127, 128, 149):
         assert list(graph.marked(i)) == [j == i for j in range(n)]
     assert graph.witness(149).marking == ("p149",)
-
-
-@settings(max_examples=100, deadline=None)
-@given(sparse_nets(signals=True), st.data())
-def test_a_set_is_a_step_iff_the_player_lists_it(net: Net, data: st.DataObject) -> None:
-    player = Player(net)
-    marking = data.draw(st.sampled_from(list(player.reachable(step=True))))
-    steps = player.steps(marking)
-    fired = tuple(data.draw(st.sets(st.integers(0, len(net.transitions) - 1)).map(sorted)))
-    assert is_step(player, marking, fired) is (fired in steps)
-    assert all(is_step(player, marking, step) for step in steps)
-
-
-def test_a_step_is_recognised_among_many_signals() -> None:
-    n = 60
-    places = tuple(Place(f"p{i}", marked=True) for i in range(n))
-    signals = tuple(Signal(f"s{i}") for i in range(n))
-    moves = tuple(Transition(f"t{i}", (f"p{i}",), external=(ExternalGate(f"s{i}"),)) for i in range(n))
-    net = Net("wide", places, (*moves, Transition("free", ("p0",))), signals)
-    player = Player(net)
-    assert is_step(player, net.initial_marking, (1, 5, n))
-    assert not is_step(player, net.initial_marking, (1, 5))  # `free` could fire too
-    assert not is_step(player, net.initial_marking, (0, n))  # they share p0
 
 
 def test_a_sequence_that_is_none_of_the_net_is_an_internal_error() -> None:

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.generate import nets
+from support.generate_sparse import sparse_nets
 
 from firable.nets.net import ExternalGate, Marking, Net, Place, Signal, Transition
 from firable.semantics.algebra import BOOL, Bitwise
@@ -149,3 +150,26 @@ def test_a_step_is_serialisable_iff_some_order_replays_it(net: Net, marking: int
         assert player.serialisable(step) == any(
             played(player, marking, order) == together for order in permutations(step)
         )
+
+
+@settings(max_examples=100, deadline=None)
+@given(sparse_nets(signals=True), st.data())
+def test_a_set_is_a_step_iff_the_player_lists_it(net: Net, data: st.DataObject) -> None:
+    player = Player(net)
+    marking = data.draw(st.sampled_from(list(player.reachable(step=True))))
+    steps = player.steps(marking)
+    fired = tuple(data.draw(st.sets(st.integers(0, len(net.transitions) - 1)).map(sorted)))
+    assert player.is_step(marking, fired) is (fired in steps)
+    assert all(player.is_step(marking, step) for step in steps)
+
+
+def test_a_step_is_recognised_among_many_signals() -> None:
+    n = 60
+    places = tuple(Place(f"p{i}", marked=True) for i in range(n))
+    signals = tuple(Signal(f"s{i}") for i in range(n))
+    moves = tuple(Transition(f"t{i}", (f"p{i}",), external=(ExternalGate(f"s{i}"),)) for i in range(n))
+    net = Net("wide", places, (*moves, Transition("free", ("p0",))), signals)
+    player = Player(net)
+    assert player.is_step(net.initial_marking, (1, 5, n))
+    assert not player.is_step(net.initial_marking, (1, 5))  # `free` could fire too
+    assert not player.is_step(net.initial_marking, (0, n))  # they share p0
