@@ -87,16 +87,20 @@ def shuffled_lines(draw: st.DrawFn, text: str) -> str:
     return "\n".join(lines)
 
 
+def well_told(refusal: InputError, text: str) -> None:
+    assert 0 < len(refusal.diagnostics) <= 20
+    for problem in refusal.diagnostics:
+        assert problem.span is not None
+        assert problem.hint
+        assert problem.span.line <= text.count("\n") + text.count("\r") + 1
+        assert all(len(line) < 2000 for line in str(problem).splitlines())
+
+
 def read_or_refused(read: Callable[[str], Net], text: str) -> None:
     try:
         net = read(text)
     except InputError as error:
-        assert 0 < len(error.diagnostics) <= 20
-        for problem in error.diagnostics:
-            assert problem.span is not None
-            assert problem.hint
-            assert problem.span.line <= text.count("\n") + text.count("\r") + 1
-            assert all(len(line) < 2000 for line in str(problem).splitlines())
+        well_told(error, text)
     else:
         assert parse_net(format_net(net)).places == net.places
 
