@@ -10,6 +10,7 @@ import click
 from firable.cli import text
 from firable.cli.options import analysis_options, answer_all, budget, format_option, load_net, write_folder
 from firable.cli.report import Report
+from firable.cli.structure import structure_json, structure_lines
 
 if TYPE_CHECKING:
     from firable.analysis.check import Report as CheckReport
@@ -27,10 +28,17 @@ if TYPE_CHECKING:
 )
 @analysis_options
 @click.option("--trace-dir", metavar="DIR", help="Write the firing sequence of each violation, for `firable replay`.")
+@click.option("--structure", is_flag=True, help="Also net class, P- and T-invariants, siphons and traps.")
 @click.option("-v", "--verbose", is_flag=True, help="Tell the firing sequences of warnings too.")
 @format_option
 def check(
-    nets: tuple[str, ...], discipline: str, trace_dir: str | None, verbose: bool, format_: str, **limits: Any
+    nets: tuple[str, ...],
+    discipline: str,
+    trace_dir: str | None,
+    structure: bool,
+    verbose: bool,
+    format_: str,
+    **limits: Any,
 ) -> int:
     """Check nets by exploring all their reachable markings, external gates free.
 
@@ -39,24 +47,32 @@ def check(
     reached); Ctrl-C ends the exploration and shows what is known so far.
     """
     allowed = budget(**limits)
-    makers = [partial(_report, net, discipline, allowed, trace_dir, many=len(nets) > 1) for net in nets]
+    makers = [
+        partial(_report, net, discipline, allowed, trace_dir, structure=structure, many=len(nets) > 1) for net in nets
+    ]
     return answer_all("check", format_, makers, partial(_show, verbose=verbose))
 
 
-def _report(argument: str, discipline: str, allowed: Budget, trace_dir: str | None, *, many: bool) -> Report:
+def _report(
+    argument: str, discipline: str, allowed: Budget, trace_dir: str | None, *, structure: bool, many: bool
+) -> Report:
     from firable.analysis.check import check as check_net
 
     loaded = load_net(argument)
     net = loaded.net
     with loaded.placing():
         found = check_net(net, discipline, allowed)
+    figures = found.figures.to_json()
+    if structure:
+        contacts = found.figures.contacts
+        figures["structure"] = structure_json(net, contact_free=None if contacts is None else not contacts)
     files: tuple[str, ...] = ()
     if trace_dir is not None:
         from pathlib import Path
 
         from firable.nets.bundle import file_stem
 
-        folder = str(Path(trace_dir) / file_stem(net.name or "net")) if many else trace_dir
+        folder = str(Path(trace_dir) / file_stem(argument)) if many else trace_dir
         files = write_folder(folder, _traces(found))
     return Report(
         "check",
@@ -64,7 +80,7 @@ def _report(argument: str, discipline: str, allowed: Budget, trace_dir: str | No
         net,
         found.verdicts,
         discipline=discipline,
-        figures=found.figures.to_json(),
+        figures=figures,
         notes=loaded.notes,
         files=files,
     )
@@ -98,6 +114,10 @@ def _show(report: Report, *, verbose: bool) -> None:
         f"{words}, external gates free"
     )
     text.show_verdicts(report.net, report.verdicts, verbose=verbose)
+    if "structure" in figures:
+        click.echo(f"\n{click.style('structure', bold=True)}")
+        for line in structure_lines(figures["structure"]):
+            click.echo(f"  {line}")
     text.show_summary(report)
     for file in report.files:
         click.echo(f"  replay it: firable replay {file} --net {report.input}")

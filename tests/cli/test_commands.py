@@ -73,6 +73,52 @@ def test_every_counterexample_replays(tmp_path: Path, capsys: pytest.CaptureFixt
             assert code == 0, trace
 
 
+def test_the_structure_is_told_on_request(capsys: pytest.CaptureFixture[str]) -> None:
+    code, data = as_json(capsys, "check", "catalogue:one_robot", "--structure")
+    structure = data["reports"][0]["figures"]["structure"]
+    assert (code, len(structure["p_invariants"]["minimal"]), structure["p_invariants"]["dimension"]) == (0, 68, 14)
+    assert structure["p_invariants"]["uncovered"] == []
+    assert main(["check", "catalogue:one_robot", "--structure"]) == 0
+    assert "P-invariants  68 minimal, dimension 14; all places are in one" in capsys.readouterr().out
+    _, data = as_json(capsys, "check", "catalogue:conceptual_one_robot_mc_late", "--structure")
+    assert data["reports"][0]["figures"]["structure"]["siphons_without_marked_trap"]
+
+
+def test_an_interrupted_check_shows_what_is_known(tmp_path: Path) -> None:
+    count = 60  # philosophers: far more markings than anyone waits for
+    seats = range(count)
+    places = [f"  {kind}{i}:" for i in seats for kind in ("thinking", "eating", "fork")]
+    taken = [f"thinking{i}, fork{i}, fork{(i + 1) % count}" for i in seats]
+    transitions = [
+        line
+        for i in seats
+        for line in (
+            f"  take{i}: {{from: [{taken[i]}], to: eating{i}}}",
+            f"  put{i}: {{from: eating{i}, to: [{taken[i]}]}}",
+        )
+    ]
+    start = ", ".join(f"thinking{i}, fork{i}" for i in seats)
+    net = tmp_path / "table.firable.yaml"
+    lines = ["firable: 1", "cell: table", f"start: [{start}]", "places:", *places, "transitions:", *transitions]
+    net.write_text("\n".join(lines) + "\n")
+    # The signal comes once the exploration runs: the interpreter's own thread sends it from beside the engine.
+    script = (
+        "import os, signal, sys, threading, firable.analysis.reachability as r\n"
+        "from firable.cli.main import main\n"
+        "engine = r._engine.explore\n"
+        "def explore(*arguments, **options):\n"
+        "    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        "    return engine(*arguments, **options)\n"
+        "r._engine.explore = explore\n"
+        f"sys.exit(main(['check', {str(net)!r}]))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 3, done.stdout + done.stderr
+    assert "markings found" in done.stdout
+    assert "interrupted" in done.stdout
+    assert done.stderr == ""
+
+
 def test_several_nets_get_a_report_each_and_the_worst_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
     code, data = as_json(capsys, "check", "catalogue:one_robot", "catalogue:one_robot_mc_late")
     assert (code, [report["status"] for report in data["reports"]]) == (1, ["proved", "violated"])
