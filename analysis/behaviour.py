@@ -132,7 +132,11 @@ def deadlock_free(behaviour: Behaviour) -> Verdict:
         graph = behaviour.graph
         deadlock = first(graph.deadlocks)
         if deadlock is not None:
-            note = f"{int(graph.deadlocks.sum()):,} deadlock markings{'' if graph.complete else ' at least'}"
+            count = int(graph.deadlocks.sum())
+            found = (
+                "1 marking of the net is a deadlock" if count == 1 else f"{count:,} markings of the net are deadlocks"
+            )
+            note = found if graph.complete else f"at least {found}"
             return no((), graph.witness(deadlock, note))
         graph.require_complete()
         return yes()
@@ -226,7 +230,7 @@ def no_doomed(behaviour: Behaviour) -> Verdict:
     """No reachable marking is doomed: while the cell runs, every deadlock can still be avoided."""
     question = Question(
         "doomed-markings",
-        "in no reachable marking a deadlock is bound to come",
+        "no reachable marking is doomed: a deadlock can still be avoided from each",
         Weight.WARNING,
         hint="the last firing of the sequence is the point of no return: give it an input or gate that forbids it",
     )
