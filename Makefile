@@ -15,7 +15,7 @@ ifneq ($(wildcard ../shared/nets),)
 export FIRABLE_NETS ?= $(abspath ../shared/nets)
 endif
 
-# The crate links to the Python that the environment was made with.
+# The crate is built for the Python that the environment was made with.
 export PYO3_PYTHON = $(abspath $(BIN)/python)
 
 .DEFAULT_GOAL := help
@@ -53,7 +53,7 @@ lint-rust-format: $(MADE)/rust-tools
 	cargo fmt --manifest-path $(CRATE)/Cargo.toml --check
 
 lint-clippy: $(MADE)/rust-tools
-	cargo clippy --quiet $(CARGO_OPTIONS) --all-targets -- -D warnings
+	cargo clippy --quiet $(CARGO_OPTIONS) --all-targets --all-features -- -D warnings
 
 test-rust: $(MADE)/develop
 	cargo test $(CARGO_OPTIONS) --quiet

@@ -154,13 +154,17 @@ def _witness(graph: ReachabilityGraph, run: EagerRun, note: str) -> Witness | No
     index = graph.net.transition_index
     parts: list[list[FiringSet]] = []
     for part in (run.prefix, run.cycle):
-        steps = [tuple(sorted(index[name] for name in step)) for step in part]
-        if graph.discipline is Discipline.INTERLEAVING:
-            orders = [graph.player.order_of(step) for step in steps]
-            if None in orders:
+        fired: list[FiringSet] = []
+        for step in part:
+            together = tuple(sorted(index[name] for name in step))
+            if graph.discipline is Discipline.STEP:
+                fired.append(together)
+                continue
+            order = graph.player.order_of(together)
+            if order is None:
                 return None
-            steps = [(t,) for order in orders for t in order or ()]
-        parts.append(steps)
+            fired += [(t,) for t in order]
+        parts.append(fired)
     prefix, cycle = parts
     marking = graph.replay(graph.net.initial_marking, prefix)
     if graph.replay(marking, cycle) != marking:

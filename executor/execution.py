@@ -26,7 +26,18 @@ from typing import Final
 from firable.executor.controller import LocalController
 from firable.executor.coordinator import Coordinator
 from firable.executor.drivers import Driver
-from firable.executor.messages import Decision, Effect, Firing, Message, Sending, Taken, VoteRequest
+from firable.executor.messages import (
+    Acknowledgement,
+    Decision,
+    Effect,
+    Firing,
+    Message,
+    Report,
+    Sending,
+    Taken,
+    Vote,
+    VoteRequest,
+)
 from firable.executor.recorder import Recorder
 from firable.executor.situation import Situation, State, blocked, is_deadlock
 from firable.nets.decomposition import Decomposition
@@ -261,8 +272,9 @@ class Execution:
         box = self.mailboxes[COORDINATOR]
         while True:
             await box.wait()
-            item = box.items.popleft()
-            self._perform(self.coordinator.receive(item))  # type: ignore[arg-type]
+            match box.items.popleft():
+                case Report() | Vote() | Acknowledgement() as message:
+                    self._perform(self.coordinator.receive(message))
             self._handled()
 
     async def _control(self, name: str) -> None:

@@ -34,7 +34,7 @@ def _number(value: object) -> object:
 
 
 def _version(value: object) -> object:
-    return int(value) if value in {"1", 1} and not isinstance(value, bool) else value
+    return 1 if value == "1" else value
 
 
 Name = Annotated[str, Field(min_length=1)]

@@ -52,7 +52,9 @@ class CommandDocument(BaseModel):
     """The output signal of a place: machine, command, and any further keys as parameters of the command."""
 
     model_config = ConfigDict(extra="allow", strict=True, frozen=True)
-    __pydantic_extra__: dict[str, str]
+    # As pydantic's documentation has it; other type checkers object, for the attribute is mutable.
+    # ty: ignore[incompatible-mutable-override]
+    __pydantic_extra__: dict[str, str]  # pyright: ignore[reportIncompatibleVariableOverride]
 
     machine: Name
     command: Name

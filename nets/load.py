@@ -6,7 +6,7 @@ does not. Guessing from the content alone would let a broken PNML file be report
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +30,7 @@ class Loaded:
     positions: Positions | None = None
 
     @contextmanager
-    def placing(self) -> Iterator[None]:
+    def placing(self) -> Generator[None]:
         """Give the problems that are found with the net in this block their positions in its file."""
         try:
             yield

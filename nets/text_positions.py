@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -28,8 +28,16 @@ _SECOND: Final = frozenset({"F2001", "F2006", "F2007"})
 _UNKNOWN: Final = frozenset({"F2002", "F2003", "F2004"})
 
 
-_Found = Node | tuple[Scalar, int, int]
-"""A node, or a part of a scalar: the scalar, the index of the part (from 0) and its length."""
+@dataclass(frozen=True, slots=True)
+class _Within:
+    """A part of a scalar: where it begins in the text of the scalar (from 0), and its length."""
+
+    scalar: Scalar
+    at: int
+    length: int
+
+
+_Found = Node | _Within
 
 
 class Positions:
@@ -56,8 +64,8 @@ class Positions:
         match found:
             case None:
                 return node_span(self.source, self.tree)
-            case (formula, at, length):
-                return self._inside(formula, at, length)
+            case _Within(scalar, at, length):
+                return self._inside(scalar, at, length)
             case _:
                 return node_span(self.source, found)
 
@@ -109,7 +117,7 @@ class Positions:
             for formula in _scalars(body):
                 # A formula names its places without quotes, between blanks and brackets.
                 for match in re.finditer(r"[^\s()]+", formula.text):
-                    yield ("properties", name, match.group()), (formula, match.start(), len(match.group()))
+                    yield ("properties", name, match.group()), _Within(formula, match.start(), len(match.group()))
 
     def _scope(self, scope: Node, path: Subject, prefix: str) -> Iterator[tuple[Subject, _Found]]:
         for item in _names(scope, "start"):

@@ -25,6 +25,7 @@ pub mod step;
 #[forbid(unsafe_code)]
 pub mod table;
 
+#[cfg(feature = "extension-module")]
 #[pyo3::pymodule(name = "_engine")]
 mod python {
     use std::sync::{Arc, OnceLock};
