@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 MADE := $(VENV)/made
 CRATE := analysis/engine
 CARGO_OPTIONS := --locked --manifest-path $(CRATE)/Cargo.toml
-PYTEST_OPTIONS ?= -q -n 2 --dist loadfile
+PYTEST_OPTIONS ?= -q -n auto --dist loadfile
 
 # Public nets to test against, where they stand beside the checkout; tests that miss them say so.
 ifneq ($(wildcard ../shared/nets),)
@@ -76,6 +76,8 @@ clean: ## remove what was built
 $(MADE)/venv:
 	@test -n "$(PYTHON)" || { echo "firable needs Python 3.11 or later; none was found (make PYTHON=... names one)"; exit 1; }
 	@command -v cargo >/dev/null || { echo "firable needs cargo, to build its Rust crate"; exit 1; }
+	@cargo --version | $(PYTHON) -c 'import re, sys; found = tuple(map(int, re.findall(r"\d+", sys.stdin.read())[:2])); \
+		found >= (1, 88) or sys.exit("firable needs cargo 1.88 or later, to build its Rust crate; here is %d.%d" % found)'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
 	@mkdir -p $(MADE) && touch $@

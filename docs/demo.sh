@@ -3,7 +3,7 @@
 set -u
 BIN=${BIN:-.venv/bin}
 OUT=${OUT:-out}
-PATH="$PWD/$BIN:$PATH"
+PATH="$(cd "$BIN" && pwd):$PATH"
 mkdir -p "$OUT"
 
 if [ -t 1 ] && [ -z "${NO_COLOR:-}" ]; then bold=$(printf '\033[1m') plain=$(printf '\033[0m'); else bold='' plain=''; fi
