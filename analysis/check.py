@@ -78,7 +78,7 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Report:
+class CheckReport:
     """What `check` found of a net under one discipline; `graph` is there for further questions."""
 
     net: Net
@@ -100,7 +100,9 @@ class Report:
         raise KeyError(name)
 
 
-def check(net: Net, discipline: Discipline | str = Discipline.INTERLEAVING, budget: Budget | None = None) -> Report:
+def check(
+    net: Net, discipline: Discipline | str = Discipline.INTERLEAVING, budget: Budget | None = None
+) -> CheckReport:
     """Explore the net under a discipline, external gates free, and decide every verdict of this room.
 
     Raises `InputError` F2013 where the arbiters do not fit the conflicts of the net.
@@ -113,7 +115,7 @@ def check(net: Net, discipline: Discipline | str = Discipline.INTERLEAVING, budg
     return report_on(explore(net, discipline, budget))
 
 
-def report_on(graph: ReachabilityGraph) -> Report:
+def report_on(graph: ReachabilityGraph) -> CheckReport:
     """Decide every verdict of this room on a graph that was explored before."""
     behaviour, conflicts = Behaviour(graph), ConflictAnalysis(graph)
     verdicts = [
@@ -125,7 +127,7 @@ def report_on(graph: ReachabilityGraph) -> Report:
         starvation_free(behaviour),
         *decide_properties(graph),
     ]
-    return Report(graph.net, graph.discipline, figures(behaviour, conflicts), tuple(verdicts), graph)
+    return CheckReport(graph.net, graph.discipline, figures(behaviour, conflicts), tuple(verdicts), graph)
 
 
 _ON_BEHAVIOUR: Final[tuple[Callable[[Behaviour], Verdict], ...]] = (

@@ -13,7 +13,7 @@ from firable.cli.report import Report
 from firable.cli.structure import structure_json, structure_lines
 
 if TYPE_CHECKING:
-    from firable.analysis.check import Report as CheckReport
+    from firable.analysis.check import CheckReport
     from firable.analysis.reachability import Budget
 
 

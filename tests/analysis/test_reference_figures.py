@@ -10,7 +10,7 @@ import pytest
 from support.reference import Case, cases, load_net, local
 
 from firable.analysis.behaviour import Behaviour
-from firable.analysis.check import Report, check
+from firable.analysis.check import CheckReport, check
 from firable.analysis.commands import entries
 from firable.analysis.equivalence import isomorphic
 from firable.analysis.reachability import explore
@@ -86,11 +86,11 @@ class Expectation:
 
     def __init__(self, net: Net) -> None:
         self.net = net
-        self.report: Report = check(net)
-        self.step: Report = check(net, "step")
+        self.report: CheckReport = check(net)
+        self.step: CheckReport = check(net, "step")
         self.player = Player(net)
 
-    def markings(self, report: Report) -> set[frozenset[str]]:
+    def markings(self, report: CheckReport) -> set[frozenset[str]]:
         graph = report.graph
         return {frozenset(map(local, graph.names(i))) for i in range(graph.n_markings)}
 

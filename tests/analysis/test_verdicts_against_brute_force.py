@@ -11,7 +11,7 @@ from support.generate import nets
 from support.generate_sparse import sparse_nets
 from support.reference import cases
 
-from firable.analysis.check import Report, check
+from firable.analysis.check import CheckReport, check
 from firable.nets.net import Marking, Net, Place, Transition
 from firable.nets.verdict import Status, Witness
 from firable.semantics.conflict import gate_races, jointly_openable
@@ -71,7 +71,7 @@ class Truth:
         self.player = Player(net)
         self.graph: Graph = self.player.reachable(step=self.step)
         self.reach = {marking: closure(self.graph, marking) for marking in self.graph}
-        self.report: Report = check(net, discipline)
+        self.report: CheckReport = check(net, discipline)
 
     def names(self, transitions: list[int]) -> tuple[str, ...]:
         return tuple(self.net.transitions[t].name for t in transitions)
