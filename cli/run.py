@@ -125,8 +125,6 @@ def _stepping(speed: float | None) -> Operator:
     """The operator who fires one transition at a time from the terminal."""
     import asyncio
 
-    from firable.executor.situation import State
-
     async def asked() -> str:
         prompt = "  next [Enter], run on [r], stop [q]: "
         try:
@@ -148,8 +146,8 @@ def _stepping(speed: float | None) -> Operator:
                     case "r":
                         execution.resume()
                         return
-            elif execution.situation().state in {State.DEADLOCK, State.FAULT, State.DONE, State.STOPPED}:
-                execution.resume()
+            elif execution.at_rest:
+                execution.resume()  # nothing to step, and nothing will come: the run ends as it would without steps
                 return
             else:
                 await asyncio.sleep(0.05)

@@ -173,6 +173,14 @@ class Execution:
         """The time since the run began."""
         return self.clock.now_seconds() if self.clock is not None else 0.0
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing is pending: no message under way, no event in the cell to come, no completion awaited.
+
+        Then time alone changes nothing; only the operator, by a step or a resume, may let something fire.
+        """
+        return not self.under_way and self.driver.at_rest and not self.overdue
+
     def situation(self) -> Situation:
         """What the run is doing, and what waits for what; exact at quiescence."""
         player, word = self.recorder.player, self.recorder.word
@@ -387,13 +395,13 @@ class Execution:
             return self.situation()
         if self.stopping:
             return replace(self.situation(), state=State.STOPPED, message="stopped by the operator")
-        at_rest = self.driver.at_rest and not self.overdue
-        if at_rest and self.draining:
+        # What a pause holds back still has to fire before the cycle, or the work, is at its end.
+        if self.at_rest and self.draining and not self.paused:
             return replace(self.situation(), state=State.STOPPED, message="stopped at the end of the cycle")
-        if at_rest and self.is_complete():
+        if self.at_rest and self.is_complete() and not (self.paused and self.operated):
             return replace(self.situation(), state=State.DONE, blocked=())
         # With an operator present, a cell at rest is waited for: it may be paused, or be given work.
-        is_stuck = at_rest and not self.operated
+        is_stuck = self.at_rest and not self.operated
         if is_stuck or is_deadlock(self.recorder.player, self.recorder.word):
             return self.situation()
         return None

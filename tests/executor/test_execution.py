@@ -207,6 +207,42 @@ def test_single_step_fires_one_transition_at_a_time() -> None:
     assert {"G1", "G2", "G3", "t1-a"} <= set(stepped)
 
 
+@pytest.mark.parametrize(
+    ("disturbance", "state"),
+    [
+        (StuckSensor("conveyor.part_at_entry", value=False), State.WAITING),
+        (NeverCompletes("MC", "CLAMP"), State.FAULT),
+    ],
+)
+def test_cell_is_at_rest_when_nothing_is_pending_and_not_while_a_completion_is_awaited(
+    disturbance: Disturbance, state: State
+) -> None:
+    async def operator(execution: Execution) -> None:
+        execution.pause()
+        while await execution.step() is not None or not execution.at_rest:
+            await asyncio.sleep(0.5)
+        assert not execution.overdue
+        execution.resume()
+
+    report, _ = run_cell("one_robot", 1, operator=operator, disturbances=[disturbance])
+    assert report.state is state
+
+
+def test_paused_run_does_not_end_while_the_operator_holds_firings_back() -> None:
+    async def operator(execution: Execution) -> None:
+        while firings(execution) < 14:
+            await asyncio.sleep(0.5)
+        execution.pause()
+        execution.stop(at_end_of_cycle=True)
+        await asyncio.sleep(100.0)
+        assert execution.at_rest
+        execution.resume()
+
+    report, _ = run_cell("one_robot", 1, operator=operator, overdue_seconds=1000.0)
+    assert sum(report.firings.values()) == 15
+    assert report.situation.marking == catalogue_net("one_robot").names(catalogue_net("one_robot").initial_marking)
+
+
 def test_step_is_for_a_paused_run() -> None:
     async def operator(execution: Execution) -> None:
         assert await execution.step() is None
