@@ -5,15 +5,15 @@ number of tokens is the same in every reachable marking, whatever the gates do: 
 T-invariant x counts firings that, if they can be fired at all, bring the marking back. A self-loop cancels, and reads
 are gates.
 
-Method: the algorithm of Farkas, as Colom and Silva put it (1991, "Convex geometry and semiflows in P/T nets"). The
-rows of [I | C] are combined pairwise to cancel one column of C after the other, and a row whose support contains that
-of another one is dropped, so that what remains after each column are exactly the minimal solutions so far; integers
-throughout, each row divided by its greatest common divisor. Their number can be exponential, so rows are bounded:
-past the bound the result is `complete=False` and holds only the rows that were finished, which are minimal invariants
-all the same, because an extreme ray of a cone that lies in a smaller cone is an extreme ray of that one too. The
-dimension of the solution space is exact and cheap in either case (rank by sympy, over the rationals). The rejected
-alternative, a basis from linear algebra, has negative entries, which no engineer reads as "these places share one
-token".
+Method: the algorithm of Farkas, as Colom and Silva put it (1991, "Convex geometry and semiflows in P/T nets"). The rows
+of [I | C] are combined pairwise to cancel one column of C after the other, and a row whose support contains that of
+another one is dropped, so that what remains after each column are exactly the minimal solutions so far; integers
+throughout, each row divided by its greatest common divisor. Their number can be exponential, so rows are bounded, and
+there may be a deadline: past either bound the result is `complete=False` and holds only the rows that were finished,
+which are minimal invariants all the same, because an extreme ray of a cone that lies in a smaller cone is an extreme
+ray of that one too. The dimension of the solution space is exact and cheap (rank by sympy, over the rationals). The
+rejected alternative, a basis from linear algebra, has negative entries, which no engineer reads as "these places share
+one token".
 
 Every vector is multiplied out against C before it is handed out.
 """
@@ -28,6 +28,7 @@ from typing import Final
 from sympy import QQ
 from sympy.polys.matrices import DomainMatrix
 
+from firable.analysis.deadline import NEVER, Deadline
 from firable.nets.net import Marking, Net
 
 ROWS_MAX: Final = 5_000
@@ -58,11 +59,12 @@ class Invariant:
 class Invariants:
     """The minimal semi-positive invariants of a net, and the dimension of the space of all rational ones.
 
-    Where not `complete`, the bound on rows was reached: all listed are minimal invariants, and there may be more.
+    Where not `complete`, the bound on rows or the deadline was reached: all listed are minimal invariants, and there
+    may be more. The dimension is None where the deadline came before it was computed.
     """
 
     minimal: tuple[Invariant, ...]
-    dimension: int
+    dimension: int | None
     complete: bool
 
     def uncovered(self, names: Sequence[str]) -> tuple[str, ...]:
@@ -78,7 +80,7 @@ def incidence(net: Net) -> Matrix:
     )
 
 
-def p_invariants(net: Net, *, rows_max: int = ROWS_MAX) -> Invariants:
+def p_invariants(net: Net, *, rows_max: int = ROWS_MAX, deadline: Deadline = NEVER) -> Invariants:
     """The minimal semi-positive P-invariants.
 
     >>> from firable.nets.catalogue import catalogue_net
@@ -86,24 +88,30 @@ def p_invariants(net: Net, *, rows_max: int = ROWS_MAX) -> Invariants:
     >>> len(found.minimal), found.dimension, found.complete
     (68, 14, True)
     """
-    return _invariants(incidence(net), [place.name for place in net.places], rows_max)
+    return _invariants(incidence(net), [place.name for place in net.places], rows_max, deadline)
 
 
-def t_invariants(net: Net, *, rows_max: int = ROWS_MAX) -> Invariants:
+def t_invariants(net: Net, *, rows_max: int = ROWS_MAX, deadline: Deadline = NEVER) -> Invariants:
     """The minimal semi-positive T-invariants."""
     names = [transition.name for transition in net.transitions]
     rows = incidence(net)
-    return _invariants(tuple(tuple(row[t] for row in rows) for t in range(len(names))), names, rows_max)
+    return _invariants(tuple(tuple(row[t] for row in rows) for t in range(len(names))), names, rows_max, deadline)
 
 
-def _invariants(matrix: Matrix, names: list[str], rows_max: int) -> Invariants:
+def _invariants(matrix: Matrix, names: list[str], rows_max: int, deadline: Deadline) -> Invariants:
     """The minimal y >= 0 with y `matrix` = 0; `names` are those of its rows."""
-    vectors, complete = _minimal_solutions(matrix, rows_max)
+    vectors, complete = _minimal_solutions(matrix, rows_max, deadline)
+    columns = tuple(zip(*matrix, strict=True))
+    checked = []
     for vector in vectors:
-        if any(sum(y * entry for y, entry in zip(vector, column, strict=True)) for column in zip(*matrix, strict=True)):
+        if deadline.over:
+            complete = False
+            break
+        if any(sum(y * entry for y, entry in zip(vector, column, strict=True)) for column in columns):
             raise AssertionError("a vector that is no invariant came out of the elimination")
-    found = tuple(Invariant(tuple((name, y) for name, y in zip(names, v, strict=True) if y)) for v in vectors)
-    return Invariants(found, len(names) - rank(matrix), complete)
+        checked.append(vector)
+    found = tuple(Invariant(tuple((name, y) for name, y in zip(names, v, strict=True) if y)) for v in checked)
+    return Invariants(found, None if deadline.over else len(names) - rank(matrix), complete)
 
 
 def rank(matrix: Matrix) -> int:
@@ -122,7 +130,7 @@ class _Row:
     rest: tuple[int, ...]
 
 
-def _minimal_solutions(matrix: Matrix, rows_max: int) -> tuple[list[tuple[int, ...]], bool]:
+def _minimal_solutions(matrix: Matrix, rows_max: int, deadline: Deadline) -> tuple[list[tuple[int, ...]], bool]:
     n = len(matrix)
     rows = [_Row(1 << i, tuple(int(i == j) for j in range(n)), tuple(row)) for i, row in enumerate(matrix)]
     columns = set(range(len(matrix[0]))) if matrix else set()
@@ -140,10 +148,18 @@ def _minimal_solutions(matrix: Matrix, rows_max: int) -> tuple[list[tuple[int, .
                     row = _combined(up, down, column)
                     combined[row.support] = row
                 if len(combined) > rows_max:
-                    finished = [row.solution for row in rows if not any(row.rest)]
-                    return sorted(finished, reverse=True), False
-        rows = _minimal(combined)
+                    return _finished(rows), False
+            if deadline.over:
+                return _finished(rows), False
+        minimal = _minimal(combined, deadline)
+        if minimal is None:
+            return _finished(rows), False
+        rows = minimal
     return sorted((row.solution for row in rows), reverse=True), True
+
+
+def _finished(rows: list[_Row]) -> list[tuple[int, ...]]:
+    return sorted((row.solution for row in rows if not any(row.rest)), reverse=True)
 
 
 def _growth(rows: list[_Row], column: int) -> int:
@@ -161,10 +177,12 @@ def _combined(up: _Row, down: _Row, column: int) -> _Row:
     return _Row(up.support | down.support, tuple(x // divisor for x in solution), tuple(x // divisor for x in rest))
 
 
-def _minimal(rows: dict[int, _Row]) -> list[_Row]:
-    """The rows whose support contains the support of no other one."""
+def _minimal(rows: dict[int, _Row], deadline: Deadline) -> list[_Row] | None:
+    """The rows whose support contains the support of no other one; None where the deadline comes first."""
     found: list[_Row] = []
     for row in sorted(rows.values(), key=lambda row: row.support.bit_count()):
+        if deadline.over:
+            return None
         if not any(other.support & row.support == other.support for other in found):
             found.append(row)
     return found

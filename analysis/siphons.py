@@ -6,11 +6,11 @@ marked. In a deadlock of an ordinary net the empty places are a siphon, so if ev
 that is marked in M0 no deadlock is reachable (Commoner 1972; Hack 1972). This proves deadlock-freeness without
 exploring anything.
 
-The minimal siphons are found by z3: a formula says "these places are a non-empty siphon and contain none found
-before"; each model is shrunk, place by place, to a minimal one, and excluded with all that contain it. When the
-formula is unsatisfiable, all are found. Their number can be exponential, so it is bounded, and the time too; short of
-that the list is said to be incomplete. The rejected alternative is the branching search of Cordone and others (2005),
-faster on large nets and three times the code.
+The minimal siphons are found by z3: a formula says "these places are a non-empty siphon and contain none found before";
+each model is shrunk, place by place, to a minimal one, and excluded with all that contain it. When the formula is
+unsatisfiable, all are found. Their number can be exponential, so it is bounded, and there may be a deadline for all
+questions together; short of the end the list is said to be incomplete. The rejected alternative is the branching search
+of Cordone and others (2005), faster on large nets and three times the code.
 
 For the net of this toolkit the argument has premises. The firing rule also forbids firings: internal gates, contact,
 a signal wanted both 1 and 0, self-loops. In the markings where one of these holds a transition back, the empty places
@@ -26,10 +26,10 @@ from typing import Final
 
 import z3
 
+from firable.analysis.deadline import NEVER, Deadline
 from firable.nets.net import Marking, Net
 
 SIPHONS_MAX: Final = 2_000
-TIMEOUT_MS: Final = 30_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,8 @@ class PlaceSets:
 class DeadlockTrap:
     """The deadlock-trap property: does every minimal siphon contain a trap that is marked in M0?
 
-    `siphons` are the minimal siphons looked at, `without_marked_trap` those that refute the property. `premises` says
+    `siphons` are the minimal siphons, not `complete` where not all were found or looked into; `without_marked_trap` are
+    those that refute the property. `premises` says
     what is missing for a conclusion on deadlock; the property alone concludes nothing about it.
     """
 
@@ -63,7 +64,7 @@ class DeadlockTrap:
         return self.holds and not self.premises
 
 
-def minimal_siphons(net: Net, *, most: int = SIPHONS_MAX, timeout_ms: int = TIMEOUT_MS) -> PlaceSets:
+def minimal_siphons(net: Net, *, most: int = SIPHONS_MAX, deadline: Deadline = NEVER) -> PlaceSets:
     """The minimal non-empty siphons.
 
     >>> from firable.nets.net import Net, Place, Transition
@@ -72,12 +73,12 @@ def minimal_siphons(net: Net, *, most: int = SIPHONS_MAX, timeout_ms: int = TIME
     >>> minimal_siphons(net).minimal
     (('p', 'q'),)
     """
-    return _minimal_sets(net, _siphon_rules(net), most, timeout_ms)
+    return _minimal_sets(net, _siphon_rules(net), most, deadline)
 
 
-def minimal_traps(net: Net, *, most: int = SIPHONS_MAX, timeout_ms: int = TIMEOUT_MS) -> PlaceSets:
+def minimal_traps(net: Net, *, most: int = SIPHONS_MAX, deadline: Deadline = NEVER) -> PlaceSets:
     """The minimal non-empty traps."""
-    return _minimal_sets(net, _trap_rules(net), most, timeout_ms)
+    return _minimal_sets(net, _trap_rules(net), most, deadline)
 
 
 def largest_trap(net: Net, places: Marking) -> Marking:
@@ -91,12 +92,18 @@ def largest_siphon(net: Net, places: Marking) -> Marking:
 
 
 def deadlock_trap(
-    net: Net, *, contact_free: bool | None = None, most: int = SIPHONS_MAX, timeout_ms: int = TIMEOUT_MS
+    net: Net, *, contact_free: bool | None = None, most: int = SIPHONS_MAX, deadline: Deadline = NEVER
 ) -> DeadlockTrap:
     """Decide the deadlock-trap property; `contact_free` is what is known of that verdict (None: nothing)."""
-    siphons = minimal_siphons(net, most=most, timeout_ms=timeout_ms)
-    bare = tuple(s for s in siphons.minimal if not largest_trap(net, net.marking(s)) & net.initial_marking)
-    return DeadlockTrap(siphons, bare, tuple(_missing_premises(net, contact_free)))
+    siphons = minimal_siphons(net, most=most, deadline=deadline)
+    bare = []
+    for siphon in siphons.minimal:
+        if deadline.over:
+            siphons = PlaceSets(siphons.minimal, complete=False)
+            break
+        if not largest_trap(net, net.marking(siphon)) & net.initial_marking:
+            bare.append(siphon)
+    return DeadlockTrap(siphons, tuple(bare), tuple(_missing_premises(net, contact_free)))
 
 
 def _missing_premises(net: Net, contact_free: bool | None) -> Iterator[str]:
@@ -136,10 +143,10 @@ def _largest(places: Marking, rules: tuple[Rule, ...]) -> Marking:
     return places
 
 
-def _minimal_sets(net: Net, rules: tuple[Rule, ...], most: int, timeout_ms: int) -> PlaceSets:
+def _minimal_sets(net: Net, rules: tuple[Rule, ...], most: int, deadline: Deadline) -> PlaceSets:
+    """Raises `KeyboardInterrupt` where the user ends the solver."""
     chosen = [z3.Bool(f"p{i}") for i in range(len(net.places))]
     solver = z3.Solver()
-    solver.set("timeout", timeout_ms)
     solver.set("random_seed", 0)
     solver.add(z3.Or(*chosen))
     for condition, needed in rules:
@@ -147,21 +154,27 @@ def _minimal_sets(net: Net, rules: tuple[Rule, ...], most: int, timeout_ms: int)
         for i in _bits(condition):
             solver.add(z3.Implies(chosen[i], alternatives))
     found: list[Marking] = []
-    complete = False
-    while len(found) < most:
-        answer = solver.check()
-        if answer != z3.sat:
-            complete = answer == z3.unsat
+    answer = z3.unknown
+    while not deadline.over:
+        answer = _answer(solver, deadline)
+        if answer != z3.sat or len(found) == most:
             break
         model = solver.model()
         places = sum(1 << i for i, variable in enumerate(chosen) if z3.is_true(model[variable]))
         smallest = _shrunk(places, lambda inner: _largest(inner, rules))
         found.append(smallest)
         solver.add(z3.Or(*(z3.Not(chosen[i]) for i in _bits(smallest))))
-    else:
-        complete = solver.check() == z3.unsat
     names = sorted((tuple(_bits(places)) for places in found), key=lambda bits: (len(bits), bits))
-    return PlaceSets(tuple(tuple(net.places[i].name for i in bits) for bits in names), complete)
+    return PlaceSets(tuple(tuple(net.places[i].name for i in bits) for bits in names), answer == z3.unsat)
+
+
+def _answer(solver: z3.Solver, deadline: Deadline) -> z3.CheckSatResult:
+    solver.set("timeout", deadline.left_milliseconds)
+    answer = solver.check()
+    # z3 takes the signal of Ctrl-C for itself and calls it an answer.
+    if answer == z3.unknown and "interrupted" in solver.reason_unknown():
+        raise KeyboardInterrupt
+    return answer
 
 
 def _shrunk(places: Marking, largest_within: Callable[[Marking], Marking]) -> Marking:

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 )
 @analysis_options
 @click.option("--trace-dir", metavar="DIR", help="Write the firing sequence of each violation, for `firable replay`.")
-@click.option("--structure", is_flag=True, help="Also net class, P- and T-invariants, siphons and traps.")
+@click.option(
+    "--structure", is_flag=True, help="Also net class, invariants, siphons, traps; in --max-seconds more, or 30."
+)
 @click.option("-v", "--verbose", is_flag=True, help="Tell the firing sequences of warnings too.")
 @format_option
 def check(
@@ -65,7 +67,9 @@ def _report(
     figures = found.figures.to_json()
     if structure:
         contacts = found.figures.contacts
-        figures["structure"] = structure_json(net, contact_free=None if contacts is None else not contacts)
+        contact_free = None if contacts is None else not contacts
+        # Anew, since the structure is wanted most where the exploration has used up its own time.
+        figures["structure"] = structure_json(net, contact_free=contact_free, seconds=allowed.seconds)
     files: tuple[str, ...] = ()
     if trace_dir is not None:
         from pathlib import Path

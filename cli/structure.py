@@ -1,35 +1,71 @@
-"""`firable check --structure`: what the arcs alone say of a net, for `check` to print beside its verdicts."""
+"""`firable check --structure`: what the arcs alone say of a net, for `check` to print beside its verdicts.
+
+The lists can be exponentially long, so all of them share one deadline; Ctrl-C is that deadline too, so that it loses
+none of the verdicts that are there already.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
+    from firable.analysis.deadline import Deadline
     from firable.analysis.invariants import Invariants
     from firable.nets.net import Net
 
+T = TypeVar("T")
+
+SECONDS_DEFAULT = 30.0
 _SHOWN_MAX = 8
 
 
-def structure_json(net: Net, *, contact_free: bool | None) -> dict[str, Any]:
-    """Net class, invariants, siphons and traps as JSON data; `contact_free` is what is known of that verdict."""
-    from firable.analysis.invariants import p_invariants, t_invariants
+def structure_json(net: Net, *, contact_free: bool | None, seconds: float | None) -> dict[str, Any]:
+    """Net class, invariants, siphons and traps as JSON data; `contact_free` is what is known of that verdict.
+
+    The lists take `seconds` together, by default 30. Where that is too short, or at Ctrl-C, `ended_early` says so and
+    those not finished are not `complete`.
+    """
+    from firable.analysis.deadline import Deadline
+    from firable.analysis.invariants import Invariants, p_invariants, t_invariants
     from firable.analysis.net_class import net_class
-    from firable.analysis.siphons import deadlock_trap, minimal_traps
+    from firable.analysis.siphons import DeadlockTrap, PlaceSets, deadlock_trap, minimal_traps
+
+    deadline, ended_early = Deadline.after(SECONDS_DEFAULT if seconds is None else seconds), ""
+
+    def found(technique: Callable[[Deadline], T], nothing: T) -> T:
+        nonlocal ended_early
+        if not ended_early:
+            try:
+                result = technique(deadline)
+            except KeyboardInterrupt:
+                ended_early = "interrupted"
+            else:
+                ended_early = "time" if deadline.over else ""
+                return result
+        return nothing
 
     kind = net_class(net, contact_free=contact_free)
-    siphons = deadlock_trap(net, contact_free=contact_free)
-    traps = minimal_traps(net)
+    no_vectors, no_sets = Invariants((), None, complete=False), PlaceSets((), complete=False)
+    of_places = found(lambda until: p_invariants(net, deadline=until), no_vectors)
+    of_transitions = found(lambda until: t_invariants(net, deadline=until), no_vectors)
+    siphons = found(
+        lambda until: deadlock_trap(net, contact_free=contact_free, deadline=until), DeadlockTrap(no_sets, (), ())
+    )
+    traps = found(lambda until: minimal_traps(net, deadline=until), no_sets)
     return {
         "net_class": kind.name,
+        "pure": kind.pure,
+        "connected": kind.connected,
+        "strongly_connected": kind.strongly_connected,
         "outside_of_its_theorems": list(kind.outside),
-        "p_invariants": _invariants(p_invariants(net), [place.name for place in net.places]),
-        "t_invariants": _invariants(t_invariants(net), [transition.name for transition in net.transitions]),
+        "p_invariants": _invariants(of_places, [place.name for place in net.places]),
+        "t_invariants": _invariants(of_transitions, [transition.name for transition in net.transitions]),
         "siphons": {"minimal": [list(s) for s in siphons.siphons.minimal], "complete": siphons.siphons.complete},
         "traps": {"minimal": [list(trap) for trap in traps.minimal], "complete": traps.complete},
         "siphons_without_marked_trap": [list(siphon) for siphon in siphons.without_marked_trap],
         "siphons_exclude_deadlock": siphons.excludes_deadlock,
+        "ended_early": ended_early,
     }
 
 
@@ -42,26 +78,45 @@ def _invariants(found: Invariants, names: Sequence[str]) -> dict[str, Any]:
     }
 
 
+_ENDED_EARLY = {"time": "the time for the structure is over", "interrupted": "interrupted"}
+
+
 def structure_lines(structure: Mapping[str, Any]) -> Iterator[str]:
     """The same for a person, from the JSON data."""
     yield f"class         {structure['net_class']}"
     for reason in structure["outside_of_its_theorems"]:
         yield f"              outside of its theorems: {reason}"
-    for key, words in (("p_invariants", "P-invariants"), ("t_invariants", "T-invariants")):
+    joined = "strongly connected" if structure["strongly_connected"] else "connected, but not strongly"
+    yield f"graph         {joined if structure['connected'] else 'of several parts without an arc between them'}"
+    for key, words, of in (
+        ("p_invariants", "P-invariants", "places"),
+        ("t_invariants", "T-invariants", "transitions"),
+    ):
         found = structure[key]
-        of = "places" if key == "p_invariants" else "transitions"
-        uncovered = found["uncovered"]
-        cover = f"all {of} are in one" if not uncovered else f"in none: {_some(uncovered)}"
-        yield f"{words}  {_count(found)}, dimension {found['dimension']}; {cover}"
-    bare = structure["siphons_without_marked_trap"]
-    held = "each contains a marked trap" if not bare else f"{len(bare)} without a marked trap, as {_some(bare[0])}"
+        dimension = "" if found["dimension"] is None else f", dimension {found['dimension']}"
+        yield f"{words}  {_count(found)}{dimension}{_cover(found, of)}"
+    siphons, bare = structure["siphons"], structure["siphons_without_marked_trap"]
+    held = ""
+    if bare:
+        held = f"; {len(bare)} without a marked trap, as {_some(bare[0])}"
+    elif siphons["complete"]:
+        held = "; each contains a marked trap"
     proof = ", which proves that there is no deadlock" if structure["siphons_exclude_deadlock"] else ""
-    yield f"siphons       {_count(structure['siphons'])}; {held}{proof}"
+    yield f"siphons       {_count(siphons)}{held}{proof}"
     yield f"traps         {_count(structure['traps'])}"
+    if reason := structure["ended_early"]:
+        yield f"incomplete    {_ENDED_EARLY[reason]}: of the lists above, those 'so far' are not finished"
+
+
+def _cover(found: Mapping[str, Any], of: str) -> str:
+    if not found["uncovered"]:
+        return f"; all {of} are in one"
+    # Another invariant may still cover them, so nothing is said of a part.
+    return f"; in none: {_some(found['uncovered'])}" if found["complete"] else ""
 
 
 def _count(found: Mapping[str, Any]) -> str:
-    return f"{len(found['minimal'])} minimal{'' if found['complete'] else ' and more'}"
+    return f"{len(found['minimal'])} minimal{'' if found['complete'] else ' so far'}"
 
 
 def _some(names: Sequence[str]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import count, product
 
 import pytest
 from hypothesis import given, settings
@@ -10,6 +10,7 @@ from support.generate import nets
 from support.generate_sparse import sparse_nets
 from support.reference import load_net, reference_names
 
+from firable.analysis.deadline import Deadline
 from firable.analysis.invariants import incidence, p_invariants, rank, t_invariants
 from firable.nets.net import Net, Place, Transition
 from firable.semantics.player import Player
@@ -132,3 +133,19 @@ def test_the_rank_is_exact() -> None:
     assert rank(((1, 2), (2, 4))) == 1
     assert rank(((1, 2), (2, 5))) == 2
     assert rank(()) == 0
+
+
+def test_past_the_deadline_the_list_is_incomplete_and_what_it_holds_is_invariant(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    net = load_net("cell1")
+    whole = p_invariants(net)
+    for seconds in range(0, 400, 7):
+        ticks = map(float, count())
+        monkeypatch.setattr("firable.analysis.deadline.monotonic", ticks.__next__)
+        part = p_invariants(net, deadline=Deadline.after(seconds))
+        assert set(part.minimal) <= set(whole.minimal)
+        assert part.dimension in {None, whole.dimension}
+        assert part.complete <= (part.minimal == whole.minimal)
+    assert not p_invariants(net, deadline=Deadline.after(0)).complete
+    assert p_invariants(net, deadline=Deadline.after(1e9)) == whole

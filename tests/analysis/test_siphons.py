@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import chain, combinations
+from itertools import chain, combinations, count
 
 import pytest
 import z3
@@ -13,6 +13,7 @@ from support.generate_sparse import sparse_nets
 from support.reference import load_net, reference_names
 
 from firable.analysis.check import check
+from firable.analysis.deadline import Deadline
 from firable.analysis.siphons import deadlock_trap, largest_siphon, largest_trap, minimal_siphons, minimal_traps
 from firable.nets.net import Net, Place, Transition
 from firable.nets.verdict import Status
@@ -120,3 +121,33 @@ def test_a_solver_that_gives_up_leaves_the_list_incomplete(monkeypatch: pytest.M
     monkeypatch.setattr(z3.Solver, "check", lambda _: z3.unknown)
     assert not minimal_siphons(load_net("fig2a")).complete
     assert not deadlock_trap(load_net("fig2a"), contact_free=True).holds
+
+
+def test_one_deadline_ends_all_questions_together_and_what_was_found_till_then_is_true(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    net, clock = load_net("cell1"), count()
+    whole = minimal_siphons(net)
+    monkeypatch.setattr("firable.analysis.deadline.monotonic", lambda: float(next(clock)))
+    part = minimal_siphons(net, deadline=Deadline.after(20))
+    assert not part.complete
+    assert 0 < len(part.minimal) < len(whole.minimal)
+    assert set(part.minimal) < set(whole.minimal)
+    assert not deadlock_trap(net, contact_free=True, deadline=Deadline.after(20)).holds
+    assert not minimal_traps(net, deadline=Deadline.after(0)).complete
+
+
+def test_siphons_that_the_deadline_leaves_unread_prove_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    net = load_net("cell1")
+    found = minimal_siphons(net)
+    assert found.complete
+    monkeypatch.setattr("firable.analysis.siphons.minimal_siphons", lambda *_, **__: found)
+    assert deadlock_trap(net, contact_free=True).excludes_deadlock
+    assert not deadlock_trap(net, contact_free=True, deadline=Deadline.after(0)).excludes_deadlock
+
+
+def test_ctrl_c_that_the_solver_took_for_itself_interrupts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(z3.Solver, "check", lambda _: z3.unknown)
+    monkeypatch.setattr(z3.Solver, "reason_unknown", lambda _: "interrupted from keyboard")
+    with pytest.raises(KeyboardInterrupt):
+        minimal_siphons(load_net("fig2a"))

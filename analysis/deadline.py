@@ -1,0 +1,44 @@
+"""A deadline: the moment after which a technique stops and hands out what it has found so far.
+
+A limit of seconds for each question to a solver bounds nothing where there are thousands of questions. So several
+techniques share one moment, and each of them asks whether it is over between two steps of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, inf
+from time import monotonic
+from typing import Final
+
+_MILLISECONDS_MAX: Final = 2**31 - 1  # the longest timeout of z3 that is safe to ask for, 24 days
+
+
+@dataclass(frozen=True, slots=True)
+class Deadline:
+    """A moment of the monotonic clock, in seconds; by default it never comes."""
+
+    at_seconds: float = inf
+
+    @classmethod
+    def after(cls, seconds: float) -> Deadline:
+        """The moment that is so many seconds away.
+
+        >>> Deadline.after(0).over, Deadline().over
+        (True, False)
+        """
+        return cls(monotonic() + seconds)
+
+    @property
+    def over(self) -> bool:
+        """Whether the moment has come."""
+        return monotonic() >= self.at_seconds
+
+    @property
+    def left_milliseconds(self) -> int:
+        """The time left for one question to a solver, at least 1: to z3, 0 is no limit."""
+        left = self.at_seconds - monotonic()
+        return _MILLISECONDS_MAX if left * 1000 >= _MILLISECONDS_MAX else max(1, ceil(left * 1000))
+
+
+NEVER: Final = Deadline()

@@ -1,0 +1,60 @@
+"""`check --structure` ends when its time is over or at Ctrl-C, says so, and keeps the verdicts."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from typing import Any
+
+import jsonschema
+import pytest
+
+from firable.cli.main import main
+
+SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+
+
+def report_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
+    main(["check", "catalogue:one_robot", "--structure", *arguments, "--format", "json"])
+    data = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator(SCHEMA).validate(data)
+    return data["reports"][0]
+
+
+def test_no_time_gives_incomplete_lists_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    structure = report_of(capsys, "--max-seconds", "0")["figures"]["structure"]
+    assert structure["ended_early"] == "time"
+    assert not any(structure[name]["complete"] for name in ("p_invariants", "t_invariants", "siphons", "traps"))
+    assert not structure["siphons_exclude_deadlock"]
+    main(["check", "catalogue:one_robot", "--structure", "--max-seconds", "0"])
+    told = capsys.readouterr().out.partition("\nstructure\n")[2]
+    assert "incomplete    the time for the structure is over" in told
+    assert "P-invariants  0 minimal so far\n" in told  # and nothing on the places in none
+    assert "siphons       0 minimal so far\n" in told  # and not that each of them contains a marked trap
+
+
+def test_ctrl_c_in_a_list_ends_all_of_them_and_keeps_the_verdicts(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = report_of(capsys)
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("firable.analysis.siphons.deadlock_trap", interrupted)
+    part = report_of(capsys)
+    assert part["verdicts"] == whole["verdicts"]
+    structure = part["figures"]["structure"]
+    assert structure["ended_early"] == "interrupted"
+    assert structure["p_invariants"] == whole["figures"]["structure"]["p_invariants"]
+    assert (structure["siphons"], structure["traps"]) == ({"minimal": [], "complete": False},) * 2
+    main(["check", "catalogue:one_robot", "--structure"])
+    assert "incomplete    interrupted: " in capsys.readouterr().out
+
+
+def test_the_graph_of_arcs_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    structure = report_of(capsys)["figures"]["structure"]
+    assert structure["ended_early"] == ""
+    assert (structure["pure"], structure["connected"], structure["strongly_connected"]) == (True, True, True)
+    main(["check", "catalogue:one_robot", "--structure"])
+    assert "graph         strongly connected\n" in capsys.readouterr().out
