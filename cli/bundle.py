@@ -39,7 +39,7 @@ def _report(argument: str, output: str, limits: dict[str, Any]) -> Report:
     if overall(found.verdicts) is not Status.PROVED:
         return Report("bundle", argument, net, found.verdicts, figures=found.figures.to_json(), notes=loaded.notes)
     with loaded.placing():
-        made = make_bundle(net, found.verdicts)
+        made = make_bundle(found)
     write_bundle(output, made)
     return Report(
         "bundle",

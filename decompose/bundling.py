@@ -1,38 +1,42 @@
 """Filling the bundle: a net may be bundled only when everything that it must prove is proved.
 
-The obligations of the decomposition are proved here; the verdicts of `firable check` are handed in by whoever explored
-the net, for this room does not explore. What is demanded is what the executor will demand when it reads the bundle:
-both ask `unproved`, so that no bundle is made that could not run.
+The obligations of the decomposition are proved here; what exploring the net shows is handed in as the report of
+`firable.analysis.check`, because verdicts alone do not say of which net they are: those on a good net would let any
+other run. So the net that is bundled is the one in the report. What is demanded of both is what the executor will
+demand when it reads the bundle: both ask `unproved`, so that no bundle is made that could not run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
+from firable.analysis.check import CheckReport
 from firable.decompose.prove import TIMEOUT_MS, prove
 from firable.decompose.split import split
 from firable.nets.bundle import Bundle, unproved
-from firable.nets.diagnostics import InputError
-from firable.nets.net import Net
-from firable.nets.verdict import Verdict
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.semantics.trace import Discipline
 
 
 def make_bundle(
-    net: Net,
-    verdicts: Iterable[Verdict],
-    evidence: Mapping[str, str] | None = None,
-    *,
-    timeout_ms: int = TIMEOUT_MS,
+    report: CheckReport, evidence: Mapping[str, str] | None = None, *, timeout_ms: int = TIMEOUT_MS
 ) -> Bundle:
-    """Split a net, prove the decomposition and bundle both with the verdicts on the net and their evidence.
+    """Split the net of a report, prove the decomposition and bundle both with all verdicts and their evidence.
 
-    `evidence` holds the text of each file that the verdicts name. Raises `InputError`: F4001 and F2011 where the net
-    cannot be split, F4003 for everything that must be proved and is not.
+    `evidence` holds the text of each file that the verdicts of the report name. Raises `InputError`: F4001 and F2011
+    where the net cannot be split; F4003 where the report is not that of exploring this net by interleaving, which is
+    how it will be executed, and for everything that must be proved and is not.
     """
-    decomposition = split(net)
-    report = prove(decomposition, timeout_ms=timeout_ms)
-    bundle = Bundle(decomposition, (*verdicts, *report.verdicts), {**(evidence or {}), **report.files})
+    if report.net != report.graph.net:
+        message = f"the verdicts are on another net than '{report.net.name}'"
+        raise InputError([Diagnostic("F4003", message, "check the net that is to be bundled")])
+    if not report.discipline is report.graph.discipline is Discipline.INTERLEAVING:
+        message = "the verdicts are on another discipline than interleaving, by which the net is executed"
+        raise InputError([Diagnostic("F4003", message, "check the net with the discipline interleaving")])
+    decomposition = split(report.net)
+    proof = prove(decomposition, timeout_ms=timeout_ms)
+    bundle = Bundle(decomposition, (*report.verdicts, *proof.verdicts), {**(evidence or {}), **proof.files})
     if problems := unproved(bundle):
         raise InputError(replace(problem, code="F4003") for problem in problems)
     return bundle

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.reference import load_net
 
+from firable.analysis.check import CheckReport, check
 from firable.analysis.smt import Terms, value
 from firable.decompose.bundling import make_bundle
 from firable.decompose.obligations import greedy
@@ -34,6 +35,7 @@ from firable.nets.net import (
 )
 from firable.nets.verdict import Status, Verdict
 from firable.semantics.arbitration import Arbitration
+from firable.semantics.trace import Discipline
 
 SPLITTABLE = [
     *("cell1", "cell1_mc_late", "cell1_mc_late_cap", "cell2_separate", "cell2_shared", "fig4_parallel"),
@@ -331,24 +333,38 @@ def test_granted_term_is_what_the_arbiter_decides(data: st.DataObject) -> None:
     assert [value(granted[f"t{i}"], assignment) for i in range(4)] == [i in decided for i in range(4)]
 
 
-def check_verdicts(net: Net) -> list[Verdict]:
-    names = (*CHECKED, *(f"property.{prop.name}" for prop in net.properties))
-    return [Verdict(name, Status.PROVED, "by exploration", "explicit") for name in names]
-
-
 def test_cell_is_bundled_with_all_its_proofs() -> None:
-    net = catalogue_net("one_robot")
-    bundle = make_bundle(net, check_verdicts(net))
+    report = check(catalogue_net("one_robot"))
+    bundle = make_bundle(report)
     assert unproved(bundle) == ()
+    assert bundle.net == report.net
     assert Bundle.from_bytes(bundle.to_bytes()) == bundle
 
 
+def not_bundled(report: CheckReport) -> str:
+    with pytest.raises(InputError) as refusal:
+        make_bundle(report)
+    assert {diagnostic.code for diagnostic in refusal.value.diagnostics} == {"F4003"}
+    return str(refusal.value)
+
+
 def test_net_with_anything_unproved_is_not_bundled() -> None:
+    report = check(load_net("ring"))
+    doubted = tuple(replace(verdict, status=Status.UNKNOWN) for verdict in report.verdicts)
+    for verdicts in ((), report.verdicts[:1], doubted):
+        not_bundled(replace(report, verdicts=verdicts))
+    lost = tuple(replace(verdict, evidence=("lost.smt2",)) for verdict in report.verdicts)
+    assert "evidence" in not_bundled(replace(report, verdicts=lost))
+
+
+def test_deadlocking_net_is_not_bundled_with_the_verdicts_on_a_good_one() -> None:
+    good, late = check(catalogue_net("one_robot")), check(catalogue_net("one_robot_mc_late"))
+    assert "'deadlock-free' is violated" in not_bundled(late)
+    assert "another net" in not_bundled(replace(good, net=late.net))
+
+
+def test_verdicts_on_steps_are_no_reason_to_run() -> None:
     net = load_net("ring")
-    doubted = [replace(verdict, status=Status.UNKNOWN) for verdict in check_verdicts(net)]
-    for verdicts in ([], check_verdicts(net)[:1], doubted):
-        with pytest.raises(InputError) as refusal:
-            make_bundle(net, verdicts)
-        assert {diagnostic.code for diagnostic in refusal.value.diagnostics} == {"F4003"}
-    with pytest.raises(InputError, match="evidence"):
-        make_bundle(net, [replace(verdict, evidence=("lost.smt2",)) for verdict in check_verdicts(net)])
+    for discipline in (Discipline.INTERLEAVING, Discipline.STEP):
+        assert "interleaving" in not_bundled(replace(check(net, Discipline.STEP), discipline=discipline))
+    assert make_bundle(check(net)).net == net
