@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -12,7 +13,6 @@ from firable.cli.report import Report
 
 if TYPE_CHECKING:
     from firable.executor.execution import Execution
-    from firable.executor.plant_file import PlantModel
     from firable.executor.run import Operator, RunReport
     from firable.nets.bundle import Bundle
     from firable.nets.verdict import Verdict
@@ -34,7 +34,7 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
     show_default=True,
     help="Times real time; max is virtual time, where a run is a function of bundle, plant and seed.",
 )
-@click.option("--trace", metavar="FILE", help="Write what happens, for `firable replay`.")
+@click.option("--trace", metavar="FILE", help="Write what happens to a file, for `firable replay`.")
 @click.option("--step", is_flag=True, help="Fire one transition at a time: Enter for the next, r to run on, q to stop.")
 @format_option
 def run(
@@ -53,13 +53,18 @@ def run(
     """
 
     def make() -> Report:
+        from firable.executor.plant_file import read_plant
         from firable.executor.run import load
         from firable.executor.run import run as run_bundle
 
         loaded = load(bundle)
+        plant_file = _plant_file(loaded, plant)
+        model = read_plant(plant_file)
+        if trace is not None:
+            _refuse_to_overwrite(trace, bundle, plant_file)
         report = run_bundle(
             loaded,
-            _plant(loaded, plant),
+            model,
             workpieces=workpieces,
             seed=seed,
             speed=_SPEEDS[speed],
@@ -78,9 +83,8 @@ def run(
     return answer("run", format_, make, _show)
 
 
-def _plant(bundle: Bundle, argument: str | None) -> PlantModel:
-    """The plant that the option names, or the one of the catalogue that bears the name of the cell."""
-    from firable.executor.plant_file import read_plant
+def _plant_file(bundle: Bundle, argument: str | None) -> Path:
+    """The plant file that the option names, or the one of the catalogue that bears the name of the cell."""
     from firable.nets.catalogue import catalogue_names
 
     if argument is None:
@@ -90,7 +94,24 @@ def _plant(bundle: Bundle, argument: str | None) -> PlantModel:
             raise click.UsageError(
                 f"say with --plant on which cell to run: none in the catalogue is '{bundle.net.name}'"
             )
-    return read_plant(catalogue_file(argument, "plant") if argument.startswith(CATALOGUE) else argument)
+    return catalogue_file(argument, "plant") if argument.startswith(CATALOGUE) else Path(argument)
+
+
+def _refuse_to_overwrite(trace: str, *inputs: Path | str) -> None:
+    """Refuse a trace on standard output, where the report goes, or in a file that the run reads; `InputError` F1017."""
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.source import printable
+
+    if trace == "-":
+        message = "-: the trace cannot go to standard output, where the report goes"
+        raise InputError([Diagnostic("F1017", message, "name a file; one that is called so is ./-")])
+    try:
+        is_input = any(Path(trace).samefile(path) for path in inputs)
+    except (OSError, ValueError):  # no such file yet, or one that will not open either, and is told of then
+        is_input = False
+    if is_input:
+        message = f"{printable(trace)}: the trace would overwrite what the run reads"
+        raise InputError([Diagnostic("F1017", message, "name another file for the trace")])
 
 
 def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, ...]:

@@ -2,24 +2,74 @@
 
 Firings, signals, commands and notes are written in the order in which they took effect: a coordinated firing at the
 coordinator's decision, a local one where it occurs. That order is a trace of the central net (SEMANTICS O1-O5), so the
-recorder plays it along and is where a running executor is asked for its marking. It is flushed at the end, and when
-the run is waiting; a line that a killed run leaves half written is no line of the trace.
+recorder plays it along and is where a running executor is asked for its marking. The file is written as its buffer
+fills, and whole at the end; a line that a killed run leaves half written is no line of the trace.
 """
 
 from __future__ import annotations
 
 import json
-from typing import TextIO
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Protocol
 
 from firable.executor.token_player import TokenPlayer
+from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
+from firable.nets.source import printable
 from firable.semantics.trace import CommandSent, End, Event, Fired, Header, Noted, SignalChanged
+
+
+class LineStream(Protocol):
+    """Where a recorder writes: a text stream, as far as it needs one."""
+
+    def write(self, line: str, /) -> object:
+        """Write a line with its end."""
+        ...
+
+    def flush(self) -> None:
+        """Hand over what is still buffered."""
+        ...
+
+
+class TraceFile:
+    """A trace on disk, opened anew: whatever fails here is `InputError` F1017, and no other error is taken for it."""
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = path
+        with self._failures():
+            self.stream = Path(path).open("w", encoding="utf-8")  # noqa: SIM115 - open as long as this object is
+
+    def write(self, line: str, /) -> None:
+        """Write a line with its end."""
+        with self._failures():
+            self.stream.write(line)
+
+    def flush(self) -> None:
+        """Hand over what is still buffered."""
+        with self._failures():
+            self.stream.flush()
+
+    def close(self) -> None:
+        """Close the file; again, it does nothing."""
+        with self._failures():
+            self.stream.close()
+
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
+            reason = error.strerror if isinstance(error, OSError) else str(error)
+            message = f"{printable(str(self.path))}: the trace cannot be written: {reason}"
+            raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
 
 
 class Recorder:
     """The trace so far, its marking and its counts."""
 
-    def __init__(self, net: Net, digest: str, stream: TextIO | None) -> None:
+    def __init__(self, net: Net, digest: str, stream: LineStream | None) -> None:
         self.player = TokenPlayer.of(net)
         self.word = net.initial_marking
         self.stream = stream

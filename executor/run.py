@@ -11,23 +11,24 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterable, Mapping
-from contextlib import nullcontext
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from firable.executor.drivers import SimulatedDriver
 from firable.executor.execution import Execution
 from firable.executor.plant import Disturbance, Plant
 from firable.executor.plant_file import PlantModel, misfits
-from firable.executor.recorder import Recorder
+from firable.executor.recorder import LineStream, Recorder, TraceFile
 from firable.executor.situation import Situation, State
 from firable.executor.virtual_time import run_in_virtual_time
 from firable.nets.bundle import Bundle, read_bundle, unproved
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
+from firable.nets.net import Net
 
 Operator = Callable[[Execution], Awaitable[None]]
 """A coroutine that runs beside the cell and uses its controls."""
@@ -94,26 +95,22 @@ def run(
 
     `speed` None is virtual time, 1.0 real time, 10.0 ten times as fast. A command that is not completed within
     `overdue_seconds` (of the cell's time) is a fault. Raises `InputError` F5002 where the bundle is not proved, F5003
-    where the plant does not fit it, F1017 where the trace cannot be written.
+    where the plant does not fit it, both before a file is touched; F1017 where the trace cannot be written.
     """
-    if problems := unproved(bundle):
-        raise InputError(problems)
-    try:
-        with nullcontext() if trace_path is None else Path(trace_path).open("w", encoding="utf-8") as stream:
-            return execute(
-                bundle.decomposition,
-                plant,
-                workpieces=workpieces,
-                seed=seed,
-                speed=speed,
-                trace=stream,
-                overdue_seconds=overdue_seconds,
-                disturbances=disturbances,
-                operator=operator,
-            )
-    except OSError as error:  # the trace is all that a run on a simulated cell writes; the machines are stopped by now
-        message = f"{trace_path}: the trace cannot be written: {error.strerror}"
-        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
+    # A run that is refused has touched no file.
+    _check(plant, bundle.net, workpieces, speed, overdue_seconds, unproved(bundle))
+    with nullcontext() if trace_path is None else closing(TraceFile(trace_path)) as trace:
+        return execute(
+            bundle.decomposition,
+            plant,
+            workpieces=workpieces,
+            seed=seed,
+            speed=speed,
+            trace=trace,
+            overdue_seconds=overdue_seconds,
+            disturbances=disturbances,
+            operator=operator,
+        )
 
 
 def execute(
@@ -123,7 +120,7 @@ def execute(
     workpieces: int,
     seed: int = 0,
     speed: float | None = None,
-    trace: TextIO | None = None,
+    trace: LineStream | None = None,
     overdue_seconds: float = 120.0,
     disturbances: Iterable[Disturbance] = (),
     operator: Operator | None = None,
@@ -132,10 +129,7 @@ def execute(
 
     Raises `InputError` F5003 where the plant does not fit the net.
     """
-    if workpieces < 0 or overdue_seconds <= 0 or (speed is not None and speed <= 0):
-        raise ValueError("workpieces must not be negative, times and speed must be positive")
-    if problems := misfits(plant, decomposition.net):
-        raise InputError(problems)
+    _check(plant, decomposition.net, workpieces, speed, overdue_seconds)
     cell = Plant(plant, workpieces=workpieces, seed=seed, disturbances=disturbances)
     recorder = Recorder(decomposition.net, net_digest(decomposition.net), trace)
     execution = Execution(
@@ -162,3 +156,17 @@ def execute(
         messages=execution.messages,
         simulated_seconds=execution.now_seconds(),
     )
+
+
+def _check(
+    plant: PlantModel,
+    net: Net,
+    workpieces: int,
+    speed: float | None,
+    overdue_seconds: float,
+    problems: Sequence[Diagnostic] = (),
+) -> None:
+    if workpieces < 0 or overdue_seconds <= 0 or (speed is not None and speed <= 0):
+        raise ValueError("workpieces must not be negative, times and speed must be positive")
+    if problems or (problems := misfits(plant, net)):
+        raise InputError(problems)

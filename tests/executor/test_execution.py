@@ -461,6 +461,34 @@ def test_trace_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None
         assert [problem.code for problem in refusal.value.diagnostics] == ["F1017"]
 
 
+def test_refused_run_leaves_an_older_trace_as_it_is(tmp_path: Path) -> None:
+    trace = tmp_path / "trace.jsonl"
+    trace.write_text("kept", encoding="utf-8")
+    unproved = replace(proved_bundle(), verdicts=())
+    for bundle, plant in ((proved_bundle(), plant_of("two_robots_shared")), (unproved, plant_of("one_robot"))):
+        with pytest.raises(InputError):
+            run(bundle, plant, workpieces=1, trace_path=trace)
+    with pytest.raises(ValueError, match="must"):
+        run(proved_bundle(), plant_of("one_robot"), workpieces=-1, trace_path=trace)
+    assert trace.read_text("utf-8") == "kept"
+
+
+@pytest.mark.parametrize("workpieces", [1, 200])  # the disk is full at the end, or in the middle of the run
+def test_full_disk_is_an_error_of_the_trace(workpieces: int) -> None:
+    with pytest.raises(InputError) as refusal:
+        run(proved_bundle(), plant_of("one_robot"), workpieces=workpieces, trace_path="/dev/full")
+    assert [problem.code for problem in refusal.value.diagnostics] == ["F1017"]
+    assert "/dev/full: the trace cannot be written: No space left" in str(refusal.value)
+
+
+def test_other_errors_of_the_system_are_not_taken_for_errors_of_the_trace(tmp_path: Path) -> None:
+    async def operator(execution: Execution) -> None:
+        raise ConnectionResetError("the panel is gone")
+
+    with pytest.raises(ConnectionResetError):
+        run(proved_bundle(), plant_of("one_robot"), workpieces=1, trace_path=tmp_path / "trace", operator=operator)
+
+
 def test_executor_runs_without_solvers_and_without_the_rooms_that_prove(tmp_path: Path) -> None:
     write_bundle(tmp_path / "cell.bundle", proved_bundle())
     program = f"""
