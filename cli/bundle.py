@@ -23,6 +23,8 @@ def bundle(net: str, output: str, format_: str, **limits: Any) -> int:
     Nothing is written unless everything that the net must prove is proved. `firable run` refuses a bundle of which any
     byte was changed.
     """
+    if output == "-":
+        raise click.UsageError("a bundle cannot go to standard output, where the report goes: name a file")
     return answer("bundle", format_, lambda: _report(net, output, limits), _show)
 
 

@@ -1,13 +1,8 @@
-"""What several commands share: the NET argument, the options for budgets and formats, and the file that is written.
-
-A file is written beside its place and renamed into it, so it is there whole or not at all.
-"""
+"""What several commands share: the NET argument, the options for budgets and formats, and where output goes."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -108,43 +103,22 @@ def _is_archive(path: str) -> bool:
 
 def write_text(path: str, text: str) -> None:
     """Write a file whole or not at all, or to standard output for `-`; raises `InputError` F1017."""
-    from firable.nets.diagnostics import Diagnostic, InputError
-    from firable.nets.source import printable
+    from firable.nets.writing import write_whole
 
     if path == "-":
         click.echo(text, nl=False)
-        return
-    target = Path(path)
-    unfinished = target.with_name(f".{target.name[:200]}.{os.getpid()}.unfinished") if target.name else target
-    try:
-        if target.is_dir():
-            raise IsADirectoryError(None, "this is a directory")
-        with unfinished.open("x", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
-        unfinished.replace(target)
-    except (OSError, ValueError) as error:
-        with suppress(OSError, ValueError):
-            unfinished.unlink()
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        message = f"{printable(path)}: cannot be written: {reason}"
-        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
+    else:
+        write_whole(path, text)
 
 
-def write_folder(folder: str, files: dict[str, str]) -> tuple[str, ...]:
+def write_folder(folder: str, files: Mapping[str, str]) -> tuple[str, ...]:
     """Write files into a folder, made if it is missing; returns their paths. Raises `InputError` F1017."""
-    from firable.nets.diagnostics import Diagnostic, InputError
-    from firable.nets.source import printable
+    from firable.nets.writing import make_folder, write_whole
 
-    try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        message = f"{printable(folder)}: the folder cannot be made: {reason}"
-        raise InputError([Diagnostic("F1017", message, "name a folder that you may write to")]) from None
-    paths = []
-    for name, text in files.items():
-        paths.append(str(Path(folder) / name))
-        write_text(paths[-1], text)
+    make_folder(folder)
+    paths = {str(Path(folder) / name): text for name, text in files.items()}
+    for path, text in paths.items():
+        write_whole(path, text)
     return tuple(paths)
 
 

@@ -79,7 +79,7 @@ def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
     with loaded.placing():
         decomposition = split(loaded.net)
     found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)))
-    files = write_folder(smt_dir, dict(found.files)) if smt_dir is not None else ()
+    files = write_folder(smt_dir, found.files) if smt_dir is not None else ()
     return Report(
         "prove",
         argument,

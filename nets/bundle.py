@@ -9,17 +9,13 @@ Reading rebuilds everything from its content, writes it again and compares: ther
 change of any byte is refused. That finds damage and edits by hand; it is no signature, since whoever can write a
 bundle can write its hashes. Pickle, or a folder of loose files, were rejected: the one runs code, the other is copied
 in part.
-
-The file is written beside its place and renamed into it, so that it is there whole or not at all.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -33,6 +29,7 @@ from firable.nets.interchange import canonical_json, net_from_json, net_to_json
 from firable.nets.net import ArbitrationRule, Net
 from firable.nets.source import printable, read_bytes
 from firable.nets.verdict import Verdict, Weight
+from firable.nets.writing import write_whole
 
 VERSION: Final = 1
 SIZE_BYTES_MAX: Final = 256 * 1024 * 1024
@@ -235,21 +232,7 @@ def write_bundle(path: str | Path, bundle: Bundle) -> None:
 
     Raises `InputError` F1017 where it cannot be written, F4003 where the bundle is too large.
     """
-    path = Path(path)
-    archive = bundle.to_bytes()
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.unfinished")
-    try:
-        with unfinished.open("xb") as stream:
-            stream.write(archive)
-            stream.flush()
-            os.fsync(stream.fileno())
-        unfinished.replace(path)
-    except (OSError, ValueError) as error:
-        with suppress(OSError, ValueError):
-            unfinished.unlink()
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        message = f"{printable(str(path))}: {reason}"
-        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
+    write_whole(path, bundle.to_bytes())
 
 
 CHECKED: Final = ("contact-free", "deadlock-free", "quasi-live", "conflicting-commands")

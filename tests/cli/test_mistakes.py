@@ -113,6 +113,7 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         (["check", "catalogue:one_robt"], "the catalogue has no 'one_robt'"),
         (["prove", "a", "b"], "unexpected extra argument"),
         (["bundle", "catalogue:one_robot"], "Missing option"),
+        (["bundle", "catalogue:one_robot", "-o", "-"], "cannot go to standard output"),
         (["run", "x", "--workpieces", "-1"], "Invalid value"),
         (["run", "x", "--speed", "100"], "is not one of"),
         (["replay", "x"], "Missing option"),
@@ -129,11 +130,12 @@ def test_a_wrong_command_line_says_what_is_wrong(
 
 
 def test_an_output_that_cannot_be_written_leaves_nothing_behind(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("kept")
     (tmp_path / "folder").mkdir()
-    for output in (str(tmp_path / "no" / "x"), str(tmp_path / "file" / "x"), str(tmp_path / "folder")):
+    monkeypatch.chdir(tmp_path / "folder")
+    for output in (str(tmp_path / "no" / "x"), str(tmp_path / "file" / "x"), str(tmp_path / "folder"), ".", "", "/"):
         for command in (["draw", "catalogue:one_robot"], ["bundle", "catalogue:one_robot"]):
             assert "error[F1017]" in refused(capsys, *command, "-o", output)
     said = refused(capsys, "convert", "catalogue:one_robot", "-o", str(tmp_path / "no" / "x.pnml"))

@@ -1,0 +1,64 @@
+"""Writing a file whole or not at all, for everything that is written at one stroke.
+
+The bytes go into a file beside the place, to the disk, and are renamed into the place: whoever opens the file finds
+the old content or the new, also after a power failure, and never half of either. Writing into the place itself would
+lose the old content first. A link is followed, so that it stays one; a device or a pipe is refused, because a rename
+would put a file where it was. A trace, which grows while a cell runs, is written by `firable.executor.recorder`.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.source import printable
+
+
+def write_whole(path: str | Path, data: bytes | str) -> None:
+    """Write a file, text as UTF-8: whole, or not at all; a file that stands there is replaced.
+
+    Raises `InputError` F1017 where that fails for any reason: a folder stands there or is missing, the name is none,
+    permission or space are lacking.
+    """
+    with _failures(path):
+        content = data.encode() if isinstance(data, str) else data
+        target = Path(os.path.realpath(path))
+        _refuse_what_is_no_file(str(path), target)
+        unfinished = target.with_name(f".{os.urandom(8).hex()}.unfinished")
+        try:
+            with unfinished.open("xb") as stream:
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())
+            unfinished.replace(target)
+        finally:  # nothing is left behind, whatever ended the writing
+            with suppress(OSError, ValueError):
+                unfinished.unlink(missing_ok=True)
+
+
+def make_folder(path: str | Path) -> None:
+    """Make a folder, and those around it, where it is missing; raises `InputError` F1017."""
+    with _failures(path):
+        Path(path).mkdir(parents=True, exist_ok=True)
+
+
+def _refuse_what_is_no_file(path: str, target: Path) -> None:
+    if path.endswith("/") or target.is_dir():
+        raise IsADirectoryError(None, "this is a directory")
+    with suppress(FileNotFoundError):
+        if not stat.S_ISREG(target.stat().st_mode):
+            raise OSError(None, "this is not a regular file")
+
+
+@contextmanager
+def _failures(path: str | Path) -> Generator[None]:
+    try:
+        yield
+    except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it, a text that is no Unicode
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        message = f"{printable(str(path)) or 'no name'}: cannot be written: {reason}"
+        raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
