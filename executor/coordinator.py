@@ -59,6 +59,7 @@ class Coordinator:
         self.participants = {
             row.name: tuple(part.controller for part in row.parts) for row in decomposition.coordinated
         }
+        """For each coordinated transition, who has to promise it: those who own a gate of it alone, too (O3)."""
         ours = [group for group in decomposition.groups if group.controller is None]
         self.arbiter = Arbiter(decomposition.net, ours)
         together = [tuple(t for t in (*g.sequence, *g.rest) if t in self.participants) for g in ours]
@@ -129,10 +130,6 @@ class Coordinator:
         for name in sorted(new):
             self.waiting.setdefault(self.group_of[name])
 
-    def _asked(self, transition: str) -> tuple[str, ...]:
-        """The controllers whose promises the transition needs: all participants, those with gates alone too (O3)."""
-        return self.participants[transition]
-
     def _open(self) -> Iterator[Effect]:
         """Open a round for each waiting group that disturbs no open round, nor a group that waits before it."""
         if not self.waiting:
@@ -160,7 +157,7 @@ class Coordinator:
         for name in names:
             compiled = self.player.transitions[name]
             writes, reads = writes | compiled.writes, reads | compiled.reads
-        participants = tuple(dict.fromkeys(c for name in names for c in self._asked(name)))
+        participants = tuple(dict.fromkeys(c for name in names for c in self.participants[name]))
         opened = Round(self.next_round, group, names, participants, writes, reads)
         self.rounds[opened.number] = opened
         self.next_round += 1
@@ -178,7 +175,7 @@ class Coordinator:
 
     def _choice(self, voted: Round) -> str | None:
         """The transition to commit: one of those with all votes yes, by the arbiter of the group."""
-        enabled = [t for t in voted.transitions if all(t in voted.votes[c] for c in self._asked(t))]
+        enabled = [t for t in voted.transitions if all(t in voted.votes[c] for c in self.participants[t])]
         return self.arbiter.choose(enabled) if enabled and self.permits != 0 else None
 
     def _decide(self, decided: Round, committed: str | None) -> Iterator[Effect]:
@@ -201,7 +198,7 @@ class Coordinator:
         yield from self._open()
 
     def _request(self, asked: Round, controller: str) -> VoteRequest:
-        names = tuple(t for t in asked.transitions if controller in self._asked(t))
+        names = tuple(t for t in asked.transitions if controller in self.participants[t])
         return VoteRequest(controller, asked.number, names, self.closed_below, self.seen[controller])
 
     def _decision(self, decided: Round, controller: str) -> Decision:

@@ -84,8 +84,7 @@ class Recorder:
 
     def fired(self, at_seconds: float, transition: str) -> None:
         """A transition of the central net has fired."""
-        compiled = self.player.transitions[transition]
-        self.word = self.word & ~compiled.takes | compiled.puts
+        self.word = self.player.transitions[transition].fire(self.word)
         self.firings[transition] += 1
         self._write(Fired(at_seconds, (transition,)))
 

@@ -62,9 +62,11 @@ class Situation:
 
 
 def is_deadlock(player: TokenPlayer, word: Word) -> bool:
-    """Whether no transition is firable and openable."""
-    openable = (c for c in player.transitions.values() if not c.needs & c.forbids & ~player.places)
-    return not any(compiled.firable(word, player.places) for compiled in openable)
+    """Whether no transition is firable and openable: `semantics.judgement.judge` on compiled transitions.
+
+    It is asked at each quiescence, so it does not play by the reference; the tests hold it to what `judge` says.
+    """
+    return not any(c.openable and c.firable(word, player.places) for c in player.transitions.values())
 
 
 def blocked(player: TokenPlayer, word: Word) -> Iterator[Blocked]:

@@ -34,6 +34,8 @@ class Compiled:
     takes: Word
     puts: Word
     clears: Word
+    openable: bool
+    """Whether some valuation of the signals opens its external gates."""
 
     @property
     def writes(self) -> Word:
@@ -88,6 +90,7 @@ class TokenPlayer:
                 takes=masks.inputs,
                 puts=masks.outputs,
                 clears=sum(signal_bit[name] for name in completions if name is not None),
+                openable=transition.openable,
             )
         return cls(net, compiled, (1 << len(net.places)) - 1)
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import io
+import random
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -10,11 +11,13 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from support.owned_nets import owned_net
 
 from firable.decompose.split import split
 from firable.executor.execution import Execution
 from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.plant_file import PlantModel, parse_plant, read_plant
+from firable.executor.recorder import Recorder
 from firable.executor.run import Operator, RunReport, execute, load, run
 from firable.executor.situation import State, is_deadlock
 from firable.executor.token_player import TokenPlayer
@@ -25,6 +28,8 @@ from firable.nets.diagnostics import InputError
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status, Verdict
+from firable.semantics.judgement import Judgement, judge
+from firable.semantics.player import Player
 from firable.semantics.trace import CommandSent, Fired, Noted, Trace, parse_trace, replay
 
 CELLS = ["one_robot", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"]
@@ -374,6 +379,27 @@ def test_transition_that_no_valuation_opens_is_not_waited_for() -> None:
     assert is_deadlock(TokenPlayer.of(net), net.initial_marking)
     waiting = replace(never, external=gates[:1])
     assert not is_deadlock(TokenPlayer.of(replace(net, transitions=(waiting,))), net.initial_marking)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_deadlock_of_a_run_is_the_deadlock_of_the_reference(seed: int) -> None:
+    net, draw = owned_net(seed), random.Random(seed)
+    gates = (ExternalGate(signal.name, wanted=wanted) for signal in net.signals for wanted in (True, False))
+    shut = replace(net.transitions[0], name="shut", external=tuple(gates))  # openable where there is no signal
+    net = replace(net, transitions=(shut, *net.transitions[draw.randrange(2) :]))
+    player, reference = TokenPlayer.of(net), Player(net)
+    for word in (net.initial_marking, *(draw.getrandbits(len(net.places) + len(net.signals)) for _ in range(100))):
+        judged = judge(reference, player.marking(word), {})
+        assert is_deadlock(player, word) is (judged is Judgement.DEADLOCK)
+
+
+def test_recorder_fires_by_the_rule_of_the_token_player() -> None:
+    recorder = Recorder(catalogue_net("one_robot"), "", None)
+    recorder.signal(0.0, "robot.at_cv1", value=True)
+    before, player = recorder.word, recorder.player
+    recorder.fired(1.0, "G2")
+    assert recorder.word == player.transitions["G2"].fire(before)
+    assert not recorder.word & player.signal_bit("robot.at_cv1")  # its command is sent in the same act
 
 
 def test_command_order_of_a_wrong_net_crashes_in_the_cell() -> None:

@@ -10,7 +10,7 @@ from support.reference import load_net
 
 from firable.decompose.split import split
 from firable.executor.controller import LocalController, Promise
-from firable.executor.coordinator import Coordinator
+from firable.executor.coordinator import Coordinator, Round
 from firable.executor.messages import (
     Acknowledgement,
     Decision,
@@ -206,10 +206,17 @@ class StaleVotes(Coordinator):
 class CachedGates(Coordinator):
     """O3 forgotten: who owns only a gate is not asked; its last report is believed."""
 
-    def _asked(self, transition: str) -> tuple[str, ...]:
-        arcs = self.player.net.transition(transition)
-        owners = {self.player.net.place(place).owner for place in (*arcs.inputs, *arcs.outputs)}
-        return tuple(controller for controller in self.participants[transition] if controller in owners)
+    def _ask(self, group: int, names: tuple[str, ...]) -> Iterator[Effect]:
+        requests = list(super()._ask(group, names))
+        transitions = [self.player.net.transition(name) for name in names]
+        moved = [self.player.net.place(place) for t in transitions for place in (*t.inputs, *t.outputs)]
+        opened = self.rounds[self.next_round - 1]
+        opened.participants = tuple(c for c in opened.participants if c in {place.owner for place in moved})
+        return (r for r in requests if isinstance(r, VoteRequest) and r.controller in opened.participants)
+
+    def _choice(self, voted: Round) -> str | None:
+        voted.votes = {**self.ready, **voted.votes}
+        return super()._choice(voted)
 
 
 class OldReports(Coordinator):
