@@ -21,7 +21,7 @@ import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, assert_never
 
 from firable.executor.controller import LocalController
 from firable.executor.coordinator import Coordinator
@@ -32,6 +32,7 @@ from firable.executor.messages import (
     Effect,
     Firing,
     Message,
+    ProtocolError,
     Report,
     Sending,
     Taken,
@@ -283,6 +284,8 @@ class Execution:
             match box.items.popleft():
                 case Report() | Vote() | Acknowledgement() as message:
                     self._perform(self.coordinator.receive(message))
+                case unknown:
+                    raise ProtocolError(f"the coordinator was sent {unknown!r}")
             self._handled()
 
     async def _control(self, name: str) -> None:
@@ -294,6 +297,10 @@ class Execution:
                     self._perform(controller.receive(message))
                 case SignalRead(signal, value, entry):
                     self._perform(controller.read(signal, value, entry))
+                case Continue():
+                    pass  # to fire is what every message leads to
+                case unknown:
+                    raise ProtocolError(f"'{name}' was sent {unknown!r}")
             fired = [] if self.paused else controller.fire()
             if fired:
                 self._perform(fired)
@@ -328,9 +335,11 @@ class Execution:
                 case VoteRequest() | Decision():
                     self.messages += 1
                     self._post(effect.controller, effect)
-                case _:
+                case Report() | Vote() | Acknowledgement():
                     self.messages += 1
                     self._post(COORDINATOR, effect)
+                case _:
+                    assert_never(effect)
 
     def _fired(self, transition: str) -> None:
         now = self.now_seconds()

@@ -15,6 +15,7 @@ from support.owned_nets import owned_net
 
 from firable.decompose.split import split
 from firable.executor.execution import Execution
+from firable.executor.messages import ProtocolError
 from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.plant_file import PlantModel, parse_plant, read_plant
 from firable.executor.recorder import Recorder
@@ -301,6 +302,15 @@ def test_operators_mistake_ends_the_run() -> None:
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
+        run_cell("one_robot", 5, operator=operator)
+
+
+@pytest.mark.parametrize(("mailbox", "receiver"), [("", "the coordinator"), ("robot", "'robot'")])
+def test_message_that_nobody_knows_ends_the_run(mailbox: str, receiver: str) -> None:
+    async def operator(execution: Execution) -> None:
+        execution.mailboxes[mailbox].post("a letter")
+
+    with pytest.raises(ProtocolError, match=f"{receiver} was sent 'a letter'"):
         run_cell("one_robot", 5, operator=operator)
 
 
