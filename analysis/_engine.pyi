@@ -12,10 +12,10 @@ part. The rest (markings, contacts, deadlocks, paths) holds of the part explored
 
 from typing import final
 
-class BudgetExceeded(RuntimeError):  # noqa: N818
+class BudgetExceeded(RuntimeError):  # noqa: N818 - what happened is no error of anybody's, and so not named one
     """The answer needs more memory than the graph's `max_memory_bytes` leaves."""
 
-class IncompleteGraph(RuntimeError):  # noqa: N818
+class IncompleteGraph(RuntimeError):  # noqa: N818 - likewise
     """The answer needs the whole reachability graph, and the exploration ended early."""
 
 def explore(
@@ -100,8 +100,6 @@ class Graph:
         """
     def contact_witness(self, t: int) -> int | None:
         """The lowest marking in contact for a transition."""
-    def enabled(self, index: int) -> list[int]:
-        """The transitions that are firable at a marking and openable, ascending."""
     def successors(self, index: int) -> list[tuple[list[int], int]]:
         """The edges that leave a marking: what fires and the marking after.
 
@@ -128,17 +126,17 @@ class Graph:
     def edges(self) -> tuple[bytes, bytes]:
         """The edges as compressed rows: offsets (`n_markings + 1` "<u8") and targets (`n_edges` "<u4").
 
-        The row of a marking has the order of `successors`; under interleaving its k-th edge fires
-        `enabled(index)[k]`. Needs the whole graph.
+        The row of a marking has the order of `successors`. Needs the whole graph.
         """
     def live(self) -> list[bool]:
         """For each transition, whether from every marking it can fire again: it fires in every bottom component."""
     def reversible(self) -> bool:
         """Whether M0 can be reached from every marking. Needs the whole graph."""
-    def home(self) -> bool:
-        """Whether some marking can be reached from every marking: there is one bottom component."""
     def home_markings(self) -> bytes:
-        """The bitmap of the home markings. Needs the whole graph."""
+        """The bitmap of the home markings, those of the only bottom component; none where there are several.
+
+        Needs the whole graph.
+        """
     def effective_conflicts(self, pairs: list[tuple[int, int]]) -> list[int | None]:
         """For each pair of transitions, the lowest marking at which both are firable by Eq. (1), or None.
 

@@ -194,7 +194,6 @@ def test_graph_is_the_one_of_the_definition(net: Drawn, step: bool) -> None:
         edges = graph.successors(i)
         assert {(frozenset(f), masks[j]) for f, j in edges} == naive.graph[m]
         assert len(edges) == len(naive.graph[m])
-        assert graph.enabled(i) == naive.may_fire(m)
         assert all(f == sorted(f) for f, _ in edges)
         for f, _ in edges:
             for t in f:
@@ -287,7 +286,6 @@ def test_live_home_and_reversible_follow_from_reachability(net: Drawn, step: boo
         assert live == all(any(t in fires[j] for j in reach[i]) for i in everything)
     assert graph.reversible() == all(0 in reach[i] for i in everything)
     home = {j for j in everything if all(j in reach[i] for i in everything)}
-    assert graph.home() == bool(home)
     assert graph.home_markings() == bitmap(graph, home)
 
 
@@ -465,7 +463,7 @@ def test_a_transition_without_arcs_is_an_edge_to_the_same_marking() -> None:
 
 def test_an_index_that_does_not_exist_is_refused() -> None:
     graph = explored(machines(2), step=False)
-    for call in (graph.marking, graph.enabled, graph.successors, graph.path_to, graph.contact_witness):
+    for call in (graph.marking, graph.successors, graph.path_to, graph.contact_witness):
         with pytest.raises(IndexError):
             call(99)
     with pytest.raises(ValueError, match="one byte for each"):

@@ -11,6 +11,10 @@
 #[forbid(unsafe_code)]
 pub mod budget;
 #[forbid(unsafe_code)]
+pub mod csr;
+#[forbid(unsafe_code)]
+pub mod edges;
+#[forbid(unsafe_code)]
 pub mod explore;
 #[forbid(unsafe_code)]
 pub mod marking;
@@ -37,9 +41,11 @@ mod python {
     use pyo3::types::{PyBytes, PyInt};
 
     use crate::budget::{Memory, Stop, Watch};
-    use crate::explore::{Edges, Limits, NONE, Space};
+    use crate::csr::Csr;
+    use crate::edges::Edges;
+    use crate::explore::{Limits, NONE, Space};
     use crate::net::{Net, Transition};
-    use crate::scc::{Csr, Scc};
+    use crate::scc::Scc;
     use crate::{paths, scc};
 
     create_exception!(
@@ -324,11 +330,6 @@ mod python {
             Ok(Some(self.space.contact_witness[self.check_transition(t)?]).filter(|&index| index != NONE))
         }
 
-        fn enabled(&self, index: usize) -> PyResult<Vec<u32>> {
-            let marking = self.space.marking(self.check(index)? as usize);
-            Ok(self.space.enabled_by(&self.space.net.forward, marking, true))
-        }
-
         fn successors(&self, py: Python<'_>, index: usize) -> PyResult<Vec<(Vec<u32>, u32)>> {
             let index = self.check(index)?;
             self.long(py, |space, watch| {
@@ -404,13 +405,9 @@ mod python {
             Ok(self.scc(py)?.sizes.len() == 1)
         }
 
-        fn home(&self, py: Python<'_>) -> PyResult<bool> {
-            Ok(self.scc(py)?.bottom.iter().filter(|&&bottom| bottom != 0).count() == 1)
-        }
-
         fn home_markings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
             let components = self.scc(py)?;
-            let home = self.home(py)?;
+            let home = components.bottom.iter().filter(|&&bottom| bottom != 0).count() == 1;
             let markings: Vec<u8> =
                 components.of.iter().map(|&of| if home { components.bottom[of as usize] } else { 0 }).collect();
             Ok(PyBytes::new(py, &markings))

@@ -4,12 +4,13 @@
 //! predecessor is taken, so a path costs its length times the number of transitions. Under steps the parent
 //! was stored. Between two markings it is a breadth-first search. Backward reach (which markings can still get
 //! there: doomed markings are the complement) runs the rule in reverse, 64 markings at a time, and so needs no edges;
-//! under steps, where the rule has no simple reverse, it turns the stored edges round (`scc.rs`).
+//! under steps, where the rule has no simple reverse, it turns the stored edges round (`csr.rs`).
 
 use crate::budget::{Memory, Stop, Watch};
-use crate::explore::{Edges, NONE, Space};
+use crate::csr::Csr;
+use crate::edges::Edges;
+use crate::explore::{NONE, Space};
 use crate::marking::{Width, linear_hash, slice};
-use crate::scc::Csr;
 use crate::with_width;
 
 /// What a witness may take beyond the budget: a graph that ended for want of memory must still show what it found.

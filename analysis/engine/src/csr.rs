@@ -1,0 +1,80 @@
+//! The edges of the reachability graph as compressed rows: an offset for each marking, and all targets end to end.
+//!
+//! They are stored only where a question walks over them again and again, 4 bytes an edge and 8 a marking within the
+//! memory budget: for the components, and to turn the edges of steps round.
+
+use crate::budget::{Memory, Stop, Watch};
+use crate::edges::Edges;
+use crate::explore::Space;
+
+/// Successors as compressed rows.
+#[derive(Debug)]
+pub struct Csr {
+    /// Where the row of each marking begins; one more than there are markings.
+    pub offsets: Vec<u64>,
+    /// Targets, row by row, in the order of the edges.
+    pub targets: Vec<u32>,
+}
+
+impl Csr {
+    /// Stores the edges that stay within a set of markings (one byte each), or all.
+    pub fn new(space: &Space, within: Option<&[u8]>, memory: &Memory, watch: &mut Watch<'_>) -> Result<Self, Stop> {
+        let count = space.len();
+        let inside = |index: u32| within.is_none_or(|within| within[index as usize] != 0);
+        let mut offsets = memory.filled(0u64, count + 1)?;
+        // Of the whole graph the number of edges is known, so nothing is claimed twice.
+        let mut targets: Vec<u32> = Vec::new();
+        if within.is_none() {
+            let edges = usize::try_from(space.edges).map_err(|_| Stop::Memory)?;
+            memory.claim(edges.checked_mul(4).ok_or(Stop::Memory)?)?;
+            targets.try_reserve_exact(edges).map_err(|_| Stop::Memory)?;
+        }
+        let mut edges = Edges::new(space);
+        let mut sources = Vec::with_capacity(64);
+        for first in (0..count).step_by(64) {
+            sources.clear();
+            sources.extend((first as u32..count.min(first + 64) as u32).filter(|&source| inside(source)));
+            edges.visit(&sources, memory, watch, &mut |source, _, target| {
+                if inside(target) {
+                    offsets[source as usize + 1] += 1;
+                    memory.push(&mut targets, target)?;
+                }
+                Ok(())
+            })?;
+        }
+        edges.finish(memory);
+        for index in 0..count {
+            offsets[index + 1] += offsets[index];
+        }
+        Ok(Csr { offsets, targets })
+    }
+
+    /// The successors of a marking.
+    pub fn targets(&self, index: u32) -> &[u32] {
+        &self.targets[self.offsets[index as usize] as usize..self.offsets[index as usize + 1] as usize]
+    }
+
+    /// The same edges by their target.
+    pub fn reversed(self, memory: &Memory, watch: &mut Watch<'_>) -> Result<Csr, Stop> {
+        let count = self.offsets.len() - 1;
+        let mut offsets = memory.filled(0u64, count + 2)?;
+        let mut sources = memory.filled(0u32, self.targets.len())?;
+        for &target in &self.targets {
+            offsets[target as usize + 2] += 1;
+        }
+        for index in 0..=count {
+            offsets[index + 1] += offsets[index];
+        }
+        for source in 0..count as u32 {
+            let row = self.targets(source);
+            for &target in row {
+                let at = &mut offsets[target as usize + 1];
+                sources[*at as usize] = source;
+                *at += 1;
+            }
+            watch.tick(1 + row.len())?;
+        }
+        offsets.pop();
+        Ok(Csr { offsets, targets: sources })
+    }
+}
