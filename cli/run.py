@@ -12,8 +12,7 @@ from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
-    from firable.executor.execution import Execution
-    from firable.executor.run import Operator, RunReport
+    from firable.executor import Execution, Operator, RunReport
     from firable.nets.bundle import Bundle
     from firable.nets.verdict import Verdict
 
@@ -53,9 +52,8 @@ def run(
     """
 
     def make() -> Report:
-        from firable.executor.plant_file import read_plant
-        from firable.executor.run import load
-        from firable.executor.run import run as run_bundle
+        from firable.executor import load, read_plant
+        from firable.executor import run as run_bundle
 
         loaded = load(bundle)
         plant_file = _plant_file(loaded, plant)
@@ -115,7 +113,7 @@ def _refuse_to_overwrite(trace: str, *inputs: Path | str) -> None:
 
 
 def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, ...]:
-    from firable.executor.situation import State
+    from firable.executor import State
     from firable.nets.verdict import Status, Verdict
 
     method = f"run on the simulated cell, seed {seed}"

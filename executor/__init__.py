@@ -1,5 +1,40 @@
 """Executing a decomposition: local controllers, their coordinator, drivers, the simulated cell.
 
-`load` and `run` of `firable.executor.run` are the way in. The voting protocol (`coordinator`, `controller`, `messages`)
-is pure: no clock, socket, task or random source. The room imports `semantics` and `nets` and nothing that proves.
+What a program imports from here: `load` reads a bundle that may run, `read_plant` the file of a simulated cell, and
+`run` carries workpieces through it and returns a `RunReport`, whose `Situation` has a `State` and says with `Blocked`
+what waits for what. `execute` runs a decomposition that need not be proved, for simulation and tests. An `Operator`
+beside the run is given its `Execution`, with the controls pause, step, resume and stop; `StuckSensor` and
+`NeverCompletes` disturb the cell. Other machines than simulated ones are reached by a `Driver`.
+
+    from firable.executor import load, read_plant, run
+
+    report = run(load("cell.bundle"), read_plant("cell.plant.yaml"), workpieces=10)
+
+The voting protocol (`coordinator`, `controller`, `messages`) is pure: no clock, socket, task or random source. The room
+imports `semantics` and `nets` and nothing that proves.
 """
+
+from firable.executor.drivers import Driver
+from firable.executor.execution import Execution
+from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.plant_file import PlantModel, read_plant
+from firable.executor.running import Operator, RunReport, execute, load, run
+from firable.executor.situation import Blocked, Situation, State
+
+__all__ = [
+    "Blocked",
+    "Disturbance",
+    "Driver",
+    "Execution",
+    "NeverCompletes",
+    "Operator",
+    "PlantModel",
+    "RunReport",
+    "Situation",
+    "State",
+    "StuckSensor",
+    "execute",
+    "load",
+    "read_plant",
+    "run",
+]

@@ -16,7 +16,7 @@ import asyncio
 from dataclasses import dataclass
 from typing import Protocol
 
-from firable.executor.plant import CommandDone, Plant, PlantFault, Report, SensorChanged
+from firable.executor.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
 from firable.nets.net import Net, Place, SignalKind
 
 
@@ -136,7 +136,7 @@ class SimulatedDriver:
         """Let no more workpieces come."""
         self.plant.close()
 
-    def _tell(self, reports: list[Report]) -> None:
+    def _tell(self, reports: list[PlantReport]) -> None:
         for report in reports:
             match report:
                 case SensorChanged(signal, value):

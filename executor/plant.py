@@ -56,7 +56,7 @@ class PlantFault:
     message: str
 
 
-Report = SensorChanged | CommandDone | PlantFault
+PlantReport = SensorChanged | CommandDone | PlantFault
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,23 +191,23 @@ class Plant:
 
     def command(
         self, now_seconds: float, machine: str, command: str, parameters: Mapping[str, str], ticket: Ticket
-    ) -> list[Report]:
+    ) -> list[PlantReport]:
         """Give a machine a command; the ticket comes back when it is done."""
         if self.faulted:
             return []
         self.now_seconds = now_seconds
         return self._lawful(machine, self._begin(machine, _Busy(command, parameters, ticket)))
 
-    def advance(self, now_seconds: float) -> list[Report]:
+    def advance(self, now_seconds: float) -> list[PlantReport]:
         """Let happen what is due."""
-        reports: list[Report] = []
+        reports: list[PlantReport] = []
         while self.next_seconds is not None and self.next_seconds <= now_seconds:
             self.now_seconds, _, event = heappop(self.events)
             reports += self._lawful(event.machine if isinstance(event, _Finish) else "", self._happen(event))
         return reports
 
-    def _lawful(self, machine: str, happening: Iterator[Report]) -> list[Report]:
-        reports: list[Report] = []
+    def _lawful(self, machine: str, happening: Iterator[PlantReport]) -> list[PlantReport]:
+        reports: list[PlantReport] = []
         try:
             reports.extend(happening)
         except _FaultError as fault:
@@ -221,7 +221,7 @@ class Plant:
         heappush(self.events, (self.now_seconds + delay, self.sequence, event))
         self.sequence += 1
 
-    def _happen(self, event: _Event) -> Iterator[Report]:
+    def _happen(self, event: _Event) -> Iterator[PlantReport]:
         match event:
             case _Arrival():
                 self.arrival_due = True
@@ -258,7 +258,7 @@ class Plant:
         ):
             raise _FaultError(f"workpiece {workpiece.id} leaves the cell without having been machined")
 
-    def _begin(self, name: str, busy: _Busy) -> Iterator[Report]:
+    def _begin(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
         machine = self.machines.get(name)
         action = machine.model.commands.get(busy.command) if machine else None
         if machine is None or action is None:
@@ -295,7 +295,7 @@ class Plant:
         if never not in self.disturbances:
             self._in(action.takes_s, action.jitter_s, _Finish(name, busy))
 
-    def _finish(self, name: str, busy: _Busy) -> Iterator[Report]:
+    def _finish(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
         machine = self.machines[name]
         action = machine.model.commands[busy.command]
         match action:
@@ -371,7 +371,7 @@ class Plant:
             return self.stations[sensor.occupied] is not None
         return self.machines[str(sensor.holding)].holding is not None
 
-    def _seen(self) -> Iterator[Report]:
+    def _seen(self) -> Iterator[PlantReport]:
         for name, sensor in self.model.sensors.items():
             value = self._sees(name, sensor)
             if value != self.shown[name]:

@@ -19,7 +19,7 @@ from firable.executor.messages import ProtocolError
 from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.plant_file import PlantModel, parse_plant, read_plant
 from firable.executor.recorder import Recorder
-from firable.executor.run import Operator, RunReport, execute, load, run
+from firable.executor.running import Operator, RunReport, execute, load, run
 from firable.executor.situation import State, is_deadlock
 from firable.executor.token_player import TokenPlayer
 from firable.nets.bundle import Bundle, required_verdicts, write_bundle
@@ -529,8 +529,7 @@ def test_executor_runs_without_solvers_and_without_the_rooms_that_prove(tmp_path
     write_bundle(tmp_path / "cell.bundle", proved_bundle())
     program = f"""
 import sys
-from firable.executor.plant_file import read_plant
-from firable.executor.run import load, run
+from firable.executor import load, read_plant, run
 plant = read_plant({str(catalogue_path("one_robot").with_name("one_robot.plant.yaml"))!r})
 assert run(load({str(tmp_path / "cell.bundle")!r}), plant, workpieces=2).delivered == (1, 2)
 heavy = {{"z3", "networkx", "sympy", "numpy", "firable.analysis", "firable.decompose", "firable.cli"}}

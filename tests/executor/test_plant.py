@@ -10,7 +10,7 @@ from firable.executor.plant import (
     NeverCompletes,
     Plant,
     PlantFault,
-    Report,
+    PlantReport,
     SensorChanged,
     StuckSensor,
 )
@@ -66,22 +66,22 @@ class Bench:
     def __init__(self, *disturbances: Disturbance, workpieces: int = 2, text: str = TEXT) -> None:
         self.plant = Plant(model(text), workpieces=workpieces, disturbances=disturbances)
         self.now = 0.0
-        self.reports: list[Report] = self.plant.advance(0.0)
+        self.reports: list[PlantReport] = self.plant.advance(0.0)
         self.tickets = 0
 
-    def give(self, machine: str, command: str, **parameters: str) -> list[Report]:
+    def give(self, machine: str, command: str, **parameters: str) -> list[PlantReport]:
         self.tickets += 1
         reports = self.plant.command(self.now, machine, command, parameters, self.tickets)
         self.reports += reports
         return reports
 
-    def wait(self, seconds: float) -> list[Report]:
+    def wait(self, seconds: float) -> list[PlantReport]:
         self.now += seconds
         reports = self.plant.advance(self.now)
         self.reports += reports
         return reports
 
-    def do(self, machine: str, command: str, **parameters: str) -> list[Report]:
+    def do(self, machine: str, command: str, **parameters: str) -> list[PlantReport]:
         return [*self.give(machine, command, **parameters), *self.wait(4.0)]
 
     def fetch(self) -> None:
