@@ -8,9 +8,11 @@ first line is a header, the last says where the trace ended; between them stand,
     {"at": 1.25, "command": "robot.to_cv1"}              the output signal of a place, sent
     {"at": 1.25, "note": "fault", ...}                   anything else, kept and not judged
 
-`at` is in seconds from the start of the run. `replay` plays the firings from M0 by the reference player: each must be
-firable, in a trace that records signals its external gates must be open, every entry of a place with an output signal
-must send its command exactly once before the token leaves, and the last line must show the marking reached. A trace
+`at` is in seconds from the start of the run, and never runs backwards. `replay` plays the firings from M0 by the
+reference player: each must be firable, in a trace that records signals its external gates must be open, every entry of
+a place with an output signal must send its command exactly once before the token leaves, and the last line must show
+the marking reached. A token that enters a place clears the completion signal of the place: a value from before is
+stale and opens no gate, and a completion may not come before its command. A trace
 that is cut off, because the run was killed, has no last line, and `replay` says so.
 """
 
@@ -208,7 +210,7 @@ class _Reader:
 
     def record(self, number: int, line: str) -> dict[str, Any]:
         try:
-            data = json.loads(line)
+            data = json.loads(line, parse_constant=_no_number)
         except (ValueError, RecursionError):
             data = None
         if not isinstance(data, dict):
@@ -251,6 +253,10 @@ class _Reader:
         raise self.failure(number, line, "not an event of a trace")
 
 
+def _no_number(constant: str) -> NoReturn:
+    raise ValueError(f"{constant} is no time")
+
+
 @dataclass(frozen=True, slots=True)
 class Replay:
     """What a trace did, once it is known to be a trace of the net."""
@@ -276,6 +282,7 @@ class _Replayer:
         self.marking = net.initial_marking
         self.signals: dict[str, bool] = {}
         self.owed: set[str] = set()
+        self.now_seconds = 0.0
         self.firings = 0
         self.commands = 0
 
@@ -289,20 +296,35 @@ class _Replayer:
             self.deviates(1, f"the trace is of the net '{self.trace.header.net}'", f"this net is '{self.net.name}'")
         number = 1
         for number, event in enumerate(self.trace.events, start=2):
+            self.passed(number, event.at_seconds)
             match event:
                 case Fired():
                     self.fired(number, event)
                 case SignalChanged():
-                    if event.signal not in self.net.signal_index:
-                        self.deviates(number, f"there is no signal '{event.signal}'", "is the trace of another net?")
-                    self.signals[event.signal] = event.value
+                    self.changed(number, event)
                 case CommandSent():
                     self.sent(number, event)
                 case Noted():
                     pass
         if self.trace.end is not None:
+            self.passed(number + 1, self.trace.end.at_seconds)
             self.ended(number + 1, self.trace.end)
         return Replay(self.marking, self.firings, self.commands, self.trace.end is not None)
+
+    def passed(self, number: int, at_seconds: float) -> None:
+        if at_seconds < self.now_seconds:
+            self.deviates(number, "time runs backwards", f"the line before is of {self.now_seconds:g} s")
+        self.now_seconds = at_seconds
+
+    def changed(self, number: int, event: SignalChanged) -> None:
+        if event.signal not in self.net.signal_index:
+            self.deviates(number, f"there is no signal '{event.signal}'", "is the trace of another net?")
+        unsent = [place for place in sorted(self.owed) if self.net.place(place).completion == event.signal]
+        if event.value and unsent:
+            self.deviates(
+                number, f"'{event.signal}' completes a command of '{unsent[0]}' that was not sent", "it is stale"
+            )
+        self.signals[event.signal] = event.value
 
     def fired(self, number: int, event: Fired) -> None:
         if unknown := [name for name in event.transitions if name not in self.net.transition_index]:
@@ -310,11 +332,15 @@ class _Replayer:
         if self.trace.header.discipline is Discipline.INTERLEAVING and len(event.transitions) > 1:
             self.deviates(number, "several transitions fire at once", "under interleaving they fire one at a time")
         fired = [self.net.transition_index[name] for name in event.transitions]
+        if len(set(fired)) < len(fired):
+            self.deviates(number, "a transition fires twice at once", "write it once")
         firable = self.player.firable(self.marking)
         for t in fired:
             transition = self.net.transitions[t]
             if t not in firable:
                 self.deviates(number, f"'{transition.name}' is not firable", self.why_not(t))
+            if not transition.openable:
+                self.deviates(number, f"'{transition.name}' can never fire", "it wants one signal both 1 and 0")
             closed = [g for g in transition.external if self.signals.get(g.signal, False) != g.wanted]
             if self.trace.header.signals and closed:
                 gate = closed[0]
@@ -329,7 +355,7 @@ class _Replayer:
         if step and not self.is_a_step(fired):
             self.deviates(number, "not a maximal step", "an enabled transition without conflict is left out")
         after = self.player.fire(self.marking, fired)
-        self.commands_due(number, after)
+        self.entered(number, after)
         self.marking = after
         self.firings += len(fired)
 
@@ -348,14 +374,17 @@ class _Replayer:
             reasons.append(f"{', '.join(full)} must be empty")
         return "; ".join(reasons)
 
-    def commands_due(self, number: int, after: Marking) -> None:
+    def entered(self, number: int, after: Marking) -> None:
+        entered = self.net.names(after & ~self.marking)
+        for place in entered:
+            if (completion := self.net.place(place).completion) is not None:
+                self.signals[completion] = False
         if not self.trace.header.commands:
             return
         left = self.net.names(self.marking & ~after)
         if unsent := [place for place in left if place in self.owed]:
             command = self.net.place(unsent[0]).command
             self.deviates(number, f"the token leaves '{unsent[0]}' before its command was sent", f"expected: {command}")
-        entered = self.net.names(after & ~self.marking)
         self.owed.update(place for place in entered if self.net.place(place).command is not None)
 
     def sent(self, number: int, event: CommandSent) -> None:
@@ -372,6 +401,8 @@ class _Replayer:
             self.deviates(
                 number, "the trace ends in another marking than it shows", f"reached: {', '.join(shown) or 'none'}"
             )
+        if end.reason == "deadlock" and not self.player.deadlocked(self.marking):
+            self.deviates(number, "the trace ends in a deadlock that is none", "some transition is firable")
         if self.owed:
             self.deviates(
                 number, f"the command of '{min(self.owed)}' was never sent", "each entry sends its command once"

@@ -77,7 +77,8 @@ def test_a_firing_through_a_closed_gate_is_no_event_of_the_net() -> None:
 
 
 def test_a_command_that_is_never_sent_is_noticed_when_the_token_leaves() -> None:
-    assert "before its command was sent" in deviation(trace(RUN[0], RUN[2], RUN[4]))
+    without_signals = Trace(Header("drill", commands=True), (RUN[0], RUN[4]), End(2.0, ("idle",)))
+    assert "before its command was sent" in deviation(without_signals)
 
 
 def test_a_command_that_is_never_sent_is_noticed_at_the_end() -> None:
@@ -112,6 +113,37 @@ def test_a_step_that_leaves_out_an_enabled_transition_is_not_maximal() -> None:
         replay(net, Trace.of_firings(net, [("t",), ("u",)], Discipline.STEP))
 
 
+def test_time_does_not_run_backwards() -> None:
+    assert deviation(trace(RUN[0], RUN[1], SignalChanged(-1.0, "done", True))) == "4: time runs backwards"
+
+
+def test_a_completion_from_before_its_command_is_stale() -> None:
+    again = (Fired(1.8, ("start",)), CommandSent(1.8, "busy"))
+    assert "external gate is closed" in deviation(trace(*RUN, *again, Fired(1.9, ("stop",))))
+
+
+def test_a_completion_does_not_come_before_its_command() -> None:
+    assert "that was not sent" in deviation(trace(RUN[0], SignalChanged(0.0, "done", True), RUN[1]))
+
+
+def test_a_transition_that_wants_a_signal_both_ways_fires_in_no_trace() -> None:
+    torn = Transition("t", (), ("p",), external=(ExternalGate("s"), ExternalGate("s", wanted=False)))
+    net = Net("torn", (Place("p"),), (torn,), (Signal("s"),))
+    with pytest.raises(InputError, match="can never fire"):
+        replay(net, Trace(Header("torn"), (Fired(0.0, ("t",)),)))
+
+
+def test_a_transition_does_not_fire_twice_in_one_step() -> None:
+    net = Net("one", (Place("a", marked=True),), (Transition("t", ("a",)),))
+    with pytest.raises(InputError, match="fires twice"):
+        replay(net, Trace(Header("one", discipline=Discipline.STEP), (Fired(0.0, ("t", "t")),)))
+
+
+def test_a_deadlock_that_is_none_is_noticed() -> None:
+    ended = Trace(trace().header, RUN, End(2.0, ("idle",), "deadlock"))
+    assert "a deadlock that is none" in deviation(ended)
+
+
 def test_a_trace_that_was_cut_off_replays_as_incomplete() -> None:
     lines = text_of(trace(*RUN)).splitlines(keepends=True)
     cut = "".join(lines[:-1]) + lines[-1][:9]
@@ -120,7 +152,15 @@ def test_a_trace_that_was_cut_off_replays_as_incomplete() -> None:
 
 @pytest.mark.parametrize(
     "line",
-    ["nothing", "[]", '{"at": 1}', '{"at": 0, "fired": []}', '{"at": 0, "signal": "done", "value": 2}', "[" * 100_000],
+    [
+        "nothing",
+        "[]",
+        '{"at": 1}',
+        '{"at": 0, "fired": []}',
+        '{"at": 0, "signal": "done", "value": 2}',
+        "[" * 100_000,
+        '{"at": NaN, "note": "x"}',
+    ],
 )
 def test_a_malformed_line_is_named(line: str) -> None:
     header = text_of(trace()).splitlines()[0]
