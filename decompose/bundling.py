@@ -14,8 +14,9 @@ from dataclasses import replace
 from firable.analysis.check import CheckReport
 from firable.decompose.prove import TIMEOUT_MS, prove
 from firable.decompose.split import split
-from firable.nets.bundle import Bundle, unproved
+from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.right_to_run import unproved
 from firable.semantics.trace import Discipline
 
 

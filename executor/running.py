@@ -24,11 +24,12 @@ from firable.executor.plant_file import PlantModel, misfits
 from firable.executor.recorder import LineStream, Recorder, TraceFile
 from firable.executor.situation import Situation, State
 from firable.executor.virtual_time import run_in_virtual_time
-from firable.nets.bundle import Bundle, read_bundle, unproved
+from firable.nets.bundle import Bundle, read_bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
 from firable.nets.net import Net
+from firable.nets.right_to_run import unproved
 
 Operator = Callable[[Execution], Awaitable[None]]
 """A coroutine that runs beside the cell and uses its controls."""

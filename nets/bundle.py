@@ -3,7 +3,7 @@
 A bundle is what runs on hardware, so it has to carry its right to run. `manifest.json` holds the SHA-256 of every
 other file and a digest over itself; `verdicts.json` names the digests of exactly the net, subnets and table that were
 judged, so that verdicts cannot be kept while a subnet is exchanged. What a bundle *must* prove is not read from the
-verdicts but derived from the net (`unproved`).
+verdicts but derived from the net (`right_to_run`).
 
 Reading rebuilds everything from its content, writes it again and compares: there is one spelling of a bundle, and a
 change of any byte is refused. That finds damage and edits by hand; it is no signature, since whoever can write a
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -28,7 +28,7 @@ from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.interchange import canonical_json, net_from_json, net_to_json
 from firable.nets.net import ArbitrationRule, Net
 from firable.nets.source import printable, read_bytes
-from firable.nets.verdict import Verdict, Weight
+from firable.nets.verdict import Verdict
 from firable.nets.writing import write_whole
 
 VERSION: Final = 1
@@ -216,7 +216,7 @@ def read_bundle(path: str | Path) -> Bundle:
     """Read a bundle file.
 
     Raises `InputError`: F1001 where it cannot be read, F1003 where it is too large for a bundle, F5001 where it is
-    damaged, changed, or none. Whether it may run is another question: `unproved`.
+    damaged, changed, or none. Whether it may run is another question: `right_to_run`.
     """
     archive = read_bytes(path, SIZE_BYTES_MAX)
     if not archive.startswith(SIGNATURE):
@@ -233,61 +233,3 @@ def write_bundle(path: str | Path, bundle: Bundle) -> None:
     Raises `InputError` F1017 where it cannot be written, F4003 where the bundle is too large.
     """
     write_whole(path, bundle.to_bytes())
-
-
-CHECKED: Final = ("contact-free", "deadlock-free", "quasi-live", "conflicting-commands")
-"""The verdicts on every net, whatever its file states, without which it may not run."""
-
-
-def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
-    """The names of the verdicts that must be PROVED before a net may run: derived from the net, not from what is there.
-
-    Of the net what `CHECKED` names and every property of the file; of the decomposition Eq. (7) and (8) for every
-    transition, Eq. (9)-(10) for every place, ownership, M0, commands, and arbitration.
-    """
-    net = decomposition.net
-    yield from CHECKED
-    yield from (f"property.{prop.name}" for prop in net.properties)
-    yield from (f"{equation}.{t.name}" for t in net.transitions for equation in ("eq7", "eq8"))
-    yield from (f"eq9-10.{place.name}" for place in net.places)
-    yield from ("ownership", "initial-marking", "commands", "arbitration")
-    yield from (f"arbitration.{group.name}" for group in decomposition.groups)
-
-
-def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
-    """What keeps a bundle from running (F5002): nothing where every required verdict is PROVED, with its evidence.
-
-    Required is what the net requires, and whatever else a verdict of the bundle says that it does.
-    """
-    problems = []
-    by_name: dict[str, list[Verdict]] = {}
-    for verdict in bundle.verdicts:
-        by_name.setdefault(verdict.name, []).append(verdict)
-    stated = (verdict.name for verdict in bundle.verdicts if verdict.weight is Weight.REQUIRED)
-    for name in dict.fromkeys((*required_verdicts(bundle.decomposition), *stated)):
-        if name not in by_name:
-            message = f"there is no verdict on '{name}'"
-            problems.append(Diagnostic("F5002", message, _HINT, ("verdicts", name)))
-        for verdict in by_name.get(name, ()):
-            subject = ("verdicts", name)
-            if not verdict.holds:
-                message = f"'{name}' is {verdict.status.value}, not proved: {verdict.statement}"
-                hint = verdict.hint or "`firable check` and `firable prove` show why"
-                problems.append(Diagnostic("F5002", message, hint, subject))
-            for file in verdict.evidence:
-                if file not in bundle.evidence:
-                    message = f"the evidence '{file}' for '{name}' is missing"
-                    problems.append(Diagnostic("F5002", message, _HINT, subject))
-    return (*problems, *_undecided_conflicts(bundle.decomposition))
-
-
-def _undecided_conflicts(decomposition: Decomposition) -> Iterator[Diagnostic]:
-    """Conflicts that no group of the table decides: then nothing was proved about them either."""
-    net = decomposition.net
-    group_of = {name: group.name for group in decomposition.groups for name in (*group.sequence, *group.rest)}
-    for p, place in enumerate(net.places):
-        for together in (net.consumers[p], net.producers[p]):
-            deciders = {group_of.get(net.transitions[t].name) for t in together}
-            if len(together) > 1 and (None in deciders or len(deciders) > 1):
-                message = f"the conflict at '{place.name}' is not decided by one arbitration group"
-                yield Diagnostic("F5002", message, _HINT, ("places", place.name))

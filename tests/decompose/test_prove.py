@@ -17,8 +17,8 @@ from firable.decompose.bundling import make_bundle
 from firable.decompose.obligations import greedy
 from firable.decompose.prove import ProofReport, prove
 from firable.decompose.split import split
-from firable.nets.bundle import CHECKED, Bundle, required_verdicts, unproved
-from firable.nets.catalogue import catalogue_net
+from firable.nets.bundle import Bundle
+from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.decomposition import Decomposition, Part
 from firable.nets.diagnostics import InputError
 from firable.nets.net import (
@@ -33,7 +33,8 @@ from firable.nets.net import (
     SignalKind,
     Transition,
 )
-from firable.nets.verdict import Status, Verdict
+from firable.nets.right_to_run import CHECKED, required_verdicts, unproved
+from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.arbitration import Arbitration
 from firable.semantics.trace import Discipline
 
@@ -339,6 +340,16 @@ def test_cell_is_bundled_with_all_its_proofs() -> None:
     assert unproved(bundle) == ()
     assert bundle.net == report.net
     assert Bundle.from_bytes(bundle.to_bytes()) == bundle
+
+
+@pytest.mark.parametrize("name", catalogue_names())
+def test_check_and_prove_give_exactly_the_required_verdicts_each_once(name: str) -> None:
+    net = catalogue_net(name)
+    decomposition = split(net)
+    verdicts = (*check(net).verdicts, *prove(decomposition).verdicts)
+    given = [verdict.name for verdict in verdicts if verdict.weight is Weight.REQUIRED]
+    assert sorted(given) == sorted(required_verdicts(decomposition))
+    assert len({verdict.name for verdict in verdicts}) == len(verdicts)
 
 
 def not_bundled(report: CheckReport) -> str:

@@ -22,11 +22,12 @@ from firable.executor.recorder import Recorder
 from firable.executor.running import Operator, RunReport, execute, load, run
 from firable.executor.situation import State, is_deadlock
 from firable.executor.token_player import TokenPlayer
-from firable.nets.bundle import Bundle, required_verdicts, write_bundle
+from firable.nets.bundle import Bundle, write_bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
+from firable.nets.right_to_run import required_verdicts
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status, Verdict
 from firable.semantics.judgement import Judgement, judge

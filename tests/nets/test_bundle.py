@@ -12,12 +12,13 @@ from pathlib import Path
 import pytest
 
 from firable.nets.archive import ArchiveError, pack, unpack
-from firable.nets.bundle import Bundle, file_stem, read_bundle, required_verdicts, unproved, write_bundle
+from firable.nets.bundle import Bundle, file_stem, read_bundle, write_bundle
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Holds
 from firable.nets.interchange import canonical_json
 from firable.nets.net import ArbitrationRule, Command, Controller, Net, Place, Property, PropertyKind, Transition
+from firable.nets.right_to_run import required_verdicts, unproved
 from firable.nets.verdict import Status, Verdict, Weight
 
 A, B = Controller("a"), Controller("b")

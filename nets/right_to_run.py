@@ -1,0 +1,80 @@
+"""The right to run: which verdicts a net needs, and what keeps a bundle from running.
+
+What must be proved is derived from the net and its decomposition, never read from the verdicts that a bundle brings:
+a list of its own demands could be shortened by whoever writes the bundle. Whatever else a verdict says that it is
+required adds to the demands, and nothing takes from them. Who makes a bundle and who runs one ask the same function,
+so that no bundle is made that could not run. Nothing is imported here that reads or proves: this is the policy alone.
+
+To require a further verdict: its name in `required_verdicts`, and a test that the prover really gives it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
+
+from firable.nets.diagnostics import Diagnostic
+from firable.nets.verdict import Verdict, Weight
+
+if TYPE_CHECKING:
+    from firable.nets.bundle import Bundle
+    from firable.nets.decomposition import Decomposition
+
+_REMEDY: Final = "make the bundle anew with `firable bundle`"
+
+CHECKED: Final = ("contact-free", "deadlock-free", "quasi-live", "conflicting-commands")
+"""The verdicts on every net, whatever its file states, without which it may not run."""
+
+
+def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
+    """The names of the verdicts that must be PROVED before a net may run: derived from the net, not from what is there.
+
+    Of the net what `CHECKED` names and every property of the file; of the decomposition Eq. (7) and (8) for every
+    transition, Eq. (9)-(10) for every place, ownership, M0, commands, and arbitration.
+    """
+    net = decomposition.net
+    yield from CHECKED
+    yield from (f"property.{prop.name}" for prop in net.properties)
+    yield from (f"{equation}.{t.name}" for t in net.transitions for equation in ("eq7", "eq8"))
+    yield from (f"eq9-10.{place.name}" for place in net.places)
+    yield from ("ownership", "initial-marking", "commands", "arbitration")
+    yield from (f"arbitration.{group.name}" for group in decomposition.groups)
+
+
+def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
+    """What keeps a bundle from running (F5002): nothing where every required verdict is PROVED, with its evidence.
+
+    Required is what the net requires, and whatever else a verdict of the bundle says that it does.
+    """
+    problems = []
+    by_name: dict[str, list[Verdict]] = {}
+    for verdict in bundle.verdicts:
+        by_name.setdefault(verdict.name, []).append(verdict)
+    stated = (verdict.name for verdict in bundle.verdicts if verdict.weight is Weight.REQUIRED)
+    for name in dict.fromkeys((*required_verdicts(bundle.decomposition), *stated)):
+        if name not in by_name:
+            message = f"there is no verdict on '{name}'"
+            problems.append(Diagnostic("F5002", message, _REMEDY, ("verdicts", name)))
+        for verdict in by_name.get(name, ()):
+            subject = ("verdicts", name)
+            if not verdict.holds:
+                message = f"'{name}' is {verdict.status.value}, not proved: {verdict.statement}"
+                hint = verdict.hint or "`firable check` and `firable prove` show why"
+                problems.append(Diagnostic("F5002", message, hint, subject))
+            for file in verdict.evidence:
+                if file not in bundle.evidence:
+                    message = f"the evidence '{file}' for '{name}' is missing"
+                    problems.append(Diagnostic("F5002", message, _REMEDY, subject))
+    return (*problems, *_undecided_conflicts(bundle.decomposition))
+
+
+def _undecided_conflicts(decomposition: Decomposition) -> Iterator[Diagnostic]:
+    """Conflicts that no group of the table decides: then nothing was proved about them either."""
+    net = decomposition.net
+    group_of = {name: group.name for group in decomposition.groups for name in (*group.sequence, *group.rest)}
+    for p, place in enumerate(net.places):
+        for together in (net.consumers[p], net.producers[p]):
+            deciders = {group_of.get(net.transitions[t].name) for t in together}
+            if len(together) > 1 and (None in deciders or len(deciders) > 1):
+                message = f"the conflict at '{place.name}' is not decided by one arbitration group"
+                yield Diagnostic("F5002", message, _REMEDY, ("places", place.name))
