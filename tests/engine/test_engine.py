@@ -363,7 +363,6 @@ def test_a_budget_that_runs_out_is_said_and_nothing_is_concluded_from_the_part()
         for question in (
             graph.live,
             graph.reversible,
-            graph.home,
             graph.home_markings,
             graph.components,
             graph.edges,

@@ -357,10 +357,10 @@ impl Space {
         Ok(found)
     }
 
-    /// The transitions that a rule enables at one marking, by tests of single places.
-    pub fn enabled_by(&self, rules: &Rules, marking: &[u64], openable: bool) -> Vec<u32> {
+    /// The openable transitions that a rule enables at one marking, by tests of single places.
+    pub fn enabled_by(&self, rules: &Rules, marking: &[u64]) -> Vec<u32> {
         (0..self.net.transitions.len())
-            .filter(|&t| rules.test_one(t, |p| holds(marking, p), openable))
+            .filter(|&t| rules.test_one(t, |p| holds(marking, p)))
             .map(|t| t as u32)
             .collect()
     }

@@ -148,11 +148,11 @@ impl Rules {
         self.edge[t]
     }
 
-    /// The same test at one marking; `openable` false asks for Eq. (1) alone.
-    pub fn test_one(&self, t: usize, holds: impl Fn(u32) -> bool, openable: bool) -> bool {
+    /// The same test at one marking, of an openable transition; false for any other.
+    pub fn test_one(&self, t: usize, holds: impl Fn(u32) -> bool) -> bool {
         let span = self.spans[t];
         let part = |start: u32, end: u32| self.places[start as usize..end as usize].iter();
-        (if openable { self.edge[t] } else { self.sound[t] }) != 0
+        self.edge[t] != 0
             && part(span.full, span.hole).all(|&p| holds(p))
             && part(span.hole, span.end).all(|&p| !holds(p))
     }

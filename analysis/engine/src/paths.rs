@@ -57,7 +57,7 @@ fn predecessor(space: &Space, index: u32) -> u32 {
     let marking = space.marking(index as usize);
     let mut before = vec![0; words];
     let mut best = NONE;
-    for t in space.enabled_by(&space.net.backward, marking, true) {
+    for t in space.enabled_by(&space.net.backward, marking) {
         let flip = space.net.flip(t as usize, words);
         for k in 0..words {
             before[k] = marking[k] ^ flip[k];
