@@ -1,9 +1,10 @@
 """A question about a net, and how its answer becomes a verdict.
 
-The verdicts of the explicit method share their shape: a statement, a weight, the graph as method and cost, and one way
-to be unknown, which is that the budget ended first. That shape is written here once; each technique says only what
-it found. An answer that needs the whole graph asks for it, and the refusal becomes UNKNOWN with the bound reached, so
-that no technique can conclude from a part by forgetting a check.
+The verdicts of the explicit method share their shape: a statement, a weight, a method (mostly the graph), a cost, and
+a way to be unknown, which is that the budget ended first. That shape is written here once; each technique says only
+what it found. An answer that needs the whole graph asks for it, and the refusal becomes UNKNOWN with the bound reached,
+so that no technique can conclude from a part by forgetting a check. A technique with another way to be unknown answers
+so itself.
 """
 
 from __future__ import annotations
@@ -21,29 +22,38 @@ METHOD = {
     Discipline.STEP: "reachability graph, synchronous steps",
 }
 
+_STATUS = {True: Status.PROVED, False: Status.VIOLATED, None: Status.UNKNOWN}
+
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What was found: whether the statement holds, what it concerns, and the evidence.
+    """What was found: whether the statement holds (None: unknown), what it concerns, and the evidence.
 
-    `hint` is for the engineer who reads a violation; it replaces the one of the question where it is not empty.
+    `hint` is for the engineer who reads it; of a violation it replaces the one of the question where it is not empty.
+    `bound` and `code` belong to an unknown answer: how far was looked, and the code of what stood in the way.
     """
 
-    holds: bool
+    holds: bool | None
     subjects: tuple[str, ...] = ()
     witness: Witness | None = None
     hint: str = ""
+    bound: str = ""
+    code: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A property of a net that some technique decides; `code` and `hint` go with a violation."""
+    """A property of a net that some technique decides; `code` and `hint` go with a violation.
+
+    `method` is named where it is not the graph itself.
+    """
 
     name: str
     statement: str
     weight: Weight = Weight.REQUIRED
     code: str = ""
     hint: str = ""
+    method: str = ""
 
     def ask(self, graph: ReachabilityGraph, find: Callable[[], Answer]) -> Verdict:
         """The verdict: what `find` answers, or UNKNOWN where it needs more of the graph than there is."""
@@ -51,27 +61,20 @@ class Question:
         try:
             answer = find()
         except (IncompleteGraph, BudgetExceeded) as error:
-            return Verdict(
-                self.name,
-                Status.UNKNOWN,
-                self.statement,
-                METHOD[graph.discipline],
-                self.weight,
-                "F3004",
-                "give it a larger budget of markings, memory or time",
-                graph.bound or f"{graph.n_markings:,} markings: {error}",
-                cost=self._cost(graph, start),
-            )
+            bound = graph.bound or f"{graph.n_markings:,} markings: {error}"
+            answer = unknown(bound, "give it a larger budget of markings, memory or time", "F3004")
+        violated = answer.holds is False
         return Verdict(
             self.name,
-            Status.PROVED if answer.holds else Status.VIOLATED,
+            _STATUS[answer.holds],
             self.statement,
-            METHOD[graph.discipline],
+            self.method or METHOD[graph.discipline],
             self.weight,
-            "" if answer.holds else self.code,
-            "" if answer.holds else answer.hint or self.hint,
-            subjects=answer.subjects,
-            witness=answer.witness,
+            answer.code or (self.code if violated else ""),
+            answer.hint or (self.hint if violated else ""),
+            answer.bound,
+            answer.subjects,
+            answer.witness,
             cost=self._cost(graph, start),
         )
 
@@ -95,3 +98,8 @@ def yes(witness: Witness | None = None) -> Answer:
 def no(subjects: tuple[str, ...] = (), witness: Witness | None = None, hint: str = "") -> Answer:
     """The statement does not hold."""
     return Answer(holds=False, subjects=subjects, witness=witness, hint=hint)
+
+
+def unknown(bound: str, hint: str, code: str = "") -> Answer:
+    """It is not known whether the statement holds."""
+    return Answer(holds=None, hint=hint, bound=bound, code=code)

@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from time import perf_counter
 from typing import Final
 
 from firable.analysis.behaviour import Behaviour
-from firable.analysis.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph, WitnessError
+from firable.analysis.question import Answer, Question, no, unknown, yes
+from firable.analysis.reachability import ReachabilityGraph, WitnessError
 from firable.nets.net import Net
-from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
+from firable.nets.verdict import Verdict, Weight, Witness
 from firable.semantics.arbitration import Arbitration
 from firable.semantics.conflict import jointly_openable
 from firable.semantics.player import FiringSet, Player
@@ -109,40 +109,29 @@ def starvation_free(behaviour: Behaviour) -> Verdict:
 
     Raises `InputError` F2013 where the arbiters do not fit the conflicts.
     """
-    graph, start = behaviour.graph, perf_counter()
-    name = "starvation"
-    statement = "every live transition fires again and again in the arbitrated run with all external gates open"
-    method = "eager run of synchronous steps under the arbiters"
-
-    def unknown(bound: str, hint: str, code: str = "") -> Verdict:
-        return Verdict(name, Status.UNKNOWN, statement, method, Weight.WARNING, code, hint, bound)
-
-    try:
-        run = eager_run(graph.net)
-        live = behaviour.live
-    except GatesCannotBeOpenError as error:
-        return unknown(str(error), "there is no run with all gates open; starvation depends on the signals")
-    except (IncompleteGraph, BudgetExceeded):
-        return unknown(graph.bound, "give it a larger budget of markings, memory or time", "F3004")
-    if not run.complete:
-        return unknown(
-            f"{len(run.prefix):,} steps of the run", "the run has not come back to an earlier marking", "F3004"
-        )
-    hungry = starved(run, live)
-    cost = Cost(graph.n_markings, graph.n_edges, perf_counter() - start)
-    if not hungry:
-        return Verdict(name, Status.PROVED, statement, method, Weight.WARNING, cost=cost)
-    return Verdict(
-        name,
-        Status.VIOLATED,
-        statement,
-        method,
+    question = Question(
+        "starvation",
+        "every live transition fires again and again in the arbitrated run with all external gates open",
         Weight.WARNING,
         hint="let the arbiter go by `order` or `rotation`, or accept that these wait for a slower cycle",
-        subjects=hungry,
-        witness=_witness(graph, run, f"{hungry[0]} never fires in the cycle"),
-        cost=cost,
+        method="eager run of synchronous steps under the arbiters",
     )
+
+    def find() -> Answer:
+        graph = behaviour.graph
+        try:
+            run = eager_run(graph.net)
+        except GatesCannotBeOpenError as error:
+            return unknown(str(error), "there is no run with all gates open; starvation depends on the signals")
+        if not run.complete:
+            bound = f"{len(run.prefix):,} steps of the run"
+            return unknown(bound, "the run has not come back to an earlier marking", "F3004")
+        hungry = starved(run, behaviour.live)
+        if not hungry:
+            return yes()
+        return no(hungry, _witness(graph, run, f"{hungry[0]} never fires in the cycle"))
+
+    return question.ask(behaviour.graph, find)
 
 
 def _witness(graph: ReachabilityGraph, run: EagerRun, note: str) -> Witness | None:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from support.generate_sparse import sparse_nets
 
 from firable.analysis.check import check
-from firable.analysis.reachability import explore
+from firable.analysis.reachability import Budget, explore
 from firable.analysis.starvation import EagerRun, GatesCannotBeOpenError, eager_run, starved
 from firable.nets.net import Arbiter, ArbitrationRule, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.verdict import Status
@@ -67,12 +67,25 @@ def test_gates_that_cannot_all_be_open_leave_starvation_unknown() -> None:
     net = Net("n", places, moves, (Signal("s"),))
     with pytest.raises(GatesCannotBeOpenError):
         eager_run(net)
-    assert check(net).verdict("starvation").status is Status.UNKNOWN
+    verdict = check(net).verdict("starvation")
+    assert verdict.status is Status.UNKNOWN
+    assert verdict.bound == "transitions that are firable together want a signal both 1 and 0"
+    assert (verdict.method, verdict.code) == ("eager run of synchronous steps under the arbiters", "")
 
 
 def test_a_run_that_is_cut_off_says_so() -> None:
     run = eager_run(two_ways(), steps_max=1)
     assert run == EagerRun((("t1",),), (), complete=False)
+
+
+def test_a_run_that_was_cut_off_and_a_graph_that_was_leave_starvation_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    of_graph = check(two_ways(), budget=Budget(markings=1)).verdict("starvation")
+    monkeypatch.setattr("firable.analysis.starvation.eager_run", lambda net: eager_run(net, steps_max=1))
+    of_run = check(two_ways()).verdict("starvation")
+    assert (of_graph.status, of_graph.code) == (of_run.status, of_run.code) == (Status.UNKNOWN, "F3004")
+    assert of_run.bound == "1 steps of the run"
+    assert of_graph.bound.startswith("1 markings found")
+    assert of_graph.cost.markings == 1
 
 
 @settings(max_examples=150, deadline=None)
