@@ -173,7 +173,7 @@ def figures(behaviour: Behaviour, conflicts: ConflictAnalysis) -> Figures:
     graph, net = behaviour.graph, behaviour.graph.net
     whole = graph.complete
     nonlive = _known(lambda: behaviour.nonlive)
-    stepwise = graph.discipline is Discipline.STEP and whole
+    stepwise = graph.discipline is Discipline.STEP
     firable = Player(net).firable(net.initial_marking)
     return Figures(
         markings=graph.n_markings,
@@ -193,7 +193,7 @@ def figures(behaviour: Behaviour, conflicts: ConflictAnalysis) -> Figures:
         structural_conflicts=conflicts.structural,
         effective_conflicts=conflicts.effective if whole else None,
         gate_races=conflicts.races,
-        nonserialisable=tuple(conflicts.nonserialisable) if stepwise else None,
+        nonserialisable=_known(lambda: conflicts.nonserialisable) if stepwise else None,
     )
 
 

@@ -77,10 +77,20 @@ class ConflictAnalysis:
         return self._named(tuple(gate_races(self.graph.net)))
 
     @cached_property
-    def nonserialisable(self) -> dict[tuple[str, ...], int]:
-        """The steps of a step graph that no order can replay, with the lowest marking at which each may fire.
+    def nonserialisable(self) -> tuple[tuple[str, ...], ...]:
+        """The steps of a step graph that no order can replay; raises `IncompleteGraph` where more may come.
 
-        Raises `ValueError` for an interleaving graph, which has no steps, `IncompleteGraph` where more may come.
+        Raises `ValueError` for an interleaving graph, which has no steps.
+        """
+        if races_may_cycle(self.graph.net):
+            self.graph.require_complete()
+        return tuple(self.unordered)
+
+    @cached_property
+    def unordered(self) -> dict[tuple[str, ...], int]:
+        """The steps found that no order can replay, with the lowest marking at which each may fire.
+
+        Of a part of the graph there may be more. Raises `ValueError` for an interleaving graph, which has no steps.
         """
         if self.graph.discipline is not Discipline.STEP:
             raise ValueError("only the step graph has steps")
@@ -179,7 +189,7 @@ def steps_serialisable(analysis: ConflictAnalysis) -> Verdict:
     )
 
     def find() -> Answer:
-        found = analysis.nonserialisable
+        found = analysis.unordered
         if found:
             step, index = min(found.items(), key=lambda item: item[1])
             witness = analysis.graph.witness(index, f"here the step of {listed(step)} has no order")

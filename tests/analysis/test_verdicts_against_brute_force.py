@@ -11,7 +11,9 @@ from support.generate import nets
 from support.generate_sparse import sparse_nets
 from support.reference import cases
 
-from firable.analysis.check import CheckReport, check
+from firable.analysis.check import CheckReport, check, report_on
+from firable.analysis.conflict_verdicts import ConflictAnalysis
+from firable.analysis.reachability import Budget, IncompleteGraph, explore
 from firable.nets.net import Marking, Net, Place, Transition
 from firable.nets.verdict import Status, Witness
 from firable.semantics.conflict import gate_races, jointly_openable
@@ -193,3 +195,22 @@ def test_two_transitions_that_close_each_others_gates_make_a_step_without_an_ord
     else:
         with pytest.raises(KeyError):
             report.verdict("steps-serialisable")
+
+
+def test_nothing_is_concluded_on_steps_from_a_part_of_the_graph() -> None:
+    places = tuple(Place(name, marked=name in "ab") for name in "abxyz")
+    late = (
+        Transition("t", ("x",), ("z",), ("y",)),
+        Transition("u", ("y",), (), ("x",)),
+        Transition("v", ("a",), ("x",)),
+        Transition("w", ("b",), ("y",)),
+    )
+    net = Net("late", places, late)
+    part = explore(net, Discipline.STEP, Budget(markings=1))
+    assert not part.complete
+    with pytest.raises(IncompleteGraph):
+        _ = ConflictAnalysis(part).nonserialisable
+    report = report_on(part)
+    assert report.figures.nonserialisable is None
+    assert report.verdict("steps-serialisable").status is Status.UNKNOWN
+    assert check(net, Discipline.STEP).figures.nonserialisable == (("t", "u"),)
