@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,7 +38,7 @@ class Case:
 def cases() -> Iterator[Case]:
     """Every variant of every case, in order."""
     for path in sorted((REFERENCE / "cases").glob("*.json")):
-        case = json.loads(path.read_text("utf-8"))
+        case = _read(path)
         for variant in case["variants"]:
             yield Case(case["id"], case["title"], variant["label"], _thunk(variant["net"]), variant["expect"])
 
@@ -53,8 +54,17 @@ def reference_names() -> tuple[str, ...]:
 
 def load_net(name: str) -> Net:
     """The net of `nets/NAME.json`."""
-    data = json.loads((REFERENCE / "nets" / f"{name}.json").read_text("utf-8"))
-    return net_from_json({"name": name, **data})
+    return net_from_json({"name": name, **_read(REFERENCE / "nets" / f"{name}.json")})
+
+
+def _read(path: Path) -> dict[str, Any]:
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        if repeated := [key for key, n in Counter(key for key, _ in pairs).items() if n > 1]:
+            raise InputError([Diagnostic("F1006", f"{path.name}: the key '{repeated[0]}' stands twice", "rename one")])
+        return dict(pairs)
+
+    found: dict[str, Any] = json.loads(path.read_text("utf-8"), object_pairs_hook=once)
+    return found
 
 
 def local(name: str) -> str:
@@ -72,6 +82,16 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
     signals: dict[str, Signal] = {}
     for name, described in transitions.items():
         for gate in described.get("gates", ()):
+            if gate.get("kind") not in {"perm", "inh"}:
+                problems.append(
+                    Diagnostic(
+                        "F1010", f"a gate of '{name}' is neither perm nor inh", "say which", ("transitions", name)
+                    )
+                )
+            if "ext" not in gate and "src" not in gate:
+                problems.append(
+                    Diagnostic("F1009", f"a gate of '{name}' has no source", "write src or ext", ("transitions", name))
+                )
             if "ext" not in gate:
                 continue
             if "src" in gate:
@@ -93,15 +113,18 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
                 )
 
     owners = {int(number) for number in data.get("subsystems", ())}
-    owners |= {place["owner"] for place in places.values() if place.get("owner") is not None}
-    owners |= {int(signal.owner[1:]) for signal in signals.values() if signal.owner}
+    used = {place["owner"] for place in places.values() if place.get("owner") is not None}
+    used |= {int(signal.owner[1:]) for signal in signals.values() if signal.owner}
+    if "subsystems" in data and not used <= owners:
+        problems.append(Diagnostic("F2005", f"{sorted(used - owners)} are no subsystems", "list them"))
+    # A subsystem keeps its number in the names of parts, so those between that own nothing are there too.
+    numbers = [*({0} & (owners | used)), *range(1, max(owners | used, default=0) + 1)]
     controllers = tuple(
-        Controller(f"c{number}", number == 0, data.get("subsystems", {}).get(str(number), ""))
-        for number in sorted(owners)
+        Controller(f"c{number}", number == 0, data.get("subsystems", {}).get(str(number), "")) for number in numbers
     )
 
     def place(name: str, of: Mapping[str, Any]) -> Place:
-        if of["m0"] not in (0, 1):
+        if of.get("m0", 0) not in (0, 1):
             problems.append(
                 Diagnostic(
                     "F2006", f"{of['m0']} tokens on '{name}'", "a place holds one token at most", ("places", full[name])
@@ -110,10 +133,10 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
         out, owner = of.get("out"), of.get("owner")
         command = Command(out["machine"], out["command"], tuple(out.get("params", {}).items())) if out else None
         owner = None if owner is None else f"c{owner}"
-        return Place(full[name], owner, of["m0"] != 0, command, description=of.get("desc", ""))
+        return Place(full[name], owner, of.get("m0", 0) != 0, command, description=of.get("desc", ""))
 
     def internal(of: Mapping[str, Any], kind: str) -> tuple[str, ...]:
-        return tuple(full.get(g["src"], g["src"]) for g in of.get("gates", ()) if g["kind"] == kind and "src" in g)
+        return tuple(full.get(g["src"], g["src"]) for g in of.get("gates", ()) if g.get("kind") == kind and "src" in g)
 
     def transition(name: str, of: Mapping[str, Any]) -> Transition:
         return Transition(
@@ -122,7 +145,9 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
             tuple(full.get(target, target) for target in of["out"]),
             internal(of, "perm"),
             internal(of, "inh"),
-            tuple(ExternalGate(signals[g["ext"]].name, g["kind"] == "perm") for g in of.get("gates", ()) if "ext" in g),
+            tuple(
+                ExternalGate(signals[g["ext"]].name, g.get("kind") == "perm") for g in of.get("gates", ()) if "ext" in g
+            ),
             of.get("num"),
             of.get("desc", ""),
         )
