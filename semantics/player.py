@@ -16,7 +16,7 @@ from functools import cached_property
 from firable.nets.net import Marking, Net
 from firable.semantics.algebra import BOOL
 from firable.semantics.conflict import Conflicts, conflicts, gate_races, jointly_openable
-from firable.semantics.firing import enabled, firable, in_contact, next_token
+from firable.semantics.firing import enabled, external_gates, firable, in_contact, next_token
 
 FiringSet = tuple[int, ...]
 """Transitions fired together, as increasing indexes; a singleton under interleaving."""
@@ -111,14 +111,8 @@ class Player:
         names = sorted({gate.signal for t in candidates for gate in self.net.transitions[t].external})
         found = set()
         for bits in range(1 << len(names)):
-            valuation = {name: bool(bits >> i & 1) for i, name in enumerate(names)}
-            found.add(
-                tuple(
-                    t
-                    for t in candidates
-                    if all(valuation[gate.signal] == gate.wanted for gate in self.net.transitions[t].external)
-                )
-            )
+            valuation = {self.net.signal_index[name]: bool(bits >> i & 1) for i, name in enumerate(names)}
+            found.add(tuple(t for t in candidates if external_gates(BOOL, self.net, t, valuation.__getitem__)))
         return found
 
     def maximal_steps(self, enabled_transitions: Iterable[int]) -> set[FiringSet]:

@@ -335,15 +335,17 @@ class _Replayer:
         if len(set(fired)) < len(fired):
             self.deviates(number, "a transition fires twice at once", "write it once")
         firable = self.player.firable(self.marking)
+        judged = self.trace.header.signals
+        enabled = self.player.enabled(self.marking, self.signals) if judged else firable
         for t in fired:
             transition = self.net.transitions[t]
             if t not in firable:
                 self.deviates(number, f"'{transition.name}' is not firable", self.why_not(t))
             if not transition.openable:
                 self.deviates(number, f"'{transition.name}' can never fire", "it wants one signal both 1 and 0")
-            closed = [g for g in transition.external if self.signals.get(g.signal, False) != g.wanted]
-            if self.trace.header.signals and closed:
-                gate = closed[0]
+            if t not in enabled:
+                # That it is closed, the firing rule has said; which gate it is, the message wants to know.
+                gate = next(g for g in transition.external if self.signals.get(g.signal, False) != g.wanted)
                 self.deviates(
                     number,
                     f"'{transition.name}' fires although its external gate is closed",
