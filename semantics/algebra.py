@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Final, Generic, Protocol, TypeVar
+from functools import reduce
+from operator import and_, or_, xor
+from typing import Final, Generic, Protocol, TypeVar
 
 B = TypeVar("B")
 
@@ -45,22 +47,16 @@ class Bitwise(Generic[B]):
 
     def conjunction(self, operands: Iterable[B], /) -> B:
         """The AND of the operands."""
-        result: Any = self.true
-        for operand in operands:
-            result = result & operand
-        return result  # type: ignore[no-any-return]
+        return reduce(and_, operands, self.true)
 
     def disjunction(self, operands: Iterable[B], /) -> B:
         """The OR of the operands."""
-        result: Any = self.false
-        for operand in operands:
-            result = result | operand
-        return result  # type: ignore[no-any-return]
+        return reduce(or_, operands, self.false)
 
     def negation(self, operand: B, /) -> B:
         """The NOT of the operand, as an exclusive or with true."""
-        value: Any = operand
-        return value ^ self.true  # type: ignore[no-any-return]
+        result: B = xor(operand, self.true)
+        return result
 
 
 BOOL: Final[Bitwise[bool]] = Bitwise(true=True, false=False)
