@@ -27,6 +27,7 @@ from typing import Final
 import z3
 
 from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.smt import SEED
 from firable.nets.net import Marking, Net
 
 SIPHONS_MAX: Final = 2_000
@@ -147,7 +148,7 @@ def _minimal_sets(net: Net, rules: tuple[Rule, ...], most: int, deadline: Deadli
     """Raises `KeyboardInterrupt` where the user ends the solver."""
     chosen = [z3.Bool(f"p{i}") for i in range(len(net.places))]
     solver = z3.Solver()
-    solver.set("random_seed", 0)
+    solver.set("random_seed", SEED)
     solver.add(z3.Or(*chosen))
     for condition, needed in rules:
         alternatives = z3.Or(*(chosen[i] for i in _bits(needed)))

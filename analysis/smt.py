@@ -258,6 +258,10 @@ def smtlib(assertions: Sequence[Term], comments: Iterable[str] = ()) -> str:
 # z3
 
 
+SEED: Final = 0
+"""The seed of every solver, so that verdicts and witnesses are the same every time."""
+
+
 class Answer(StrEnum):
     """Whether all assertions can be true together."""
 
@@ -305,6 +309,7 @@ def decide(assertions: Sequence[Term], *, timeout_ms: int | None = None) -> Deci
     <Answer.UNSAT: 'unsat'>
     """
     solver = z3.Solver()
+    solver.set("random_seed", SEED)  # the same answer, and the same model, every time
     if timeout_ms is not None:
         solver.set("timeout", timeout_ms)
     solver.add(to_z3(assertions))

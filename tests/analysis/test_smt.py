@@ -4,10 +4,13 @@ import re
 
 import cvc5
 import pytest
+import z3
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firable.analysis.smt import Answer, Operator, Term, Terms, decide, smtlib, subterms, symbol, value, variables
+from firable.analysis.siphons import minimal_siphons
+from firable.analysis.smt import SEED, Answer, Operator, Term, Terms, decide, smtlib, subterms, symbol, value, variables
+from firable.nets.net import Net, Place
 
 TERMS = Terms()
 NAMES = ("robot.free", "p", "p'", "fires(t)", "é", "a%b")
@@ -130,3 +133,11 @@ def test_solver_without_time_is_unknown() -> None:
 def test_second_solver_refuses_what_is_no_smt_lib(text: str) -> None:
     with pytest.raises(Exception, match=r"\S"):
         by_cvc5(f"(set-logic QF_UF)(declare-const p Bool){text}(check-sat)")
+
+
+def test_every_question_is_asked_with_the_one_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    set_to: list[tuple[object, ...]] = []
+    monkeypatch.setattr(z3.Solver, "set", lambda _, *options: set_to.append(options))
+    decide([Terms().true])
+    minimal_siphons(Net("n", (Place("p"),)))
+    assert [options for options in set_to if options[0] == "random_seed"] == [("random_seed", SEED)] * 2
