@@ -14,19 +14,22 @@ in part.
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, Final, NoReturn, TypeVar
 from urllib.parse import quote
 
+from pydantic import BaseModel, ValidationError
+from pydantic_core import from_json
+
 from firable.nets.archive import SIGNATURE, ArchiveError, pack, unpack
-from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
+from firable.nets.bundle_records import JudgedRecord, ManifestRecord, TableRecord, VersionRecord, table_to_json
+from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.interchange import canonical_json, net_from_json, net_to_json
-from firable.nets.net import ArbitrationRule, Net
+from firable.nets.net import Net
 from firable.nets.source import printable, read_bytes
 from firable.nets.verdict import Verdict
 from firable.nets.writing import write_whole
@@ -54,7 +57,7 @@ class Bundle:
         """The files of the bundle by name, but for the manifest."""
         judged = {
             "net.json": canonical_json(net_to_json(self.net)),
-            "table.json": canonical_json(_table(self.decomposition)),
+            "table.json": canonical_json(table_to_json(self.decomposition)),
             **{
                 f"subnets/{file_stem(subnet.name)}.json": canonical_json(net_to_json(subnet))
                 for subnet in self.decomposition.subnets
@@ -94,12 +97,8 @@ class Bundle:
         """Read a bundle back; raises `InputError` F5001 for any bytes that `to_bytes` does not make."""
         try:
             bundle = _bundle(unpack(archive))
-        except _DamageError as damage:
-            _refuse(file, str(damage))
-        except ArchiveError as error:
-            _refuse(file, str(error))
-        except (InputError, KeyError, TypeError, ValueError, AttributeError, RecursionError):
-            _refuse(file, "its content is not that of a bundle")
+        except (_DamageError, ArchiveError) as damage:
+            _refuse(file, printable(str(damage)))
         if bundle.to_bytes() != archive:
             _refuse(file, "its content is not as it was written")
         return bundle
@@ -123,88 +122,67 @@ def _sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _table(decomposition: Decomposition) -> dict[str, Any]:
-    return {
-        "coordinated": [
-            {
-                "name": row.name,
-                "number": row.number,
-                "parts": [[part.controller, part.name] for part in row.parts],
-                "description": row.description,
-            }
-            for row in decomposition.coordinated
-        ],
-        "groups": [
-            {
-                "name": group.name,
-                "sequence": list(group.sequence),
-                "rest": list(group.rest),
-                "by": group.by.value,
-                "controller": group.controller,
-            }
-            for group in decomposition.groups
-        ],
-    }
-
-
 def _bundle(members: Mapping[str, bytes]) -> Bundle:
     """The bundle that the members hold, once all their hashes agree."""
     files = {name: data for name, data in members.items() if name != "manifest.json"}
-    if "manifest.json" not in members:
-        raise _DamageError("it has no manifest")
-    manifest = json.loads(members["manifest.json"])
-    if manifest["firable_bundle"] != VERSION:
-        raise _DamageError(f"version {manifest['firable_bundle']} of the format is not known")
-    if set(manifest["members"]) != set(files):
+    version = _record(VersionRecord, members, "manifest.json").firable_bundle
+    if version != VERSION:
+        raise _DamageError(f"version {version} of the format is not known")
+    manifest = _record(ManifestRecord, members, "manifest.json")
+    if set(manifest.members) != set(files):
         raise _DamageError("files were added to it or taken out")
     for name, data in sorted(files.items()):
-        if manifest["members"][name] != _sha256(data):
+        if manifest.members[name] != _sha256(data):
             raise _DamageError(f"'{name}' has been changed")
 
-    net = net_from_json(json.loads(files["net.json"]))
-    table = json.loads(files["table.json"])
-    decomposition = Decomposition(
-        net,
-        tuple(net_from_json(json.loads(files[f"subnets/{file_stem(c.name)}.json"])) for c in net.controllers),
-        tuple(
-            Coordinated(row["name"], row["number"], tuple(Part(*part) for part in row["parts"]), row["description"])
-            for row in table["coordinated"]
-        ),
-        tuple(
-            ArbitrationGroup(
-                group["name"],
-                tuple(group["sequence"]),
-                tuple(group["rest"]),
-                ArbitrationRule(group["by"]),
-                group["controller"],
-            )
-            for group in table["groups"]
-        ),
-    )
-    judged = json.loads(files["verdicts.json"])
-    if changed := sorted(name for name, sha in judged["of"].items() if _sha256(files.get(name, b"")) != sha):
+    net = _net(files, "net.json")
+    subnets = tuple(_net(files, f"subnets/{file_stem(controller.name)}.json") for controller in net.controllers)
+    for controller, subnet in zip(net.controllers, subnets, strict=True):
+        if subnet.name != controller.name:
+            raise _DamageError(f"the subnet of '{controller.name}' has another name")
+    table = _record(TableRecord, files, "table.json")
+    judged = _record(JudgedRecord, files, "verdicts.json")
+    if changed := sorted(name for name, sha in judged.of.items() if _sha256(files.get(name, b"")) != sha):
         raise _DamageError(f"'{changed[0]}' is not the one that the verdicts are about")
-    evidence = {
-        name.removeprefix("evidence/"): data.decode() for name, data in files.items() if name.startswith("evidence/")
-    }
-    bundle = Bundle(decomposition, tuple(map(Verdict.from_json, judged["verdicts"])), evidence)
-    if not _is_well_typed(bundle):
-        raise _DamageError("its content is not that of a bundle")
-    return bundle
+    return Bundle(
+        Decomposition(net, subnets, table.rows(), table.arbitration_groups()),
+        judged.read(),
+        {name.removeprefix("evidence/"): _text(files, name) for name in files if name.startswith("evidence/")},
+    )
 
 
-def _is_well_typed(bundle: Bundle) -> bool:
-    """Whether names are texts and numbers are numbers, so that whoever reads the bundle need not ask."""
-    texts: list[Any] = []
-    for verdict in bundle.verdicts:
-        texts += [verdict.name, verdict.statement, verdict.method, verdict.code, verdict.hint, verdict.bound]
-        texts += [*verdict.subjects, *verdict.evidence]
-    for row in bundle.decomposition.coordinated:
-        texts += [row.name, row.description, *(name for part in row.parts for name in (part.controller, part.name))]
-    for group in bundle.decomposition.groups:
-        texts += [group.name, *group.sequence, *group.rest, *([] if group.controller is None else [group.controller])]
-    numbers: list[Any] = [row.number for row in bundle.decomposition.coordinated]
-    return all(isinstance(text, str) for text in texts) and all(n is None or type(n) is int for n in numbers)
+R = TypeVar("R", bound=BaseModel)
+
+
+def _record(record: type[R], files: Mapping[str, bytes], name: str) -> R:
+    try:
+        return record.model_validate_json(_member(files, name))
+    except ValidationError:
+        raise _DamageError(f"the content of '{name}' is not that of a bundle") from None
+
+
+def _net(files: Mapping[str, bytes], name: str) -> Net:
+    try:
+        data = from_json(_member(files, name))
+    except ValueError:
+        raise _DamageError(f"'{name}' is not JSON") from None
+    try:
+        return net_from_json(data)
+    except InputError as error:
+        raise _DamageError(f"'{name}' is no net: {error.diagnostics[0].message}") from None
+
+
+def _text(files: Mapping[str, bytes], name: str) -> str:
+    try:
+        return files[name].decode()
+    except UnicodeDecodeError:
+        raise _DamageError(f"'{name}' is not text") from None
+
+
+def _member(files: Mapping[str, bytes], name: str) -> bytes:
+    if name not in files:
+        raise _DamageError(f"'{name}' is missing")
+    return files[name]
 
 
 def _refuse(file: str, reason: str) -> NoReturn:

@@ -8,10 +8,10 @@ or the names of the files an independent checker reads. The record lies in this 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Self
+from typing import Any
 
 
 class Status(StrEnum):
@@ -108,34 +108,6 @@ class Verdict:
             if getattr(self.cost, key) is not None:
                 data[key] = getattr(self.cost, key)
         return data
-
-    @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Self:
-        """Read a verdict back; `KeyError`, `TypeError` or `ValueError` where the data are none."""
-        witness = None
-        if "witness" in data:
-            raw = data["witness"]
-            witness = Witness(
-                tuple(tuple(fired) for fired in raw["firings"]),
-                tuple(tuple(fired) for fired in raw["cycle"]),
-                tuple(raw["marking"]),
-                tuple((str(name), bool(value)) for name, value in raw["assignment"]),
-                raw["note"],
-            )
-        return cls(
-            name=data["name"],
-            status=Status(data["status"]),
-            statement=data["statement"],
-            method=data["method"],
-            weight=Weight(data["weight"]),
-            code=data.get("code", ""),
-            hint=data.get("hint", ""),
-            bound=data.get("bound", ""),
-            subjects=tuple(data.get("subjects", ())),
-            witness=witness,
-            evidence=tuple(data.get("evidence", ())),
-            cost=Cost(data.get("markings"), data.get("edges")),
-        )
 
 
 def overall(verdicts: Iterable[Verdict]) -> Status:

@@ -5,7 +5,7 @@ import json
 import os
 import zipfile
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from firable.nets.formula import Holds
 from firable.nets.interchange import canonical_json
 from firable.nets.net import ArbitrationRule, Command, Controller, Net, Place, Property, PropertyKind, Transition
 from firable.nets.right_to_run import required_verdicts, unproved
-from firable.nets.verdict import Status, Verdict, Weight
+from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
 
 A, B = Controller("a"), Controller("b")
 P, Q, R = (
@@ -153,15 +153,59 @@ def test_other_spelling_of_the_same_content_is_refused() -> None:
         ("table.json", b'"number":1', b'"number":true'),
         ("table.json", b'"controller":null', b'"controller":0'),
         ("table.json", b'"t0-1"', b"0"),
+        ("table.json", b'"rest":[]', b'"rest":[],"more":0'),
+        ("table.json", b'"rest":[],', b""),
+        ("table.json", b'"priority"', b'"chance"'),
+        ("table.json", b'["b","t1-11"]', b'["b"]'),
+        ("net.json", b'"marked":true', b'"marked":1'),
+        ("net.json", b'"inputs":["a.p"]', b'"inputs":["a.z"]'),
+        ("subnets/a.json", b'"name":"a"}', b'"name":"c"}'),
+        ("verdicts.json", b'"evidence":["eq7-G.smt2"]', b'"evidence":"eq7-G.smt2"'),
+        ("verdicts.json", b'"name":"ownership"', b'"markings":true,"name":"ownership"'),
+        ("verdicts.json", b'"name":"ownership"', b'"name":"ownership","seconds":1'),
+        ("evidence/eq7-G.smt2", b"check", b"\xff"),
     ],
 )
 def test_content_of_another_type_is_refused_though_every_hash_is_right(name: str, old: bytes, new: bytes) -> None:
     members = unpack(BUNDLE.to_bytes())
     assert old in members[name]
     files = {**members, name: members[name].replace(old, new)}
+    assert with_judged_hashes(members) == BUNDLE.to_bytes()
+    assert refused(with_judged_hashes(files))
+
+
+def with_judged_hashes(files: Mapping[str, bytes]) -> bytes:
+    """The archive of changed members, in which the verdicts claim to be about the changed ones."""
     judged = json.loads(files["verdicts.json"])
     judged["of"] = {file: hashlib.sha256(files[file]).hexdigest() for file in judged["of"]}
-    assert refused(with_new_hashes({**files, "verdicts.json": canonical_json(judged)}))
+    return with_new_hashes({**files, "verdicts.json": canonical_json(judged)})
+
+
+def test_every_field_of_a_verdict_is_read_back() -> None:
+    witness = Witness((("G",), ("l", "G")), (("l",),), ("a.p",), (("a.p", True), ("b.q", False)), "so")
+    full = Verdict(
+        *("v", Status.VIOLATED, "it holds", "by hand", Weight.WARNING),
+        code="F4002",
+        hint="split anew",
+        bound="10 markings",
+        subjects=("G", "l"),
+        witness=witness,
+        evidence=("eq7-G.smt2",),
+        cost=Cost(3, 0),
+    )
+    assert all(getattr(full, field.name) for field in fields(full))
+    bundle = replace(BUNDLE, verdicts=(*VERDICTS, full))
+    assert Bundle.from_bytes(bundle.to_bytes()).verdicts[-1] == full
+
+
+def test_our_own_fault_is_not_called_a_damaged_bundle(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*arguments: object) -> None:
+        raise TypeError("planted")
+
+    archive = BUNDLE.to_bytes()
+    monkeypatch.setattr("firable.nets.bundle.net_from_json", broken)
+    with pytest.raises(TypeError, match="planted"):
+        Bundle.from_bytes(archive)
 
 
 @pytest.mark.parametrize("data", [b"", b"[]", b"{}", b"\xff", b"[" * 100_000, b"null", b'{"firable_bundle":2}'])
@@ -231,7 +275,14 @@ def test_bundle_with_every_verdict_proved_may_run() -> None:
 
 def test_required_verdicts_follow_from_the_net() -> None:
     assert list(required_verdicts(DECOMPOSITION)) == [
-        *("contact-free", "deadlock-free", "quasi-live", "conflicting-commands", "property.apart"),
+        *(
+            "contact-free",
+            "deadlock-free",
+            "quasi-live",
+            "conflicting-commands",
+            "shared-completions",
+            "property.apart",
+        ),
         *("eq7.G", "eq8.G", "eq7.l", "eq8.l", "eq9-10.a.p", "eq9-10.b.q", "eq9-10.a.r"),
         *("ownership", "initial-marking", "commands", "arbitration", "arbitration.next"),
     ]

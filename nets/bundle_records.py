@@ -1,0 +1,153 @@
+"""The files of a bundle that are not nets, as strict records: manifest, coordinator table, verdicts.
+
+Whoever reads a bundle acts on it, so each value has exactly the type that the writer gives it, and an unknown or a
+missing key is refused: pydantic says so in one place, and what is read needs no further look at its types. Reading by
+hand was rejected: it took a `true` for a number wherever nobody thought of it, and had to catch the errors of our own
+mistakes with those of the file's.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
+from firable.nets.net import ArbitrationRule
+from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class VersionRecord(BaseModel):
+    """What a manifest of any version begins with."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, frozen=True)
+
+    firable_bundle: int
+
+
+class ManifestRecord(_Record):
+    """`manifest.json`: the SHA-256 of every other file, and a digest over the manifest itself."""
+
+    firable_bundle: int
+    cell: str
+    members: dict[str, str]
+    digest: str
+
+
+class _CoordinatedRecord(_Record):
+    name: str
+    number: int | None
+    parts: tuple[tuple[str, str], ...]
+    description: str
+
+
+class _GroupRecord(_Record):
+    name: str
+    sequence: tuple[str, ...]
+    rest: tuple[str, ...]
+    by: ArbitrationRule
+    controller: str | None
+
+
+class TableRecord(_Record):
+    """`table.json`: what the coordinator decides."""
+
+    coordinated: tuple[_CoordinatedRecord, ...]
+    groups: tuple[_GroupRecord, ...]
+
+    def rows(self) -> tuple[Coordinated, ...]:
+        """The transitions that the coordinator decides."""
+        return tuple(
+            Coordinated(row.name, row.number, tuple(Part(*part) for part in row.parts), row.description)
+            for row in self.coordinated
+        )
+
+    def arbitration_groups(self) -> tuple[ArbitrationGroup, ...]:
+        """The groups by which conflicts are decided."""
+        return tuple(
+            ArbitrationGroup(group.name, group.sequence, group.rest, group.by, group.controller)
+            for group in self.groups
+        )
+
+
+def table_to_json(decomposition: Decomposition) -> dict[str, Any]:
+    """The data of `TableRecord` for a decomposition."""
+    return {
+        "coordinated": [
+            {
+                "name": row.name,
+                "number": row.number,
+                "parts": [[part.controller, part.name] for part in row.parts],
+                "description": row.description,
+            }
+            for row in decomposition.coordinated
+        ],
+        "groups": [
+            {
+                "name": group.name,
+                "sequence": list(group.sequence),
+                "rest": list(group.rest),
+                "by": group.by.value,
+                "controller": group.controller,
+            }
+            for group in decomposition.groups
+        ],
+    }
+
+
+class _WitnessRecord(_Record):
+    firings: tuple[tuple[str, ...], ...]
+    cycle: tuple[tuple[str, ...], ...]
+    marking: tuple[str, ...]
+    assignment: tuple[tuple[str, bool], ...]
+    note: str
+
+
+class _VerdictRecord(_Record):
+    """What `Verdict.to_json` writes."""
+
+    name: str
+    status: Status
+    statement: str
+    method: str
+    weight: Weight
+    code: str = ""
+    hint: str = ""
+    bound: str = ""
+    subjects: tuple[str, ...] = ()
+    witness: _WitnessRecord | None = None
+    evidence: tuple[str, ...] = ()
+    markings: int | None = None
+    edges: int | None = None
+
+    def verdict(self) -> Verdict:
+        seen = self.witness
+        return Verdict(
+            self.name,
+            self.status,
+            self.statement,
+            self.method,
+            self.weight,
+            self.code,
+            self.hint,
+            self.bound,
+            self.subjects,
+            Witness(seen.firings, seen.cycle, seen.marking, seen.assignment, seen.note) if seen else None,
+            self.evidence,
+            Cost(self.markings, self.edges),
+        )
+
+
+class JudgedRecord(_Record):
+    """`verdicts.json`: the verdicts, and the SHA-256 of each file that they are about."""
+
+    of: dict[str, str]
+    verdicts: tuple[_VerdictRecord, ...]
+
+    def read(self) -> tuple[Verdict, ...]:
+        """The verdicts."""
+        return tuple(record.verdict() for record in self.verdicts)
