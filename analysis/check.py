@@ -18,7 +18,12 @@ from typing import Any, Final, TypeVar
 from firable.analysis import behaviour as behaviour_of
 from firable.analysis import conflict_verdicts as conflict
 from firable.analysis.behaviour import Behaviour
-from firable.analysis.commands import commands_agree, machines_stopped, no_command_in_initial_marking
+from firable.analysis.commands import (
+    commands_agree,
+    completions_apart,
+    machines_stopped,
+    no_command_in_initial_marking,
+)
 from firable.analysis.conflict_verdicts import ConflictAnalysis, Pairs
 from firable.analysis.properties import decide_properties
 from firable.analysis.question import Answer, Question
@@ -146,6 +151,7 @@ _ON_CONFLICTS: Final[tuple[Callable[[ConflictAnalysis], Verdict], ...]] = (
 )
 _ON_GRAPH: Final[tuple[Callable[[ReachabilityGraph], Verdict], ...]] = (
     commands_agree,
+    completions_apart,
     machines_stopped,
     no_command_in_initial_marking,
 )

@@ -1,10 +1,14 @@
 """Verdicts on commands: what the net tells its machines, and what it forgets to tell them.
 
 A place with an output signal sends its command when the token enters. While the token stays, the machine works under
-that command. Three things can be wrong that no verdict on tokens alone shows:
+that command. Four things can be wrong that no verdict on tokens alone shows:
 
 *Conflicting commands*: two places that send different commands to one machine hold a token at one reachable marking.
 The same command twice is no contradiction and is not reported.
+
+*A completion awaited twice*: two places that wait for the same completion signal hold a token at one reachable marking.
+The signal is one bit: sending the second command clears it for the first, and the end of either opens the gate of both,
+so a transition would fire while its machine is still at work. Places that take turns may share a signal.
 
 *A machine that is never stopped* (a warning). What a command means is the machine's matter, and a list of words such
 as STOP or OFF would know only English. What the net does know is the order in which commands follow each other. A
@@ -85,6 +89,39 @@ def commands_agree(graph: ReachabilityGraph) -> Verdict:
             return yes()
         index, machine, p, q = min(clashes)
         note = f"{machine} is under '{net.places[p].command}' and '{net.places[q].command}'"
+        subjects = dict.fromkeys(net.places[place].name for *_, p, q in sorted(clashes) for place in (p, q))
+        return no(tuple(subjects), graph.witness(index, note))
+
+    return question.ask(graph, find)
+
+
+def completions_apart(graph: ReachabilityGraph) -> Verdict:
+    """No two places that wait for the same completion signal hold a token at one reachable marking."""
+    question = Question(
+        "shared-completions",
+        "no completion signal is awaited by two commands at once",
+        code="F3005",
+        hint="give each of the two commands a completion signal of its own",
+    )
+
+    def find() -> Answer:
+        net, waiting = graph.net, dict[str, list[int]]()
+        for p, place in enumerate(net.places):
+            if place.completion is not None:
+                waiting.setdefault(place.completion, []).append(p)
+        clashes = []
+        for signal, places in waiting.items():
+            columns = [graph.marked(p) for p in places] if places[1:] else []
+            for k, column in enumerate(columns):
+                for j in range(k):
+                    index = first(column & columns[j])
+                    if index is not None:
+                        clashes.append((index, signal, places[j], places[k]))
+        if not clashes:
+            graph.require_complete()
+            return yes()
+        index, signal, p, q = min(clashes)
+        note = f"both '{net.places[p].command}' and '{net.places[q].command}' wait for {signal}"
         subjects = dict.fromkeys(net.places[place].name for *_, p, q in sorted(clashes) for place in (p, q))
         return no(tuple(subjects), graph.witness(index, note))
 

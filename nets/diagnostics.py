@@ -71,6 +71,7 @@ CODES: Final[dict[str, str]] = {
     "F3002": "an output signal on a place marked in M0",
     "F3003": "conflicting commands to one machine",
     "F3004": "the budget is used up",
+    "F3005": "a completion signal awaited by two commands at once",
     # F4: decomposition
     "F4001": "the net cannot be split",
     "F4002": "an obligation is refuted",

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _REMEDY: Final = "make the bundle anew with `firable bundle`"
 
-CHECKED: Final = ("contact-free", "deadlock-free", "quasi-live", "conflicting-commands")
+CHECKED: Final = ("contact-free", "deadlock-free", "quasi-live", "conflicting-commands", "shared-completions")
 """The verdicts on every net, whatever its file states, without which it may not run."""
 
 

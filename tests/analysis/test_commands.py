@@ -5,14 +5,20 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.generate_sparse import sparse_nets
 from support.reference import load_net, reference_names
+from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
-from firable.analysis.commands import commands_agree, entries, machines_stopped, no_command_in_initial_marking
+from firable.analysis.commands import (
+    commands_agree,
+    completions_apart,
+    entries,
+    machines_stopped,
+    no_command_in_initial_marking,
+)
 from firable.analysis.reachability import Budget, explore
 from firable.nets.catalogue import catalogue_names, catalogue_net
-from firable.nets.net import Command, Marking, Net, Place, Transition
+from firable.nets.net import Command, ExternalGate, Marking, Net, Place, Signal, SignalKind, Transition
 from firable.nets.verdict import Status, Weight, overall
 from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
@@ -77,8 +83,8 @@ def places_of(net: Net) -> dict[str, Command]:
     return {place.name: place.command for place in net.places if place.command is not None}
 
 
-@settings(max_examples=150, deadline=None)
-@given(sparse_nets(commands=True), st.sampled_from(Discipline))
+@settings(max_examples=150)
+@given(ring_nets(commands=True), st.sampled_from(Discipline))
 def test_verdicts_on_commands_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     sent, graph = places_of(net), Player(net).reachable(step=discipline is Discipline.STEP)
     clashes = [
@@ -139,3 +145,36 @@ def test_a_cut_off_graph_still_shows_a_machine_with_one_command_and_nothing_more
     assert machines_stopped(explore(one, budget=Budget(markings=3))).status is Status.VIOLATED
     assert machines_stopped(explore(two, budget=Budget(markings=3))).status is Status.UNKNOWN
     assert check(two, budget=Budget(markings=3)).status is Status.UNKNOWN
+
+
+def shared(*, together: bool) -> Net:
+    """Arm and clamp, told by one completion signal; at work at the same time, or one after the other."""
+    arm = Place("arm", command=Command("ARM", "MOVE"), completion="done")
+    clamp = Place("clamp", command=Command("CLAMP", "CLOSE"), completion="done")
+    done = (ExternalGate("done"),)
+    if together:
+        start = (Transition("start", ("idle",), ("arm", "clamp")),)
+        end = (Transition("end", ("arm", "clamp"), ("idle",), external=done),)
+    else:
+        start = (Transition("start", ("idle",), ("arm",)), Transition("next", ("arm",), ("clamp",), external=done))
+        end = (Transition("end", ("clamp",), ("idle",), external=done),)
+    places = (Place("idle", marked=True), arm, clamp)
+    return Net("shared", places, (*start, *end), (Signal("done", kind=SignalKind.COMPLETION),))
+
+
+@pytest.mark.parametrize("discipline", Discipline)
+def test_a_completion_awaited_by_two_commands_at_once_is_violated_with_the_firings(discipline: Discipline) -> None:
+    verdict = completions_apart(explore(shared(together=True), discipline))
+    assert (verdict.status, verdict.weight, verdict.code) == (Status.VIOLATED, Weight.REQUIRED, "F3005")
+    assert verdict.subjects == ("arm", "clamp")
+    assert verdict.witness is not None
+    assert verdict.witness.firings == (("start",),)
+
+
+def test_commands_that_take_turns_may_share_a_completion() -> None:
+    assert completions_apart(explore(shared(together=False))).status is Status.PROVED
+
+
+def test_a_shared_completion_is_unknown_where_the_budget_ends_first() -> None:
+    verdict = completions_apart(explore(shared(together=False), budget=Budget(markings=1)))
+    assert verdict.status is Status.UNKNOWN
