@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 from hypothesis import given, settings
-from support.generate import nets
+from support.dense_nets import dense_nets
 
 from firable.analysis.encoding import Relation, interleaving_relation, step_relation
 from firable.analysis.smt import Answer, Term, Terms, decide, value
@@ -42,8 +42,8 @@ def solved(relation: Relation) -> Iterator[Edge]:
 
 
 @pytest.mark.parametrize(("encode", "step"), DISCIPLINES)
-@given(net=nets(signals=True))
-@settings(max_examples=60, deadline=None)
+@given(net=dense_nets(signals=True))
+@settings(max_examples=60)
 def test_models_of_a_relation_are_the_edges_of_the_player(encode: Encoder, step: bool, net: Net) -> None:
     found = list(solved(encode(net, None)))
     assert len(set(found)) == len(found)

@@ -6,9 +6,9 @@ from itertools import count, product
 
 import pytest
 from hypothesis import given, settings
-from support.generate import nets
-from support.generate_sparse import sparse_nets
+from support.dense_nets import dense_nets
 from support.reference import load_net, reference_names
+from support.ring_nets import ring_nets
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.invariants import incidence, p_invariants, rank, t_invariants
@@ -65,14 +65,14 @@ def dominated(y: tuple[int, ...], vectors: set[tuple[int, ...]]) -> bool:
     return any(max(v) > 1 and {i for i, x in enumerate(v) if x} < support for v in vectors)
 
 
-@settings(max_examples=60, deadline=None)
-@given(nets(most_transitions=4))
+@settings(max_examples=60)
+@given(dense_nets(most_transitions=4))
 def test_minimal_invariants_are_those_that_exhaustive_search_finds(net: Net) -> None:
     check_both_kinds(net, 3)
 
 
-@settings(max_examples=40, deadline=None)
-@given(sparse_nets())
+@settings(max_examples=40)
+@given(ring_nets())
 def test_minimal_invariants_of_rings_are_those_that_exhaustive_search_finds(net: Net) -> None:
     check_both_kinds(net, 1 if len(net.places) + len(net.transitions) > 12 else 2)
 

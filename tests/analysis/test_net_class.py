@@ -5,7 +5,7 @@ from __future__ import annotations
 import networkx as nx
 import pytest
 from hypothesis import given, settings
-from support.generate import nets
+from support.dense_nets import dense_nets
 from support.reference import load_net
 
 from firable.analysis.net_class import arcs, net_class
@@ -39,8 +39,8 @@ def test_each_class_is_recognised(net: Net, name: str) -> None:
     assert net_class(net, contact_free=True).outside == ()
 
 
-@settings(max_examples=200, deadline=None)
-@given(nets())
+@settings(max_examples=200)
+@given(dense_nets())
 def test_each_class_is_contained_in_the_wider_ones(net: Net) -> None:
     found = net_class(net)
     assert found.free_choice or not (found.state_machine or found.marked_graph)

@@ -9,7 +9,7 @@ import networkx as nx
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from support.generate_sparse import sparse_nets
+from support.ring_nets import ring_nets
 
 from firable.analysis.leads_to import check_lasso
 from firable.analysis.properties import decide_property, statement
@@ -25,7 +25,7 @@ from firable.semantics.trace import Discipline
 FORMULAS = st.sampled_from(
     ["a", "b", "not a", "a and not b", "a or b", "start", "deadlock", "firable(t0)", "not firable(t1)", "false", "true"]
 ).map(parse_formula)
-SITUATIONS = st.tuples(sparse_nets(signals=True), st.sampled_from(Discipline)).filter(
+SITUATIONS = st.tuples(ring_nets(signals=True), st.sampled_from(Discipline)).filter(
     lambda drawn: len(drawn[0].transitions) > 1
 )
 
@@ -47,7 +47,7 @@ def graph_of(net: Net, discipline: Discipline) -> nx.MultiDiGraph[Marking]:
     return graph
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(SITUATIONS, FORMULAS)
 def test_properties_of_markings_are_decided_by_their_definitions(
     situation: tuple[Net, Discipline], formula: Formula
@@ -100,7 +100,7 @@ def fails(net: Net, truth: nx.MultiDiGraph[Marking], p: Formula, q: Formula, fai
 
 
 @pytest.mark.parametrize("fairness", Fairness)
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(situation=SITUATIONS, p=FORMULAS, q=FORMULAS)
 def test_leads_to_fails_iff_some_set_of_markings_recurs_fairly(
     fairness: Fairness, situation: tuple[Net, Discipline], p: Formula, q: Formula

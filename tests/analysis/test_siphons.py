@@ -8,9 +8,9 @@ import pytest
 import z3
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.generate import nets
-from support.generate_sparse import sparse_nets
+from support.dense_nets import dense_nets
 from support.reference import load_net, reference_names
+from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
 from firable.analysis.deadline import Deadline
@@ -19,7 +19,7 @@ from firable.nets.net import Net, Place, Transition
 from firable.nets.verdict import Status
 from firable.semantics.player import Player
 
-NETS = st.one_of(nets(), sparse_nets())
+NETS = st.one_of(dense_nets(), ring_nets())
 
 
 def subsets(net: Net) -> list[frozenset[str]]:
@@ -39,7 +39,7 @@ def minimal(sets: list[frozenset[str]]) -> set[frozenset[str]]:
     return {s for s in sets if s and not any(other < s for other in sets if other)}
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(NETS)
 def test_minimal_siphons_and_traps_are_those_among_all_sets_of_places(net: Net) -> None:
     siphons, traps = minimal_siphons(net), minimal_traps(net)
@@ -49,7 +49,7 @@ def test_minimal_siphons_and_traps_are_those_among_all_sets_of_places(net: Net) 
     assert {frozenset(s) for s in traps.minimal} == minimal([s for s in subsets(net) if is_trap(net, s)])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(NETS)
 def test_the_largest_siphon_and_trap_are_the_union_of_all_within(net: Net) -> None:
     for places in subsets(net)[:16]:
@@ -60,8 +60,8 @@ def test_the_largest_siphon_and_trap_are_the_union_of_all_within(net: Net) -> No
         assert set(net.names(largest_siphon(net, net.marking(places)))) == siphon
 
 
-@settings(max_examples=150, deadline=None)
-@given(sparse_nets(signals=True))
+@settings(max_examples=150)
+@given(ring_nets(signals=True))
 def test_where_the_premises_hold_the_property_excludes_deadlock(net: Net) -> None:
     report = check(net)
     found = deadlock_trap(net, contact_free=report.verdict("contact-free").holds)

@@ -7,9 +7,9 @@ from itertools import combinations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.generate import nets
-from support.generate_sparse import sparse_nets
+from support.dense_nets import dense_nets
 from support.reference import cases
+from support.ring_nets import ring_nets
 
 from firable.analysis.check import CheckReport, check, report_on
 from firable.analysis.conflict_verdicts import ConflictAnalysis
@@ -22,7 +22,7 @@ from firable.semantics.trace import Discipline
 
 Graph = dict[Marking, list[tuple[FiringSet, Marking]]]
 DISCIPLINES = st.sampled_from(Discipline)
-NETS = st.one_of(nets(signals=True), sparse_nets(signals=True), sparse_nets())
+NETS = st.one_of(dense_nets(signals=True), ring_nets(signals=True), ring_nets())
 
 
 def closure(graph: Graph, start: Marking) -> set[Marking]:
@@ -88,7 +88,7 @@ class Truth:
             assert len(verdict.witness.firings) == distance(self.graph, self.net.initial_marking, targets)
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=250)
 @given(NETS, DISCIPLINES)
 def test_figures_and_witnesses_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     truth = Truth(net, discipline)
@@ -128,7 +128,7 @@ def test_figures_and_witnesses_are_those_of_the_definitions(net: Net, discipline
     truth.shortest("home-markings", set() if home else sinks)
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=250)
 @given(NETS, DISCIPLINES)
 def test_conflicts_and_races_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     truth = Truth(net, discipline)

@@ -318,7 +318,7 @@ def test_out_of_time_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @given(st.data())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_granted_term_is_what_the_arbiter_decides(data: st.DataObject) -> None:
     sets = st.frozensets(st.sampled_from("pqr"), min_size=1, max_size=2).map(sorted).map(tuple)
     transitions = tuple(Transition(f"t{i}", data.draw(sets)) for i in range(4))

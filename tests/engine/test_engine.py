@@ -159,7 +159,7 @@ def explored(net: Drawn, *, step: bool) -> _engine.Graph:
 
 def both(test: Callable[[Drawn, bool], None]) -> Callable[[], None]:
     """A generated net under either discipline."""
-    return settings(max_examples=250, deadline=None)(given(net=nets(), step=st.booleans())(test))
+    return settings(max_examples=250)(given(net=nets(), step=st.booleans())(test))
 
 
 def digraph(graph: _engine.Graph) -> nx.DiGraph[int]:
@@ -229,7 +229,7 @@ def test_sequences_replay_and_are_shortest(net: Drawn, step: bool) -> None:
         assert len(sequence) == naive.distance[graph.marking(i)]
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=250)
 @given(net=nets(), step=st.booleans(), data=st.data())
 def test_paths_within_a_set_are_those_of_networkx(net: Drawn, step: bool, data: st.DataObject) -> None:
     naive, graph = Naive(net, step=step), explored(net, step=step)
@@ -256,7 +256,7 @@ def test_paths_within_a_set_are_those_of_networkx(net: Drawn, step: bool, data: 
     assert graph.backward(bitmap(graph, targets), sorted(within)) == bitmap(graph, can)
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=250)
 @given(net=nets(), step=st.booleans(), data=st.data())
 def test_components_are_those_of_networkx(net: Drawn, step: bool, data: st.DataObject) -> None:
     graph = explored(net, step=step)

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 from hypothesis import given, settings
-from support.generate_nets import whole_nets
 from support.reference import load_net, reference_names
+from support.whole_nets import whole_nets
 
 from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.diagnostics import InputError
@@ -16,7 +16,7 @@ from firable.nets.net import Net, Place
 
 
 @given(whole_nets())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_any_net_survives_json(net: Net) -> None:
     back = net_from_json(json.loads(canonical_json(net_to_json(net))))
     assert back == net

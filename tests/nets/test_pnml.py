@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
-from support.generate_nets import whole_nets
 from support.reference import load_net, reference_names
+from support.whole_nets import whole_nets
 
 from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError, Severity
@@ -307,7 +307,7 @@ def test_a_net_of_the_field_survives_pnml(name: str) -> None:
 
 
 @given(whole_nets())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_any_net_survives_pnml_up_to_its_names(net: Net) -> None:
     text, notes = write_pnml(net)
     back = parse_pnml(text).net

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.generate_nets import whole_nets
 from support.reference import cases, load_net, reference_names
+from support.whole_nets import whole_nets
 
 from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.diagnostics import InputError
@@ -41,7 +41,7 @@ def test_a_reference_net_survives_printing(name: str) -> None:
 
 
 @given(whole_nets())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_any_net_survives_printing(net: Net) -> None:
     back = parse_net(format_net(net))
     assert back == in_file_order(net)
@@ -50,7 +50,7 @@ def test_any_net_survives_printing(net: Net) -> None:
 
 
 @given(whole_nets())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_file_order_only_reorders(net: Net) -> None:
     ordered = in_file_order(net)
     assert set(ordered.places) == set(net.places)
@@ -61,7 +61,6 @@ def test_file_order_only_reorders(net: Net) -> None:
 
 
 @given(st.text())
-@settings(deadline=None)
 def test_any_description_survives_printing(text: str) -> None:
     net = Net("n", (Place("p", description=text),), description=text)
     back = parse_net(format_net(net))

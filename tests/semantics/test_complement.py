@@ -2,7 +2,7 @@
 
 import pytest
 from hypothesis import given
-from support.generate import nets
+from support.dense_nets import dense_nets
 
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Command, Net, Place, Transition
@@ -10,7 +10,7 @@ from firable.semantics.complement import complement
 from firable.semantics.player import Player
 
 
-@given(nets())
+@given(dense_nets())
 def test_the_graph_of_the_complement_is_the_graph_with_one_bit_inverted(net: Net) -> None:
     other = complement(net, "c")
     bit = net.marking(["c"])
@@ -21,7 +21,7 @@ def test_the_graph_of_the_complement_is_the_graph_with_one_bit_inverted(net: Net
     assert Player(other).reachable() == inverted
 
 
-@given(nets())
+@given(dense_nets())
 def test_the_complement_of_the_complement_is_the_net(net: Net) -> None:
     twice = complement(complement(net, "c"), "not_c", new_name="c")
     assert Player(twice).reachable() == Player(net).reachable()

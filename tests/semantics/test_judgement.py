@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.generate import nets
+from support.dense_nets import dense_nets
 
 from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
 from firable.semantics.judgement import Judgement, judge
 from firable.semantics.player import Player
 
 
-@settings(max_examples=100, deadline=None)
-@given(nets(signals=True), st.booleans(), st.booleans())
+@settings(max_examples=100)
+@given(dense_nets(signals=True), st.booleans(), st.booleans())
 def test_a_net_waits_iff_another_valuation_would_let_it_run(net: Net, r: bool, s: bool) -> None:
     player, marking = Player(net), net.initial_marking
     some = any(player.enabled(marking, {"r": a, "s": b}) for a in (False, True) for b in (False, True))

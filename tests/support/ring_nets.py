@@ -15,7 +15,7 @@ _NONE: tuple[str, ...] = ()
 
 
 @st.composite
-def sparse_nets(draw: st.DrawFn, *, signals: bool = False, commands: bool = False) -> Net:
+def ring_nets(draw: st.DrawFn, *, signals: bool = False, commands: bool = False) -> Net:
     """Nets, some with a self-loop; with external gates and output signals if asked for."""
     sizes = draw(st.sampled_from(_SIZES))
     names = "abcdefgh"[: sum(sizes)]

@@ -1,4 +1,4 @@
-"""Hypothesis strategies: small nets, with every kind of arc and gate."""
+"""Hypothesis strategies: small nets whose every arc and gate is drawn with an even chance; mostly dead, of any shape."""
 
 from hypothesis import strategies as st
 
@@ -13,7 +13,7 @@ external_gates = st.frozensets(st.builds(ExternalGate, st.sampled_from(["r", "s"
 
 
 @st.composite
-def nets(draw: st.DrawFn, *, most_transitions: int = 4, signals: bool = False) -> Net:
+def dense_nets(draw: st.DrawFn, *, most_transitions: int = 4, signals: bool = False) -> Net:
     """Five places, a few transitions with any sets of arcs and internal gates, and external gates if asked for."""
     marked = draw(sets_of_places)
     transitions = tuple(
