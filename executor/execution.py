@@ -398,6 +398,8 @@ class Execution:
         ended = self._ended()
         if ended is not None:
             self.outcome.set_result(ended)
+        else:
+            self.recorder.flush()
 
     def _ended(self) -> Situation | None:
         if self.fault:

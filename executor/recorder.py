@@ -2,8 +2,9 @@
 
 Firings, signals, commands and notes are written in the order in which they took effect: a coordinated firing at the
 coordinator's decision, a local one where it occurs. That order is a trace of the central net (SEMANTICS O1-O5), so the
-recorder plays it along and is where a running executor is asked for its marking. The file is written as its buffer
-fills, and whole at the end; a line that a killed run leaves half written is no line of the trace.
+recorder plays it along and is where a running executor is asked for its marking. It is flushed whenever the
+run waits, so that who follows the file sees what has happened; a line that a killed run leaves half written is no line
+of the trace.
 """
 
 from __future__ import annotations
@@ -75,6 +76,7 @@ class Recorder:
         self.stream = stream
         self.firings: dict[str, int] = {transition.name: 0 for transition in net.transitions}
         self.commands = 0
+        self.unflushed = False
         self._write(Header(net.name, digest, signals=True, commands=True))
 
     @property
@@ -106,9 +108,15 @@ class Recorder:
     def end(self, at_seconds: float, reason: str) -> None:
         """The last line."""
         self._write(End(at_seconds, self.player.net.names(self.marking), reason))
-        if self.stream is not None:
+        self.flush()
+
+    def flush(self) -> None:
+        """Hand the lines so far over to who follows the file."""
+        if self.stream is not None and self.unflushed:
             self.stream.flush()
+            self.unflushed = False
 
     def _write(self, item: Header | Event | End) -> None:
         if self.stream is not None:
             self.stream.write(json.dumps(item.to_json()) + "\n")
+            self.unflushed = True

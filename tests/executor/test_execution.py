@@ -510,7 +510,19 @@ def test_refused_run_leaves_an_older_trace_as_it_is(tmp_path: Path) -> None:
     assert trace.read_text("utf-8") == "kept"
 
 
-@pytest.mark.parametrize("workpieces", [1, 200])  # the disk is full at the end, or in the middle of the run
+def test_trace_is_on_disk_as_far_as_it_goes_while_the_run_waits(tmp_path: Path) -> None:
+    async def operator(execution: Execution) -> None:
+        while firings(execution) < 3:
+            await asyncio.sleep(0.5)
+        await execution.quiet()
+        so_far.append(parse_trace((tmp_path / "trace").read_text("utf-8")))
+
+    so_far: list[Trace] = []
+    run(proved_bundle(), plant_of("one_robot"), workpieces=1, trace_path=tmp_path / "trace", operator=operator)
+    assert replay(catalogue_net("one_robot"), so_far[0]).firings == 3
+
+
+@pytest.mark.parametrize("workpieces", [0, 1])  # the disk is full at the end, or in the middle of the run
 def test_full_disk_is_an_error_of_the_trace(workpieces: int) -> None:
     with pytest.raises(InputError) as refusal:
         run(proved_bundle(), plant_of("one_robot"), workpieces=workpieces, trace_path="/dev/full")
