@@ -12,7 +12,7 @@ from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
-    from firable.executor import Execution, Operator, RunReport
+    from firable.executor import RunReport
     from firable.nets.bundle import Bundle
     from firable.nets.verdict import Verdict
 
@@ -34,7 +34,7 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
     help="Times real time; max is virtual time, where a run is a function of bundle, plant and seed.",
 )
 @click.option("--trace", metavar="FILE", help="Write what happens to a file, for `firable replay`.")
-@click.option("--step", is_flag=True, help="Fire one transition at a time: Enter for the next, r to run on, q to stop.")
+@click.option("--step", is_flag=True, help="Fire one transition at a time, by the keys below.")
 @format_option
 def run(
     bundle: str,
@@ -48,10 +48,16 @@ def run(
 ) -> int:
     """Run BUNDLE: a coordinator and a controller for each subnet, on a simulated cell of machines and workpieces.
 
-    A bundle that is changed or not proved is refused. Ctrl-C stops the machines and the run in order.
+    A bundle that is changed or not proved is refused. Ctrl-C stops the machines, and the run ends in order, with its
+    report and its trace.
+
+    With --step, Enter fires the next transition, r runs on, e stops at the end of the cycle, when the cell is empty,
+    and s stops now. In real time (--speed 1 or 10) the machines end what they are at while you think, and Enter pauses
+    a run that runs on.
     """
 
     def make() -> Report:
+        from firable.cli.stepping import stepping
         from firable.executor import load, read_plant
         from firable.executor import run as run_bundle
 
@@ -67,7 +73,7 @@ def run(
             seed=seed,
             speed=_SPEEDS[speed],
             trace_path=trace,
-            operator=_stepping(_SPEEDS[speed]) if step else None,
+            operator=stepping(_SPEEDS[speed], to_stderr=format_ == "json") if step else None,
         )
         return Report(
             "run",
@@ -138,40 +144,6 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
             subjects=tuple(f"workpiece {i}" for i in (*report.lost, *report.doubled)),
         ),
     )
-
-
-def _stepping(speed: float | None) -> Operator:
-    """The operator who fires one transition at a time from the terminal."""
-    import asyncio
-
-    async def asked() -> str:
-        prompt = "  next [Enter], run on [r], stop [q]: "
-        try:
-            # In virtual time no time passes while the person thinks; in real time the machines must go on.
-            return (input(prompt) if speed is None else await asyncio.to_thread(input, prompt)).strip().lower()
-        except EOFError:
-            return "q"
-
-    async def operate(execution: Execution) -> None:
-        execution.pause()
-        while True:
-            fired = await execution.step()
-            if fired is not None:
-                click.echo(f"{execution.now_seconds():8.1f} s  {fired}  {execution.net.transition(fired).description}")
-                match await asked():
-                    case "q":
-                        execution.stop()
-                        return
-                    case "r":
-                        execution.resume()
-                        return
-            elif execution.at_rest:
-                execution.resume()  # nothing to step, and nothing will come: the run ends as it would without steps
-                return
-            else:
-                await asyncio.sleep(0.05)
-
-    return operate
 
 
 def _show(report: Report) -> None:

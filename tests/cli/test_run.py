@@ -1,13 +1,18 @@
 """`firable run` with an operator at the terminal: steps, stops, Ctrl-C, and the files that a run may write."""
 
+import json
+import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from firable.cli.main import main
-from firable.nets.catalogue import catalogue_path
+from firable.nets.catalogue import catalogue_net, catalogue_path
+from firable.semantics.trace import Noted, read_trace, replay
 
 PLANT = catalogue_path("one_robot").with_name("one_robot.plant.yaml")
 
@@ -30,6 +35,98 @@ def typed(lines: str, *arguments: str) -> subprocess.CompletedProcess[str]:
         check=False,
         timeout=60,
     )
+
+
+def stepped(said: str) -> list[str]:
+    """The transitions that were fired by a step, in order."""
+    return re.findall(r"^.*?\d\.\d s  (\S+)  ", said, re.MULTILINE)
+
+
+def notes_of(trace: Path) -> list[str]:
+    """The notes in a trace, and why it ended; the trace must be one of the net, and whole."""
+    read = read_trace(trace)
+    assert replay(catalogue_net("one_robot"), read).complete
+    assert read.end is not None
+    return [*(event.note for event in read.events if isinstance(event, Noted)), read.end.reason]
+
+
+@pytest.mark.parametrize("last", ["s\n", ""], ids=["s", "end of input"])
+@pytest.mark.parametrize("speed", ["max", "10"])
+def test_steps_are_fired_one_by_one_until_the_operator_stops(
+    speed: str, last: str, bundle: str, tmp_path: Path
+) -> None:
+    trace = tmp_path / "trace"
+    done = typed(f"\n\n{last}", bundle, "--workpieces", "1", "--step", "--speed", speed, "--trace", str(trace))
+    assert done.returncode == 3, done.stdout + done.stderr
+    assert stepped(done.stdout) == ["G1", "G2", "t1-a"]
+    assert notes_of(trace) == ["paused", "stopped by the operator", "stopped"]
+
+
+def test_a_run_goes_on_after_steps(bundle: str, tmp_path: Path) -> None:
+    trace = tmp_path / "trace"
+    done = typed("\nr\n", bundle, "--workpieces", "2", "--step", "--trace", str(trace))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert stepped(done.stdout) == ["G1", "G2"]
+    assert "2 workpieces carried through" in done.stdout
+    assert notes_of(trace) == ["paused", "resumed", "done"]
+
+
+def test_every_firing_is_one_of_the_steps_where_the_operator_only_steps(bundle: str) -> None:
+    done = typed("\n" * 15, bundle, "--workpieces", "1", "--step")
+    assert (done.returncode, len(stepped(done.stdout))) == (0, 15), done.stdout + done.stderr
+
+
+def test_a_run_stops_at_the_end_of_the_cycle(bundle: str, tmp_path: Path) -> None:
+    trace = tmp_path / "trace"
+    done = typed("\ne\n", bundle, "--workpieces", "50", "--step", "--trace", str(trace))
+    assert done.returncode == 3, done.stdout + done.stderr
+    assert "0 still inside" in done.stdout
+    assert "0 workpieces carried through" not in done.stdout
+    assert notes_of(trace) == ["paused", "stopping at the end of the cycle", "resumed", "stopped"]
+
+
+def test_a_key_that_means_nothing_is_asked_for_again(bundle: str) -> None:
+    done = typed("x\n S \n", bundle, "--workpieces", "1", "--step")
+    assert stepped(done.stdout) == ["G1"]
+    assert done.stdout.count("[e] stop at the end of the cycle") == 2
+
+
+def test_enter_pauses_a_run_that_runs_on_in_real_time(bundle: str, tmp_path: Path) -> None:
+    trace = tmp_path / "trace"
+    typed("r\n\ns\n", bundle, "--workpieces", "1", "--step", "--speed", "10", "--trace", str(trace))
+    assert notes_of(trace) == ["paused", "resumed", "paused", "stopped by the operator", "stopped"]
+
+
+def test_the_dialogue_keeps_out_of_the_json(bundle: str) -> None:
+    done = typed("\ns\n", bundle, "--workpieces", "1", "--step", "--format", "json")
+    assert json.loads(done.stdout)["reports"][0]["run"]["state"] == "stopped"
+    assert stepped(done.stderr) == ["G1", "G2"]
+
+
+@pytest.mark.parametrize("options", [[], ["--step"], ["--step", "--speed", "max"]], ids=" ".join)
+def test_interrupt_ends_a_run_in_order(options: list[str], bundle: str, tmp_path: Path) -> None:
+    trace = tmp_path / "trace"
+    command = [sys.executable, "-m", "firable.cli", "run", bundle, "--speed", "1", "--trace", str(trace), *options]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
+        assert process.stdout is not None
+        if options:
+            shown = ""
+            while not shown.endswith("[s] stop now: "):
+                character = process.stdout.read(1)
+                assert character, shown
+                shown += character
+        else:
+            while not (trace.exists() and '"fired"' in trace.read_text(encoding="utf-8")):
+                assert process.poll() is None
+                time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        process.wait(timeout=60)  # and nothing is typed, nor the input ended
+        said, errors = process.communicate()
+    assert process.returncode == 3, said + errors
+    assert errors == ""
+    assert "stopped after" in said
+    assert notes_of(trace)[-2:] == ["stopped by the operator", "stopped"]
 
 
 def test_steps_end_where_the_cell_waits_for_ever(bundle: str, tmp_path: Path) -> None:

@@ -1,0 +1,144 @@
+"""The operator at the terminal of `firable run --step`: one transition at a time, on, or to an end.
+
+In virtual time the cell stands still while the person thinks, so the prompt waits and everything with it; Ctrl-C there
+is handed to the prompt, for the event loop that usually obeys it does not turn. In real time the machines go on: a
+thread reads what is typed. It reads the file descriptor and is waited for by nobody, because a thread that waits for a
+line in `input` keeps the program from ending, as does one that holds the lock of `sys.stdin`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import threading
+from collections import deque
+from typing import Protocol
+
+import click
+
+from firable.executor import Execution, Operator
+
+_PROMPT = "  [Enter] next, [r] run on, [e] stop at the end of the cycle, [s] stop now: "
+_POLL_SECONDS = 0.05
+
+
+class _Typed(Protocol):
+    """What the operator types."""
+
+    async def asked(self) -> str | None:
+        """The next line, after a prompt; None where there are no more."""
+        ...
+
+    def unasked(self) -> bool:
+        """Whether a line has been typed before it was asked for; it is taken."""
+        ...
+
+
+class _TypedAtPrompt:
+    """Lines that everything waits for."""
+
+    def __init__(self, *, to_stderr: bool) -> None:
+        self.to_stderr = to_stderr
+
+    async def asked(self) -> str | None:
+        """The next line, after a prompt; None at the end of the input and at Ctrl-C."""
+        handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+        try:
+            click.echo(_PROMPT, nl=False, err=self.to_stderr)
+            return input()
+        except (EOFError, KeyboardInterrupt):
+            return None
+        finally:
+            signal.signal(signal.SIGINT, handler)
+
+    def unasked(self) -> bool:
+        """Never: in virtual time a run that runs on is over before anything is typed."""
+        return False
+
+
+class _TypedMeanwhile:
+    """Lines that are read beside the run."""
+
+    def __init__(self, *, to_stderr: bool) -> None:
+        self.to_stderr = to_stderr
+        self.lines: deque[str] = deque()
+        self.ended = threading.Event()
+        threading.Thread(target=self._read, daemon=True).start()
+
+    async def asked(self) -> str | None:
+        """The next line, after a prompt; None at the end of the input."""
+        click.echo(_PROMPT, nl=False, err=self.to_stderr)
+        while not self.lines:
+            if self.ended.is_set() and not self.lines:  # the last lines come before the end
+                return None
+            await asyncio.sleep(_POLL_SECONDS)
+        return self.lines.popleft()
+
+    def unasked(self) -> bool:
+        """Whether a line has been typed before it was asked for; it is taken."""
+        if self.lines:
+            self.lines.popleft()
+            return True
+        return False
+
+    def _read(self) -> None:
+        unfinished = b""
+        while some := os.read(sys.stdin.fileno(), 4096):
+            *lines, unfinished = (unfinished + some).split(b"\n")
+            self.lines.extend(line.decode(errors="replace") for line in lines)
+        self.ended.set()
+
+
+def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
+    """The operator of a run at a speed (None: virtual time), who talks on standard output or on standard error."""
+
+    async def key(typed: _Typed) -> str:
+        while True:
+            line = await typed.asked()
+            if line is None:
+                click.echo(err=to_stderr)
+                return "s"
+            if line.strip().lower() in {"", "r", "e", "s"}:
+                return line.strip().lower()
+
+    async def stepped(execution: Execution) -> bool:
+        """Fire one transition, waiting until one is enabled; False where none ever will be."""
+        while (fired := await execution.step()) is None:
+            if execution.at_rest:
+                return False
+            await asyncio.sleep(_POLL_SECONDS)
+        description = execution.net.transition(fired).description
+        click.echo(f"{execution.now_seconds():8.1f} s  {fired}  {description}", err=to_stderr)
+        return True
+
+    async def paused_again(execution: Execution, typed: _Typed) -> bool:
+        """Let the run go on until something is typed, which pauses it; False where it goes on to its end."""
+        execution.resume()
+        if speed is None:
+            return False
+        click.echo("  running on; Enter pauses", err=to_stderr)
+        while not execution.at_rest:
+            if typed.unasked():
+                execution.pause()
+                return True
+            await asyncio.sleep(_POLL_SECONDS)
+        return False
+
+    async def operate(execution: Execution) -> None:
+        typed: _Typed = (_TypedAtPrompt if speed is None else _TypedMeanwhile)(to_stderr=to_stderr)
+        execution.pause()
+        while await stepped(execution):
+            match await key(typed):
+                case "s":
+                    execution.stop()
+                    return
+                case "e":
+                    execution.stop(at_end_of_cycle=True)
+                    break
+                case "r" if not await paused_again(execution, typed):
+                    return
+        execution.resume()
+
+    return operate
