@@ -357,7 +357,7 @@ def _preference(group: ArbitrationGroup, turn: int) -> list[str]:
 def _group_facts(
     name: str, sequence: Iterable[str], rest: Iterable[str], by: ArbitrationRule, controller: str | None
 ) -> Iterator[str]:
-    yield f"{name} decides by {by.value} at {controller or 'the coordinator'}"
+    yield f"{name} decides by {by.value} at {_json(controller)}"
     yield from (f"{name} takes {t} in turn {i}" for i, t in enumerate(sequence))
     yield from (f"{name} takes {t} last, in turn {i}" for i, t in enumerate(rest))
 

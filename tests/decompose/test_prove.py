@@ -231,6 +231,8 @@ def table_mutants(decomposition: Decomposition) -> Iterator[Decomposition]:
             replace(group, rest=group.rest[1:], sequence=group.sequence[: len(group.sequence) - (not group.rest)]),
             replace(group, by=ArbitrationRule.ROTATION),
             replace(group, controller="b" if group.controller is None else None),
+            replace(group, controller=""),
+            replace(group, controller="the coordinator"),
         ):
             if changed != group:
                 yield replace(decomposition, groups=(*before_g, changed, *after_g))
