@@ -8,7 +8,6 @@ import click
 
 from firable.cli import text
 from firable.cli.options import analysis_options, answer, budget, format_option, load_net, net_argument
-from firable.cli.prove import table_json
 from firable.cli.report import Report
 
 
@@ -50,7 +49,7 @@ def _report(argument: str, output: str, limits: dict[str, Any]) -> Report:
         made.verdicts,
         figures={**found.figures.to_json(), "bundle_digest": made.digest},
         notes=loaded.notes,
-        table=table_json(made.decomposition),
+        table=made.decomposition.table,
         files=(output,),
     )
 

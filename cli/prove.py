@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from textwrap import indent
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,7 +14,6 @@ from firable.cli.report import Report
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from firable.nets.decomposition import Decomposition
     from firable.nets.verdict import Verdict
 
 _FAMILIES = {
@@ -45,18 +45,6 @@ def prove(net: str, smt_dir: str | None, timeout: float, format_: str) -> int:
     return answer("prove", format_, lambda: _report(net, smt_dir, timeout), _show)
 
 
-def table_json(decomposition: Decomposition) -> list[dict[str, Any]]:
-    """The coordinator table as JSON data."""
-    return [
-        {
-            "name": row.name,
-            "parts": [{"controller": part.controller, "name": part.name} for part in row.parts],
-            "description": row.description,
-        }
-        for row in decomposition.table
-    ]
-
-
 def show_obligations(net_verdicts: Sequence[Verdict]) -> None:
     """Print how many obligations of each family are proved."""
     families: dict[str, list[Verdict]] = {}
@@ -86,27 +74,20 @@ def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
         loaded.net,
         found.verdicts,
         notes=loaded.notes,
-        table=table_json(decomposition),
+        table=decomposition.table,
         assumptions=tuple(map(str, assumptions(decomposition))),
         files=files,
     )
 
 
-def show_table(rows: Sequence[Any]) -> None:
-    """Print the coordinator table from its JSON data."""
-    parts = [", ".join(part["name"] for part in row["parts"]) for row in rows]
-    width_name = max((len(row["name"]) for row in rows), default=0) + 1
-    width_parts = max(map(len, parts), default=0)
-    for row, named in zip(rows, parts, strict=True):
-        click.echo(f"  {row['name'] + ':':<{width_name}} {named:<{width_parts}}   {row['description']}".rstrip())
-
-
 def _show(report: Report) -> None:
+    from firable.decompose.table import table_text
+
     for note in report.notes:
         text.show_diagnostic(note)
     text.heading(report.net, report.input)
     click.echo(f"\n{click.style('coordinator table', bold=True)}")
-    show_table(report.table)
+    click.echo(indent(table_text(report.table), "  "), nl=False)
     if not report.table:
         click.echo("  no transition has more than one participant")
     click.echo(f"\n{click.style('obligations', bold=True)}")

@@ -13,6 +13,7 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from firable.nets.decomposition import Coordinated
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
@@ -41,7 +42,7 @@ class Report:
     discipline: str = ""
     figures: Mapping[str, Any] = field(default_factory=dict)
     notes: Sequence[Diagnostic] = ()
-    table: Sequence[Mapping[str, Any]] = ()
+    table: Sequence[Coordinated] = ()
     assumptions: Sequence[str] = ()
     files: Sequence[str] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
@@ -69,13 +70,23 @@ class Report:
             "digest": net_digest(self.net),
             "status": overall(self.verdicts).value,
         }
-        for key in ("discipline", "figures", "table", "assumptions", "files", "run"):
+        if self.table:
+            data["table"] = [_row_to_json(row) for row in self.table]
+        for key in ("discipline", "figures", "assumptions", "files", "run"):
             if value := getattr(self, key):
                 data[key] = list(value) if isinstance(value, tuple) else value
         if self.notes:
             data["notes"] = [diagnostic_to_json(note) for note in self.notes]
         data["verdicts"] = [verdict.to_json() for verdict in self.verdicts]
         return data
+
+
+def _row_to_json(row: Coordinated) -> dict[str, Any]:
+    return {
+        "name": row.name,
+        "parts": [{"controller": part.controller, "name": part.name} for part in row.parts],
+        "description": row.description,
+    }
 
 
 def diagnostic_to_json(diagnostic: Diagnostic) -> dict[str, Any]:

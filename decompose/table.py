@@ -6,23 +6,25 @@ controllers must agree, so the table is what an engineer compares with the paper
 
 from __future__ import annotations
 
-from firable.nets.decomposition import Decomposition
+from collections.abc import Sequence
+
+from firable.nets.decomposition import Coordinated
 
 _GAP = 3
 
 
-def table_text(decomposition: Decomposition) -> str:
-    """The coordinator table, a line for each global transition, each with its line end; empty where there is none.
+def table_text(table: Sequence[Coordinated]) -> str:
+    """The coordinator table `Decomposition.table`, a line with its line end for each row; empty where there is none.
 
     >>> from firable.decompose.split import split
     >>> from firable.nets.net import Controller, Net, Place, Transition
     >>> places = (Place("a.p", "a", marked=True), Place("b.q", "b"))
     >>> hand_over = Transition("G1", ("a.p",), ("b.q",), number=1, description="hand over")
-    >>> net = Net("n", places, (hand_over,), controllers=(Controller("a"), Controller("b")))
-    >>> print(table_text(split(net)), end="")
+    >>> net = Net("n", places, (hand_over,), controllers=(Controller("a", coordinator=True), Controller("b")))
+    >>> print(table_text(split(net).table), end="")
     G1: t0-1, t1-11   hand over
     """
-    rows = [(row.name, ", ".join(part.name for part in row.parts), row.description) for row in decomposition.table]
+    rows = [(row.name, ", ".join(part.name for part in row.parts), row.description) for row in table]
     width_name = max((len(name) for name, _, _ in rows), default=0) + 1
     width_parts = max((len(parts) for _, parts, _ in rows), default=0) + _GAP
     return "".join(

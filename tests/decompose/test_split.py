@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from support.published import COORDINATOR_TABLE
 from support.reference import Case, cases, load_net
 
 from firable.decompose.join import join
@@ -12,18 +13,6 @@ from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.decomposition import Decomposition, Part
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Arbiter, Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
-
-PUBLISHED = """\
-G1: t0-1, t3-13                 start of carrying in
-G2: t0-2, t1-21, t2-22, t3-23   start of loading from CV1
-G3: t1-71, t3-73                end of grasp on CV1
-G4: t1-81, t2-82                end of putting on MC
-G5: t0-3, t1-31, t2-32          end of loading into MC
-G6: t0-4, t1-41, t2-42, t3-43   start of unloading from MC
-G7: t1-91, t2-92                end of grasp on MC
-G8: t0-5, t1-51, t3-53          end of putting on CV2
-G9: t0-6, t3-63                 end of carrying out
-"""
 
 ALL_NETS = [
     *("cell1", "cell1_mc_late", "cell1_mc_late_cap", "cell2_separate", "cell2_shared", "conceptual1", "fig2a", "fig2b"),
@@ -45,12 +34,12 @@ def codes(net: Net) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def test_coordinator_table_of_the_cell_is_the_published_one() -> None:
-    assert table_text(split(load_net("cell1"))) == PUBLISHED
+    assert table_text(split(load_net("cell1")).table) == COORDINATOR_TABLE
 
 
 def test_coordinator_table_of_the_cell_in_the_catalogue_is_the_published_one() -> None:
     decomposition = split(catalogue_net("one_robot"))
-    assert table_text(decomposition) == PUBLISHED
+    assert table_text(decomposition.table) == COORDINATOR_TABLE
     assert [subnet.name for subnet in decomposition.subnets] == ["system", "robot", "mc", "conveyor"]
 
 
@@ -74,7 +63,7 @@ def test_transitions_without_participants_are_those_of_the_case(case: Case) -> N
 
 
 def test_net_without_global_transitions_has_an_empty_table() -> None:
-    assert table_text(split(load_net("fig4_parallel"))) == ""
+    assert table_text(split(load_net("fig4_parallel")).table) == ""
 
 
 @pytest.mark.parametrize("name", ALL_NETS)
