@@ -1,4 +1,4 @@
-"""Hypothesis strategies: small nets whose every arc and gate is drawn with an even chance; mostly dead, of any shape."""
+"""Hypothesis strategy: small nets whose every arc and gate is drawn with an even chance; mostly dead, of any shape."""
 
 from hypothesis import strategies as st
 
