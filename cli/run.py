@@ -34,7 +34,7 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
     help="Times real time; max is virtual time, where a run is a function of bundle, plant and seed.",
 )
 @click.option("--trace", metavar="FILE", help="Write what happens to a file, for `firable replay`.")
-@click.option("--step", is_flag=True, help="Fire one transition at a time, by the keys below.")
+@click.option("--step", is_flag=True, help="Fire one transition at a time, by the keys above.")
 @format_option
 def run(
     bundle: str,

@@ -18,7 +18,6 @@ which takes no time in one process, then the driver drives the safe outputs, whi
 from __future__ import annotations
 
 import asyncio
-from collections import deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from typing import Final, assert_never
@@ -26,6 +25,7 @@ from typing import Final, assert_never
 from firable.executor.controller import LocalController
 from firable.executor.coordinator import Coordinator
 from firable.executor.drivers import Driver
+from firable.executor.mailbox import Continue, Mailbox, SignalRead
 from firable.executor.messages import (
     Acknowledgement,
     Decision,
@@ -51,19 +51,6 @@ FIRINGS_AT_ONCE_MAX: Final = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class SignalRead:
-    """A driver's message to a controller: a new value of one of its signals."""
-
-    signal: str
-    value: bool
-    entry: int | None
-
-
-class Continue:
-    """A controller's message to itself: it may have more to fire."""
-
-
-@dataclass(frozen=True, slots=True)
 class RunClock:
     """The time of a run on the present event loop, `speed` times as fast as the loop's."""
 
@@ -78,24 +65,6 @@ class RunClock:
     def loop_delay_seconds(self, until_seconds: float) -> float:
         """How long the event loop has to wait until a time of the run."""
         return max(0.0, until_seconds - self.now_seconds()) / self.speed
-
-
-class _Mailbox:
-    """Messages for one task, in the order in which they were posted."""
-
-    def __init__(self) -> None:
-        self.items: deque[object] = deque()
-        self.waiter: asyncio.Future[None] | None = None
-
-    def post(self, item: object) -> None:
-        self.items.append(item)
-        if self.waiter is not None and not self.waiter.done():
-            self.waiter.set_result(None)
-
-    async def wait(self) -> None:
-        if not self.items:
-            self.waiter = asyncio.get_running_loop().create_future()
-            await self.waiter
 
 
 class Execution:
@@ -122,7 +91,7 @@ class Execution:
         self.coordinator = Coordinator(decomposition)
         self.controllers = {s.name: LocalController(decomposition, s.name) for s in decomposition.subnets}
         self.owner_of = {signal.name: subnet.name for subnet in decomposition.subnets for signal in subnet.signals}
-        self.mailboxes = {name: _Mailbox() for name in (COORDINATOR, *self.controllers)}
+        self.mailboxes = {name: Mailbox() for name in (COORDINATOR, *self.controllers)}
         self.under_way = 0
         self.messages = 0
         self.paused = False

@@ -14,6 +14,7 @@ import pytest
 from support.owned_nets import owned_net
 
 from firable.decompose.split import split
+from firable.executor.drivers import SimulatedDriver
 from firable.executor.execution import Execution
 from firable.executor.messages import ProtocolError
 from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
@@ -272,7 +273,9 @@ def test_after_a_stop_nothing_fires_and_every_machine_stands_still() -> None:
     assert report.inside
     notes = [i for i, event in enumerate(trace.events) if isinstance(event, Noted)]
     assert not [event for event in trace.events[notes[0] :] if isinstance(event, Fired | CommandSent)]
-    assert all(machine.busy is None for machine in kept[0].driver.plant.machines.values())  # type: ignore[attr-defined]
+    driver = kept[0].driver
+    assert isinstance(driver, SimulatedDriver)
+    assert all(machine.busy is None for machine in driver.plant.machines.values())
 
 
 def test_stop_at_the_end_of_the_cycle_leaves_an_empty_cell() -> None:
@@ -290,10 +293,9 @@ def test_stop_at_the_end_of_the_cycle_leaves_an_empty_cell() -> None:
 def test_cancelled_run_is_an_operators_stop() -> None:
     async def cancelled(execution: Execution) -> None:
         await asyncio.sleep(20.0)
-        main.append(next(task for task in asyncio.all_tasks() if task.get_coro().__name__ == "main"))  # type: ignore[union-attr]
-        main[0].cancel()
+        (main,) = (task for task in asyncio.all_tasks() if "Execution.main()" in repr(task.get_coro()))
+        main.cancel()
 
-    main: list[asyncio.Task[object]] = []
     report, _ = run_cell("one_robot", 5, operator=cancelled)
     assert report.state is State.STOPPED
 
@@ -480,10 +482,10 @@ def test_plant_of_another_cell_is_refused() -> None:
     assert {problem.code for problem in refusal.value.diagnostics} == {"F5003"}
 
 
-@pytest.mark.parametrize("wrong", [{"workpieces": -1}, {"speed": 0.0}, {"overdue_seconds": 0.0}])
-def test_senseless_quantities_are_refused(wrong: dict[str, float]) -> None:
+@pytest.mark.parametrize(("workpieces", "speed", "overdue_seconds"), [(-1, None, 1.0), (1, 0.0, 1.0), (1, None, 0.0)])
+def test_senseless_quantities_are_refused(workpieces: int, speed: float | None, overdue_seconds: float) -> None:
     with pytest.raises(ValueError, match="must"):
-        run_cell("one_robot", **{"workpieces": 1, **wrong})  # type: ignore[arg-type]
+        run_cell("one_robot", workpieces, speed=speed, overdue_seconds=overdue_seconds)
 
 
 def test_run_without_workpieces_is_done_at_once() -> None:
