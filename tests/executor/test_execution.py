@@ -293,7 +293,7 @@ def test_stop_at_the_end_of_the_cycle_leaves_an_empty_cell() -> None:
 def test_cancelled_run_is_an_operators_stop() -> None:
     async def cancelled(execution: Execution) -> None:
         await asyncio.sleep(20.0)
-        (main,) = (task for task in asyncio.all_tasks() if "Execution.main()" in repr(task.get_coro()))
+        (main,) = (task for task in asyncio.all_tasks() if "Execution.main" in repr(task.get_coro()))
         main.cancel()
 
     report, _ = run_cell("one_robot", 5, operator=cancelled)
