@@ -1,1 +1,74 @@
-"""firable.analysis"""
+"""What holds of a net: by its reachability graph, by its structure, by a solver.
+
+What a program imports from here: `explore` gives the `ReachabilityGraph` of a net within a `Budget`, and `report_on`
+the `CheckReport` of a graph, with every verdict and with the `Figures` behind them. `p_invariants`, `t_invariants`,
+`minimal_siphons`, `minimal_traps` and `deadlock_trap` read the arcs alone, and may be given a `Deadline`. `eager_run`
+is the run under the arbiters with all gates open; `isomorphic` and `weakly_bisimilar` compare two graphs. What needs
+the whole graph raises `IncompleteGraph`, and `BudgetExceeded` where memory ends.
+
+    from firable.analysis import Budget, explore, report_on
+
+    report = report_on(explore(net, "step", Budget(seconds=60)))
+
+`check` and `net_class` are functions that have the names of their modules, and are imported from there: `from
+firable.analysis.check import check` does both of these steps at once.
+
+The names are loaded when they are asked for: numpy, sympy and z3 take a second, and belong to the extra `prove`.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from firable.analysis.check import CheckReport, Figures, report_on
+    from firable.analysis.deadline import Deadline
+    from firable.analysis.equivalence import isomorphic, weakly_bisimilar
+    from firable.analysis.invariants import p_invariants, t_invariants
+    from firable.analysis.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
+    from firable.analysis.siphons import deadlock_trap, minimal_siphons, minimal_traps
+    from firable.analysis.starvation import eager_run
+
+__all__ = [
+    "Budget",
+    "BudgetExceeded",
+    "CheckReport",
+    "Deadline",
+    "Figures",
+    "IncompleteGraph",
+    "ReachabilityGraph",
+    "deadlock_trap",
+    "eager_run",
+    "explore",
+    "isomorphic",
+    "minimal_siphons",
+    "minimal_traps",
+    "p_invariants",
+    "report_on",
+    "t_invariants",
+    "weakly_bisimilar",
+]
+
+_MODULES: Final = {
+    "check": ("CheckReport", "Figures", "report_on"),
+    "deadline": ("Deadline",),
+    "equivalence": ("isomorphic", "weakly_bisimilar"),
+    "invariants": ("p_invariants", "t_invariants"),
+    "reachability": ("Budget", "BudgetExceeded", "IncompleteGraph", "ReachabilityGraph", "explore"),
+    "siphons": ("deadlock_trap", "minimal_siphons", "minimal_traps"),
+    "starvation": ("eager_run",),
+}
+_MODULE_OF: Final = {name: module for module, names in _MODULES.items() for name in names}
+
+
+if not TYPE_CHECKING:  # type checkers read the imports above, and so see a name that is misspelt
+
+    def __getattr__(name: str) -> object:
+        if name not in _MODULE_OF:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
