@@ -22,11 +22,12 @@ from pathlib import Path
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError, Severity, did_you_mean
-from firable.nets.net import FORBIDDEN_IN_NAMES, Net, Place, Transition
+from firable.nets.net import Net, Place, Transition
 from firable.nets.pnml_writer import write_pnml
 from firable.nets.pnml_xml import PnmlRecords, Record, described, parse_xml
 from firable.nets.source import Source, quoted, read_bytes
 from firable.nets.text_positions import bounded
+from firable.nets.well_formed import FORBIDDEN_IN_NAMES
 
 __all__ = ["PnmlImport", "parse_pnml", "read_pnml", "write_pnml"]
 

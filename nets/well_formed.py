@@ -1,0 +1,279 @@
+"""The rules of a well-formed net, each with the diagnostic that says what to write instead.
+
+They are asked once, by the constructor of `Net`, so a net that exists keeps them, whoever built it; and they name the
+*subject* of a problem, never a line, so that they serve text, PNML and programs alike. A contradiction that no text can
+express, such as a completion signal that gates nothing, is a `ValueError`: the fault of the program that made it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean
+from firable.nets.formula import CONSTANT_ATOMS, Holds, names_in
+from firable.nets.net import ArbitrationRule, ExternalGate, Net, Place, PropertyKind, Signal, SignalKind, Transition
+
+FORBIDDEN_IN_NAMES: Final = frozenset(" \t\r\n()[]{},:#&*!|>'\"%@`\\")
+
+
+def problems(net: Net) -> Iterator[Diagnostic]:
+    """Every rule of SEMANTICS, "The net", that the parts violate, found as it is asked for."""
+    yield from _duplicate_names(net)
+    controllers = {controller.name for controller in net.controllers}
+    yield from _ownership(net, controllers)
+    if len(coordinators := [c.name for c in net.controllers if c.coordinator]) > 1:
+        yield Diagnostic(
+            "F2015",
+            f"{' and '.join(coordinators)} are both marked as coordinator",
+            "leave `coordinator: true` at one of them",
+            ("controllers", coordinators[1]),
+        )
+    yield from _completions(net)
+    known = _Known(
+        {place.name for place in net.places},
+        {transition.name for transition in net.transitions},
+        {signal.name for signal in net.signals},
+    )
+    for transition in net.transitions:
+        yield from _transition_problems(transition, known)
+    yield from _numbers(net)
+    yield from _arbiters(net)
+    yield from _properties(net)
+
+
+def _duplicate_names(net: Net) -> Iterator[Diagnostic]:
+    kinds: tuple[tuple[str, tuple[str, ...]], ...] = (
+        ("controllers", tuple(x.name for x in net.controllers)),
+        ("places", tuple(x.name for x in net.places)),
+        ("signals", tuple(x.name for x in net.signals)),
+        ("transitions", tuple(x.name for x in net.transitions)),
+        ("arbiters", tuple(x.name for x in net.arbiters)),
+        ("properties", tuple(x.name for x in net.properties)),
+    )
+    nodes: dict[str, str] = {}
+    for kind, names in kinds:
+        seen: set[str] = set()
+        for name in names:
+            singular = {"properties": "property"}.get(kind, kind[:-1])
+            if (
+                not name
+                or FORBIDDEN_IN_NAMES & set(name)
+                or not name.isprintable()
+                or name in {"and", "or", "not", "->"}
+            ):
+                yield Diagnostic(
+                    "F2012",
+                    f"{name!r} is not a name for a {singular}",
+                    "use letters, digits, '_', '-' and '.'",
+                    (kind, name),
+                )
+            if name in seen:
+                yield Diagnostic("F2001", f"there are two {kind} named '{name}'", "rename one of them", (kind, name))
+            seen.add(name)
+            # Places, signals and transitions are told apart by their names alone, in gates and in formulas.
+            if kind in {"places", "signals", "transitions"}:
+                if (other := nodes.get(name)) not in {None, kind}:
+                    yield Diagnostic(
+                        "F2001",
+                        f"'{name}' names one of the {other} and one of the {kind}",
+                        "rename one of them: gates and formulas tell them apart by name",
+                        (kind, name),
+                    )
+                nodes.setdefault(name, kind)
+
+
+def _ownership(net: Net, controllers: set[str]) -> Iterator[Diagnostic]:
+    owned: tuple[tuple[str, tuple[Place | Signal, ...]], ...] = (("places", net.places), ("signals", net.signals))
+    for kind, items in owned:
+        for item in items:
+            if item.owner is None:
+                continue
+            subject: Subject = (kind, item.name, "owner")
+            if item.owner not in controllers:
+                yield Diagnostic(
+                    "F2005",
+                    f"'{item.name}' is owned by '{item.owner}', which is no controller",
+                    did_you_mean(item.owner, sorted(controllers)) + "declare it under `controllers`",
+                    subject,
+                )
+            local = item.name.removeprefix(f"{item.owner}.")
+            if local == item.name or not local:
+                yield Diagnostic(
+                    "F2019",
+                    f"'{item.name}' is owned by '{item.owner}', so its name must begin with '{item.owner}.'",
+                    f"name it '{item.owner}.{item.name}'",
+                    subject,
+                )
+
+
+def _completions(net: Net) -> Iterator[Diagnostic]:
+    signals = {signal.name: signal for signal in net.signals}
+    consumers: dict[str, list[Transition]] = {place.name: [] for place in net.places}
+    for transition in net.transitions:
+        for name in transition.inputs:
+            consumers.get(name, []).append(transition)
+    for place in net.places:
+        if place.completion is None:
+            continue
+        subject: Subject = ("places", place.name, "until")
+        signal = signals.get(place.completion)
+        if signal is None:
+            yield _unknown("F2003", "signal", place.completion, sorted(signals), subject)
+        elif signal.kind is not SignalKind.COMPLETION:
+            yield Diagnostic(
+                "F2018",
+                f"'{signal.name}' is declared as a sensor, and `until` makes it a completion signal",
+                "a completion is a bit that the driver forms and clears: take it out of `inputs`, "
+                "or write `if` at the transition",
+                subject,
+            )
+        if place.command is None:
+            yield Diagnostic(
+                "F2014",
+                f"'{place.name}' waits until '{place.completion}' but sends no command that could complete",
+                "add `send`, or declare the signal under `inputs` and write it as `if` of the transition",
+                subject,
+            )
+        for transition in consumers[place.name]:
+            if ExternalGate(place.completion) not in transition.external:
+                raise ValueError(
+                    f"'{transition.name}' takes the token of '{place.name}' without the gate '{place.completion}'"
+                )
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """The names an arc or a gate may end at."""
+
+    places: set[str]
+    transitions: set[str]
+    signals: set[str]
+
+
+def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diagnostic]:
+    places, names, signals = known.places, known.transitions, known.signals
+    arcs = (("from", transition.inputs), ("to", transition.outputs))
+    gates = (("if", transition.permissive), ("unless", transition.inhibitive))
+    for key, sources in (*arcs, *gates):
+        is_gate = key in {"if", "unless"}
+        seen: set[str] = set()
+        for name in sources:
+            subject: Subject = ("transitions", transition.name, key, name)
+            if name in seen:
+                yield Diagnostic(
+                    "F2007",
+                    f"'{name}' stands twice in `{key}` of '{transition.name}'",
+                    "arcs and gates are sets, without weights: write it once",
+                    subject,
+                )
+            seen.add(name)
+            if name in places:
+                continue
+            if name in names:
+                code = "F2008" if is_gate else "F2017"
+                yield Diagnostic(
+                    code,
+                    f"'{name}' in `{key}` of '{transition.name}' is a transition",
+                    "the source of a gate is a place or a signal"
+                    if is_gate
+                    else "an arc joins a place and a transition",
+                    subject,
+                )
+            elif name in signals and not is_gate:
+                yield Diagnostic(
+                    "F2017",
+                    f"'{name}' in `{key}` of '{transition.name}' is a signal",
+                    "a signal can be a gate: write it under `if` or `unless`",
+                    subject,
+                )
+            elif not is_gate:
+                yield _unknown("F2002", "place", name, sorted(places), subject)
+            elif name not in signals:
+                yield _unknown("F2002", "place or signal", name, sorted(places | signals), subject)
+    seen_gates: set[ExternalGate] = set()
+    for gate in transition.external:
+        subject = ("transitions", transition.name, "if" if gate.wanted else "unless", gate.signal)
+        if gate.signal not in signals:
+            yield _unknown("F2003", "signal", gate.signal, sorted(signals), subject)
+        if gate in seen_gates:
+            yield Diagnostic(
+                "F2007", f"the gate '{gate.signal}' of '{transition.name}' stands twice", "write it once", subject
+            )
+        seen_gates.add(gate)
+
+
+def _unknown(code: str, kind: str, name: str, known: list[str], subject: Subject) -> Diagnostic:
+    local = [full for full in known if full.rpartition(".")[2] == name]
+    suggestion = f"did you mean '{local[0]}'? " if local else did_you_mean(name, known)
+    return Diagnostic(
+        code, f"there is no {kind} '{name}'", f"{suggestion}Declare it first, or correct the name.".strip(), subject
+    )
+
+
+def _numbers(net: Net) -> Iterator[Diagnostic]:
+    first: dict[int, str] = {}
+    for transition in net.transitions:
+        if transition.number is None:
+            continue
+        other = first.setdefault(transition.number, transition.name)
+        if other != transition.name:
+            yield Diagnostic(
+                "F2016",
+                f"'{other}' and '{transition.name}' both have the number {transition.number}",
+                "numbers name the parts of a transition in the controllers, so each is used once",
+                ("transitions", transition.name, "number"),
+            )
+
+
+def _arbiters(net: Net) -> Iterator[Diagnostic]:
+    names = {transition.name for transition in net.transitions}
+    taken: dict[str, str] = {}
+    for arbiter in net.arbiters:
+        subject: Subject = ("arbiters", arbiter.name, "among")
+        if len(set(arbiter.among)) < 2:
+            yield Diagnostic(
+                "F2013", f"'{arbiter.name}' has nothing to decide", "name at least two transitions", subject
+            )
+        if arbiter.by is not ArbitrationRule.ORDER and len(set(arbiter.among)) < len(arbiter.among):
+            yield Diagnostic(
+                "F2013",
+                f"'{arbiter.name}' names a transition twice",
+                "only `by: order` may name a transition more than once",
+                subject,
+            )
+        for name in dict.fromkeys(arbiter.among):
+            if name not in names:
+                yield _unknown("F2004", "transition", name, sorted(names), (*subject, name))
+            elif (other := taken.setdefault(name, arbiter.name)) != arbiter.name:
+                yield Diagnostic(
+                    "F2013",
+                    f"'{name}' is decided by '{other}' and by '{arbiter.name}'",
+                    "a conflict component has one arbiter: join the two",
+                    (*subject, name),
+                )
+
+
+def _properties(net: Net) -> Iterator[Diagnostic]:
+    places = {place.name for place in net.places}
+    transitions = {transition.name for transition in net.transitions}
+    for name in sorted(CONSTANT_ATOMS & places) if net.properties else ():
+        yield Diagnostic(
+            "F2012",
+            f"the place '{name}' has a name that means something else in the formulas of `properties`",
+            "rename the place",
+            ("places", name),
+        )
+    for prop in net.properties:
+        if (prop.then is None) == (prop.kind is PropertyKind.LEADS_TO):
+            raise ValueError(f"'{prop.name}': exactly `leads_to` has a second formula")
+        for formula in (prop.formula, prop.then):
+            for atom in names_in(formula) if formula else ():
+                if isinstance(atom, Holds):
+                    if atom.place not in places:
+                        subject: Subject = ("properties", prop.name, atom.place)
+                        yield _unknown("F2002", "place", atom.place, sorted(places), subject)
+                elif atom.transition not in transitions:
+                    subject = ("properties", prop.name, atom.transition)
+                    yield _unknown("F2004", "transition", atom.transition, sorted(transitions), subject)
