@@ -97,11 +97,18 @@ def test_a_badly_formatted_line_in_the_crate_stops_the_gate(tmp_path: Path) -> N
     assert f"Diff in {crate}/src/lib.rs" in make(ROOT, "lint-rust-format", f"CRATE={crate}")
 
 
-def test_a_clippy_warning_in_the_crate_stops_the_gate() -> None:
+def test_a_clippy_warning_in_the_crate_stops_the_gate_also_in_what_only_python_sees() -> None:
     # Always the same folder, inside the target folder: so the dependencies are those that the gate has built already.
     target = ROOT / "analysis" / "engine" / "target"
     text = "\n/// Planted.\npub fn planted(bytes: &Vec<u8>) -> bool {\n    bytes.len() == 0\n}\n"
     crate = planted_crate(target / "planted", text)
+    library = crate / "src" / "lib.rs"
+    outside, feature, inside = library.read_text(encoding="utf-8").partition('#[cfg(feature = "extension-module")]')
+    begin, module, rest = inside.partition("mod python {\n")
+    assert module
+    planted = "    pub fn planted(flag: bool) -> bool {\n        if flag == true { false } else { true }\n    }\n\n"
+    library.write_text(outside + feature + begin + module + planted + rest, encoding="utf-8")
     output = make(ROOT, "lint-clippy", f"CRATE={crate}", CARGO_TARGET_DIR=str(target))
     assert "clippy::len-zero" in output
     assert "clippy::ptr-arg" in output
+    assert "clippy::bool-comparison" in output  # inside the module that is compiled with all features only
