@@ -152,6 +152,7 @@ def shared(*, together: bool) -> Net:
     arm = Place("arm", command=Command("ARM", "MOVE"), completion="done")
     clamp = Place("clamp", command=Command("CLAMP", "CLOSE"), completion="done")
     done = (ExternalGate("done"),)
+    start: tuple[Transition, ...]
     if together:
         start = (Transition("start", ("idle",), ("arm", "clamp")),)
         end = (Transition("end", ("arm", "clamp"), ("idle",), external=done),)
