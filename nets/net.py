@@ -111,6 +111,16 @@ class Transition:
         """Whether some valuation of the signals opens X(t): no signal is wanted both 1 and 0."""
         return len({gate.signal for gate in self.external}) == len(set(self.external))
 
+    @property
+    def self_loops(self) -> tuple[str, ...]:
+        """The places that are both input and output; one is enough to keep the transition from ever firing.
+
+        >>> Transition("t", ("p", "q"), ("q", "r")).self_loops
+        ('q',)
+        """
+        outputs = set(self.outputs)
+        return tuple(place for place in self.inputs if place in outputs)
+
 
 class ArbitrationRule(StrEnum):
     """How an arbiter decides a conflict; see `firable.semantics.arbitration`."""

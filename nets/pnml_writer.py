@@ -35,7 +35,7 @@ def write_pnml(net: Net) -> tuple[str, tuple[Diagnostic, ...]]:
     >>> "<net id=" in text, notes
     (True, ())
     """
-    loops = [t.name for t in net.transitions if set(t.inputs) & set(t.outputs)]
+    loops = [t.name for t in net.transitions if t.self_loops]
     if loops:
         raise InputError(
             Diagnostic(
