@@ -5,7 +5,9 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from support.owned_nets import owned_net
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.owned_nets import owned_net, owned_nets
 from support.reference import load_net
 
 from firable.decompose.split import split
@@ -77,11 +79,14 @@ def test_joint_traces_of_the_cells_are_traces_of_the_central_net(name: str, netw
     assert sum(check(Simulation(decomposition_of(name), seed, network), 3000) for seed in range(4)) > 40
 
 
-def test_joint_traces_of_random_nets_are_traces_of_the_central_net() -> None:
-    fired = 0
-    for seed in range(400):
-        fired += check(Simulation(split(owned_net(seed)), seed, NETWORKS[seed % 4]), 400)
-    assert fired > 2000
+@settings(max_examples=400, deadline=None)
+@given(owned_nets(), st.integers(0, 2**16), st.sampled_from(NETWORKS))
+def test_joint_traces_of_random_nets_are_traces_of_the_central_net(net: Net, seed: int, network: Network) -> None:
+    check(Simulation(split(net), seed, network), 400)
+
+
+def test_random_nets_fire() -> None:
+    assert sum(check(Simulation(split(owned_net(seed)), seed), 400) for seed in range(40)) > 200
 
 
 def test_one_seed_is_one_run() -> None:
@@ -433,7 +438,9 @@ def test_value_from_before_a_command_is_not_taken_for_its_completion() -> None:
     assert controller.fire() == [Firing("back")]
 
 
-def test_rounds_side_by_side_never_meet_at_a_promise() -> None:
+@settings(max_examples=150, deadline=None)
+@given(owned_nets(), st.integers(0, 2**16), st.sampled_from(NETWORKS))
+def test_rounds_side_by_side_never_meet_at_a_promise(net: Net, seed: int, network: Network) -> None:
     class Alone(LocalController):
         def _vote(self, request: VoteRequest) -> Iterator[Effect]:
             asked_for = [self.parts[name] for name in request.transitions]
@@ -441,8 +448,7 @@ def test_rounds_side_by_side_never_meet_at_a_promise() -> None:
                 assert not any(self._disturbs_promises(part) for part in asked_for)
             yield from super()._vote(request)
 
-    for seed in range(150):
-        check(Simulation(split(owned_net(seed)), seed, NETWORKS[seed % 4], controller=Alone), 300)
+    check(Simulation(split(net), seed, network, controller=Alone), 300)
 
 
 def test_permit_for_one_firing_lets_one_of_two_open_rounds_commit() -> None:
@@ -492,16 +498,16 @@ def test_closed_rounds_are_forgotten() -> None:
     assert max(len(controller.closed) for controller in simulation.controllers.values()) <= 2
 
 
-def test_compiled_transitions_are_enabled_and_fire_as_the_reference_says() -> None:
-    for seed in range(60):
-        net = owned_net(seed)
-        player, reference = TokenPlayer.of(net), Player(net)
-        for draw in range(40):
-            word = hash((seed, draw)) & (1 << len(net.places) + len(net.signals)) - 1
-            signals = {s.name: bool(word >> len(net.places) + j & 1) for j, s in enumerate(net.signals)}
-            marking = player.marking(word)
-            enabled = [t for t, c in enumerate(player.transitions.values()) if c.enabled(word)]
-            assert tuple(enabled) == reference.enabled(marking, signals)
-            for t in enabled:
-                fired = player.transitions[net.transitions[t].name].fire(word)
-                assert player.marking(fired) == reference.fire(marking, (t,))
+@settings(max_examples=200, deadline=None)
+@given(owned_nets(), st.data())
+def test_compiled_transitions_are_enabled_and_fire_as_the_reference_says(net: Net, data: st.DataObject) -> None:
+    player, reference = TokenPlayer.of(net), Player(net)
+    for _ in range(10):
+        word = data.draw(st.integers(0, (1 << len(net.places) + len(net.signals)) - 1))
+        signals = {s.name: bool(word >> len(net.places) + j & 1) for j, s in enumerate(net.signals)}
+        marking = player.marking(word)
+        enabled = [t for t, c in enumerate(player.transitions.values()) if c.enabled(word)]
+        assert tuple(enabled) == reference.enabled(marking, signals)
+        for t in enabled:
+            fired = player.transitions[net.transitions[t].name].fire(word)
+            assert player.marking(fired) == reference.fire(marking, (t,))

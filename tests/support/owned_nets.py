@@ -1,6 +1,11 @@
-"""Random nets in which everything has an owner, for the split and the protocol: small, with every kind of gate."""
+"""Random nets in which everything has an owner, for the split and the protocol: small, with every kind of gate.
+
+`owned_nets` is for properties, whose failures are shrunk; `owned_net` is for a search over seeds.
+"""
 
 import random
+
+from hypothesis import strategies as st
 
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 
@@ -8,12 +13,21 @@ Arcs = tuple[tuple[str, ...], tuple[str, ...]]
 
 
 def owned_net(seed: int) -> Net:
-    """A net of two or three controllers, with local and global transitions, drawn from the seed.
+    """The net of `drawn_net` that is drawn from a seed."""
+    return drawn_net(random.Random(seed), f"random-{seed}")
+
+
+def owned_nets() -> st.SearchStrategy[Net]:
+    """The nets of `drawn_net`, with every choice left to hypothesis."""
+    return st.randoms(use_true_random=False).map(lambda draw: drawn_net(draw, "random"))
+
+
+def drawn_net(draw: random.Random, title: str) -> Net:
+    """A net of two or three controllers, with local and global transitions.
 
     It is marked so that its first transition can fire unless a gate keeps it, and no gate waits for the completion of a
     command that was never sent.
     """
-    draw = random.Random(seed)
     owners = ["a", "b", "c"][: draw.randint(2, 3)]
     names = [f"{draw.choice(owners)}.p{i}" for i in range(draw.randint(4, 8))]
     arcs = _arcs(draw, owners, names)
@@ -46,7 +60,7 @@ def owned_net(seed: int) -> Net:
         return Transition(f"t{i}", inputs, outputs, permissive, inhibitive, external)
 
     return Net(
-        f"random-{seed}",
+        title,
         tuple(places.values()),
         tuple(transition(i, *both) for i, both in enumerate(arcs)),
         tuple(signals.values()),
