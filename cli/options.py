@@ -70,14 +70,9 @@ def load_net(argument: str) -> Loaded:
 
     The argument is a file (net file, PNML or bundle) or `catalogue:NAME`. Raises `InputError` as the readers do.
     """
-    from firable.nets.bundle import read_bundle
-    from firable.nets.load import Loaded, load
+    from firable.nets.load import load
 
-    if argument.startswith(CATALOGUE):
-        return load(catalogue_file(argument, ""))
-    if _is_archive(argument):
-        return Loaded(read_bundle(argument).net)
-    return load(argument)
+    return load(catalogue_file(argument, "") if argument.startswith(CATALOGUE) else argument)
 
 
 def catalogue_file(argument: str, kind: str) -> Path:
@@ -89,16 +84,6 @@ def catalogue_file(argument: str, kind: str) -> Path:
         raise click.UsageError(f"the catalogue has no '{name}'; it has: {', '.join(catalogue_names())}")
     path = catalogue_path(name)
     return path.with_name(f"{name}.plant.yaml") if kind == "plant" else path
-
-
-def _is_archive(path: str) -> bool:
-    from firable.nets.archive import SIGNATURE
-
-    try:
-        with Path(path).open("rb") as stream:
-            return stream.read(len(SIGNATURE)) == SIGNATURE
-    except (OSError, ValueError):  # the reader finds it again, and says it well
-        return False
 
 
 def write_text(path: str, text: str) -> None:

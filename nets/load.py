@@ -1,7 +1,8 @@
 """Reading a net from whatever file it is in.
 
-The extension tells the format; where it does not, the first character does, because XML begins with `<` and a net file
-does not. Guessing from the content alone would let a broken PNML file be reported as broken YAML.
+A bundle is known by its first bytes, which no text begins with. Of the text formats the extension tells which it is;
+where it does not, the first character does, because XML begins with `<` and a net file does not. Guessing from the
+content alone would let a broken PNML file be reported as broken YAML.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from pathlib import Path
 from typing import Final
 
 from firable.nets import pnml, text
+from firable.nets.archive import SIGNATURE
+from firable.nets.bundle import read_bundle
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Net
 from firable.nets.text_positions import Positions
@@ -41,22 +44,32 @@ class Loaded:
 
 
 def load(path: str | Path) -> Loaded:
-    """Read a net file or PNML.
+    """Read a net file, PNML, or the net of a bundle.
 
-    Raises `InputError` as `read_net` and `read_pnml` do.
+    Raises `InputError` as `read_net`, `read_pnml` and `read_bundle` do.
     """
+    head = _head(path)
+    if head.startswith(SIGNATURE):
+        return Loaded(read_bundle(path).net)
     suffix = Path(path).suffix.lower()
-    if suffix in PNML_SUFFIXES or (suffix not in TEXT_SUFFIXES and _looks_like_xml(path)):
+    if suffix in PNML_SUFFIXES or (suffix not in TEXT_SUFFIXES and _looks_like_xml(head)):
         imported = pnml.read_pnml(path)
         return Loaded(imported.net, imported.notes)
     net, positions = text.read_positioned(path)
     return Loaded(net, positions=positions)
 
 
-def _looks_like_xml(path: str | Path) -> bool:
+def _head(path: str | Path) -> bytes:
+    """The first bytes of a file; none where it cannot be read, which the reader finds again and says well."""
     try:
+        # A pipe would wait here for its other side.
+        if not Path(path).is_file():
+            return b""
         with Path(path).open("rb") as stream:
-            head = stream.read(512)
-    except (OSError, ValueError):  # the reader of net files finds it again and says it well
-        return False
+            return stream.read(512)
+    except (OSError, ValueError):
+        return b""
+
+
+def _looks_like_xml(head: bytes) -> bool:
     return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<")

@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from support.reference import load_net, reference_names
 from support.whole_nets import whole_nets
 
-from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path
+from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.diagnostics import InputError, Severity
-from firable.nets.load import load
 from firable.nets.net import Net, Place, Transition
 from firable.nets.pnml import PnmlImport, parse_pnml, read_pnml, write_pnml
 
@@ -342,25 +341,6 @@ def test_a_self_loop_is_not_written() -> None:
 
 
 # Reading whichever it is
-
-
-def test_the_extension_or_the_content_tells_the_format(tmp_path: Path) -> None:
-    net = Net("n", (Place("p"),))
-    text, _ = write_pnml(net)
-    for name in ("a.pnml", "b.xml", "c.unknown"):
-        (tmp_path / name).write_text(text)
-        assert load(tmp_path / name).net == net
-    assert load(catalogue_path("one_robot")).net == catalogue_net("one_robot")
-    (tmp_path / "d").write_text(catalogue_path("one_robot").read_text())
-    loaded = load(tmp_path / "d")
-    assert (loaded.net, loaded.notes) == (catalogue_net("one_robot"), ())
-
-
-@pytest.mark.parametrize("name", ["none", "none.yaml", "none.pnml", "."])
-def test_a_file_that_is_none_is_refused_whatever_its_extension(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError) as refused:
-        load(tmp_path / name)
-    assert [problem.code for problem in refused.value.diagnostics] == ["F1001"]
 
 
 # Public nets, where they are at hand
