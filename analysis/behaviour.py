@@ -58,7 +58,7 @@ class Behaviour:
         return tuple(
             transition.name
             for transition in self.graph.net.transitions
-            if set(transition.inputs) & set(transition.outputs) or not transition.openable
+            if transition.self_loops or not transition.openable
         )
 
     @cached_property

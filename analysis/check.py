@@ -159,7 +159,7 @@ _ON_GRAPH: Final[tuple[Callable[[ReachabilityGraph], Verdict], ...]] = (
 
 def self_loops(net: Net) -> tuple[str, ...]:
     """The transitions with a place that is both input and output: it would have to hold a token and hold none."""
-    return tuple(t.name for t in net.transitions if set(t.inputs) & set(t.outputs))
+    return tuple(t.name for t in net.transitions if t.self_loops)
 
 
 def self_loop_free(graph: ReachabilityGraph) -> Verdict:

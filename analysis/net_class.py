@@ -80,7 +80,7 @@ def net_class(net: Net, *, contact_free: bool | None = None) -> NetClass:
         ),
         extended_free_choice=all(a == b for a, b in sharing),
         asymmetric_choice=all(a <= b or b <= a for a, b in sharing),
-        pure=not any(set(t.inputs) & set(t.outputs) for t in net.transitions),
+        pure=not any(t.self_loops for t in net.transitions),
         connected=empty or nx.is_weakly_connected(graph),
         strongly_connected=empty or nx.is_strongly_connected(graph),
         outside=tuple(_outside(net, contact_free)),
@@ -105,7 +105,7 @@ def _outside(net: Net, contact_free: bool | None) -> Iterator[str]:
         yield "it has internal gates, which are read and inhibitor arcs"
     if any(t.external for t in net.transitions):
         yield "it has external gates, on which choices depend"
-    if any(set(t.inputs) & set(t.outputs) for t in net.transitions):
+    if any(t.self_loops for t in net.transitions):
         yield "it has self-loops, which never fire here and would in an ordinary net"
     if contact_free is False:
         yield "it is not contact-free: an ordinary net would fire where this one may not"

@@ -112,7 +112,7 @@ def _missing_premises(net: Net, contact_free: bool | None) -> Iterator[str]:
         yield "it has no transitions, so that every marking is a deadlock"
     if any(t.permissive or t.inhibitive for t in net.transitions):
         yield "internal gates may hold transitions back while their inputs are marked"
-    if any(set(t.inputs) & set(t.outputs) for t in net.transitions):
+    if any(t.self_loops for t in net.transitions):
         yield "a transition with a self-loop never fires"
     if not all(t.openable for t in net.transitions):
         yield "a transition wants a signal both 1 and 0 and never fires"
