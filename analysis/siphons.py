@@ -88,7 +88,10 @@ def largest_trap(net: Net, places: Marking) -> Marking:
 
 
 def largest_siphon(net: Net, places: Marking) -> Marking:
-    """The largest siphon within a set of places, given and returned as bit masks."""
+    """The largest siphon within a set of places, given and returned as bit masks.
+
+    Within the empty places of a deadlock it is what ran empty.
+    """
     return _largest(places, _siphon_rules(net))
 
 
