@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Witness
@@ -258,6 +259,8 @@ def explore(
 ) -> ReachabilityGraph:
     """The reachability graph of a net, external gates free, or as much of it as the budget allows.
 
+    Raises `InputError` F3004 where the budget of memory does not even hold the net.
+
     >>> from firable.nets.net import Net, Place, Transition
     >>> net = Net("n", (Place("p", marked=True), Place("q")), (Transition("t", ("p",), ("q",)),))
     >>> graph = explore(net)
@@ -265,8 +268,17 @@ def explore(
     (2, 1, ('q',))
     """
     discipline, budget = Discipline(discipline), budget or Budget()
+    try:
+        graph = _explored(net, discipline, budget)
+    except BudgetExceeded:
+        message = f"the budget of {budget.memory_bytes:,} bytes does not hold the net itself, let alone its markings"
+        raise InputError([Diagnostic("F3004", message, "give it a larger budget of memory")]) from None
+    return ReachabilityGraph(net, discipline, budget, graph)
+
+
+def _explored(net: Net, discipline: Discipline, budget: Budget) -> _engine.Graph:
     place, signal = net.place_index, net.signal_index
-    graph = _engine.explore(
+    return _engine.explore(
         len(net.places),
         [
             (
@@ -284,7 +296,6 @@ def explore(
         max_memory_bytes=budget.memory_bytes,
         max_seconds=budget.seconds,
     )
-    return ReachabilityGraph(net, discipline, budget, graph)
 
 
 def _reader(rows: npt.NDArray[np.uint64]) -> Callable[[int], Column]:

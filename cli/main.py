@@ -18,7 +18,7 @@ import click
 
 from firable import __version__
 from firable.cli import bundle, check, convert, draw, prove, replay, run, schema
-from firable.cli.report import ExitCode
+from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
 _EXTRA = frozenset({"z3", "networkx", "numpy", "sympy"})
@@ -89,7 +89,7 @@ def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
             return ExitCode.INPUT_ERROR
         case InputError():
             show_errors(error.diagnostics)
-            return ExitCode.INPUT_ERROR
+            return worst(map(exit_code_of, error.diagnostics))
         case ModuleNotFoundError() if error.name and error.name.partition(".")[0] in _EXTRA:
             click.echo(
                 f"error: this command needs '{error.name}', which is not installed\n"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from firable.cli.report import ExitCode, Report, document, worst
+from firable.cli.report import Report, document, exit_code_of, worst
 
 if TYPE_CHECKING:
     from firable.analysis.reachability import Budget
@@ -142,7 +142,7 @@ def answer_all(
         reports.append(report)
         if format_ == "text":
             show(report)
-    code = worst([*(report.exit_code for report in reports), *([ExitCode.INPUT_ERROR] if errors else [])])
+    code = worst([*(report.exit_code for report in reports), *map(exit_code_of, errors)])
     if format_ == "json":
         click.echo(json.dumps(document(command, reports, errors, code), indent=2, ensure_ascii=False))
     return code

@@ -103,6 +103,11 @@ def diagnostic_to_json(diagnostic: Diagnostic) -> dict[str, Any]:
     return data
 
 
+def exit_code_of(error: Diagnostic) -> ExitCode:
+    """The exit code that an error means: an input error, but for a budget that ended before anything was known."""
+    return ExitCode.UNKNOWN if error.code == "F3004" else ExitCode.INPUT_ERROR
+
+
 def worst(codes: Iterable[ExitCode]) -> ExitCode:
     """The exit code of several reports together: an input error outweighs a violation, and that what is unknown."""
     order = (ExitCode.INPUT_ERROR, ExitCode.VIOLATED, ExitCode.UNKNOWN)

@@ -238,3 +238,15 @@ def test_schemas_are_printed(kind: str, capsys: pytest.CaptureFixture[str]) -> N
     schema = json.loads(capsys.readouterr().out)
     jsonschema.Draft202012Validator.check_schema(schema)
     assert schema["properties"]
+
+
+def test_a_budget_that_does_not_hold_the_net_is_unknown_and_no_crash(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net = tmp_path / "ring.firable.yaml"
+    places = "".join(f"  p{i}:\n" for i in range(3000))
+    moves = "".join(f"  t{i}: {{from: p{i}, to: p{(i + 1) % 3000}}}\n" for i in range(3000))
+    net.write_text(f"firable: 1\ncell: ring\nplaces:\n{places}start: p0\ntransitions:\n{moves}", encoding="utf-8")
+    code, data = as_json(capsys, "check", str(net), "--max-memory", "1")
+    assert code == 3
+    assert [error["code"] for error in data["errors"]] == ["F3004"]
