@@ -6,13 +6,17 @@ from support.reference import Case, cases, load_net, local
 from firable.decompose.persistence import nonpersistent
 from firable.decompose.protocol import ProtocolVerdict, Variant, Votes, explore_protocol
 from firable.decompose.split import split
-from firable.nets.diagnostics import InputError
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
+from firable.nets.verdict import Status
 
 CASES = [(case, name) for case in cases() for name in case.expect.get("dist", {})]
 FALSIFIED = [case for case in cases() if "nonpersistent" in case.expect]
 
 A, B = Controller("a"), Controller("b")
+
+
+def decided(holds: bool) -> Status:
+    return Status.PROVED if holds else Status.VIOLATED
 
 
 def explored(net: Net, name: str) -> ProtocolVerdict:
@@ -32,12 +36,12 @@ def test_there_are_cases() -> None:
 def test_variant_does_what_the_case_expects(case: Case, name: str) -> None:
     expect = case.expect["dist"][name]
     verdict = explored(case.net(), name)
-    assert verdict.refines == expect["refines"]
-    assert bool(verdict.counterexample) != verdict.refines
+    assert verdict.refines is decided(expect["refines"])
+    assert bool(verdict.counterexample) != expect["refines"]
     if "wrong" in expect:
         assert shown(verdict) == sorted(expect["wrong"])
     if "complete" in expect:
-        assert verdict.complete == expect["complete"]
+        assert verdict.complete is decided(expect["complete"])
 
 
 @pytest.mark.parametrize("case", FALSIFIED, ids=str)
@@ -47,8 +51,7 @@ def test_nonpersistent_parts_are_those_of_the_case(case: Case) -> None:
 
 def test_promises_make_the_whole_cell_refine_and_complete() -> None:
     verdict = explored(load_net("cell1"), "locked")
-    assert verdict.refines
-    assert verdict.complete
+    assert verdict.refines is verdict.complete is Status.PROVED
     assert verdict.wrong == ()
     assert verdict.n_configurations == 31_005
 
@@ -65,8 +68,7 @@ def test_counterexample_on_the_cell_gives_the_robot_a_second_task_while_it_carri
 @pytest.mark.parametrize("name", ["naive", "recheck", "gates", "fresh", "stale", "stale_serial", "locked"])
 def test_every_protocol_refines_where_no_vote_can_be_falsified(name: str) -> None:
     verdict = explored(load_net("no_trouble"), name)
-    assert verdict.refines
-    assert verdict.complete
+    assert verdict.refines is verdict.complete is Status.PROVED
     assert (verdict.counterexample, verdict.blocked, verdict.lost) == ((), (), "")
 
 
@@ -75,7 +77,7 @@ def test_every_protocol_refines_where_no_vote_can_be_falsified(name: str) -> Non
 )
 def test_promises_refine_and_lose_nothing_on_every_net(name: str) -> None:
     verdict = explored(load_net(name), "locked")
-    assert (verdict.refines, verdict.complete, verdict.wrong) == (True, True, ())
+    assert (verdict.refines, verdict.complete, verdict.wrong) == (Status.PROVED, Status.PROVED, ())
 
 
 def test_promise_that_is_never_met_does_not_block_for_ever() -> None:
@@ -83,28 +85,27 @@ def test_promise_that_is_never_met_does_not_block_for_ever() -> None:
     places = (Place("a.p", "a", marked=True), Place("a.e", "a"), Place("b.q", "b"))
     net = Net("n", places, (Transition("G", ("a.p", "b.q")), Transition("l", ("a.p",), ("a.e",))), (), (A, B))
     verdict = explored(net, "locked")
-    assert (verdict.refines, verdict.complete) == (True, True)
+    assert verdict.refines is verdict.complete is Status.PROVED
 
 
 def test_crash_after_a_yes_is_safe_and_says_what_is_lost() -> None:
     verdict = explored(load_net("ring"), "locked_crash")
-    assert verdict.refines
-    assert not verdict.complete
+    assert (verdict.refines, verdict.complete) == (Status.PROVED, Status.VIOLATED)
     assert verdict.lost in {"G", "l", "m"}
     assert verdict.blocked[-1].endswith("stops for ever")
 
 
 def test_late_duplicate_is_known_by_its_round() -> None:
     net = load_net("ring")
-    assert explored(net, "locked_dup").refines
+    assert explored(net, "locked_dup").refines is Status.PROVED
     run = explored(net, "locked_dup_noepoch").counterexample
     assert run[-1].startswith("the late copy of the order for G arrives")
 
 
 def test_one_order_at_a_time_repairs_orders_that_overtake_but_no_stale_vote() -> None:
-    assert not explored(load_net("read_before_order"), "fresh").refines
-    assert explored(load_net("read_before_order"), "stale_serial").refines
-    assert not explored(load_net("local_conflict"), "stale_serial").refines
+    assert explored(load_net("read_before_order"), "fresh").refines is Status.VIOLATED
+    assert explored(load_net("read_before_order"), "stale_serial").refines is Status.PROVED
+    assert explored(load_net("local_conflict"), "stale_serial").refines is Status.VIOLATED
 
 
 def test_cached_copy_of_a_gate_fails_also_in_a_global_transition() -> None:
@@ -117,8 +118,8 @@ def test_cached_copy_of_a_gate_fails_also_in_a_global_transition() -> None:
         (Transition("G", ("a.p", "b.q"), inhibitive=("c.h",)), Transition("l", ("c.e",), ("c.h",))),
         controllers=(A, B, c),
     )
-    assert explored(net, "locked").refines
-    assert not explored(net, "gates").refines
+    assert explored(net, "locked").refines is Status.PROVED
+    assert explored(net, "gates").refines is Status.VIOLATED
 
 
 def test_transition_that_no_valuation_opens_takes_no_part() -> None:
@@ -133,9 +134,33 @@ def test_transition_that_no_valuation_opens_takes_no_part() -> None:
     assert explored(net, "locked").n_configurations == 1
 
 
-def test_exploration_stops_at_its_budget() -> None:
-    with pytest.raises(InputError, match="F3004"):
-        explore_protocol(load_net("cell1"), Variant.named("locked"), configurations_max=100)
+def test_exploration_that_ends_early_proves_nothing() -> None:
+    verdict = explore_protocol(load_net("cell1"), Variant.named("locked"), configurations_max=100)
+    assert (verdict.refines, verdict.complete) == (Status.UNKNOWN, Status.UNKNOWN)
+    assert verdict.bound.startswith("100 of at least ")
+    assert (verdict.counterexample, verdict.blocked, verdict.lost, verdict.wrong) == ((), (), "", ())
+
+
+@pytest.mark.parametrize("name", ["naive_loss", "fresh", "stale", "locked_crash", "locked", "locked_dup_noepoch"])
+@pytest.mark.parametrize("net_name", ["ring", "local_conflict", "read_before_order"])
+def test_what_is_decided_within_any_budget_stays_decided(net_name: str, name: str) -> None:
+    net, variant = load_net(net_name), Variant.named(name)
+    whole = explore_protocol(net, variant)
+    assert Status.UNKNOWN not in {whole.refines, whole.complete}
+    assert whole.bound == ""
+    budgets = range(0, whole.n_configurations, max(1, whole.n_configurations // 40))
+    early = [explore_protocol(net, variant, configurations_max=budget) for budget in budgets]
+    for some in early:
+        assert some.bound
+        assert some.refines in {Status.UNKNOWN, whole.refines} - {Status.PROVED}
+        assert some.complete in {Status.UNKNOWN, whole.complete} - {Status.PROVED}
+        assert set(some.wrong) <= set(whole.wrong)
+        if some.refines is Status.VIOLATED:
+            assert some.counterexample == whole.counterexample
+    if whole.refines is Status.VIOLATED:
+        assert Status.VIOLATED in {some.refines for some in early}
+    exact = explore_protocol(net, variant, configurations_max=whole.n_configurations)
+    assert exact == whole
 
 
 def test_decomposition_may_be_given_in_place_of_the_net() -> None:
