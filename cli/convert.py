@@ -20,7 +20,7 @@ def convert(source: str, output: str) -> int:
 
     What the other format cannot carry is said, never dropped in silence.
     """
-    from firable.nets.load import PNML_SUFFIXES, TEXT_SUFFIXES
+    from firable.nets.loading import PNML_SUFFIXES, TEXT_SUFFIXES
     from firable.nets.pnml import write_pnml
     from firable.nets.printing import format_net
 

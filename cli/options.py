@@ -13,7 +13,7 @@ from firable.cli.report import Report, document, exit_code_of, worst
 if TYPE_CHECKING:
     from firable.analysis.reachability import Budget
     from firable.nets.diagnostics import Diagnostic
-    from firable.nets.load import Loaded
+    from firable.nets.loading import Loaded
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -70,7 +70,7 @@ def load_net(argument: str) -> Loaded:
 
     The argument is a file (net file, PNML or bundle) or `catalogue:NAME`. Raises `InputError` as the readers do.
     """
-    from firable.nets.load import load
+    from firable.nets.loading import load
 
     return load(catalogue_file(argument, "") if argument.startswith(CATALOGUE) else argument)
 

@@ -60,8 +60,8 @@ def show_obligations(net_verdicts: Sequence[Verdict]) -> None:
 
 def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
     from firable.decompose.assumptions import assumptions
-    from firable.decompose.prove import prove as prove_split
-    from firable.decompose.split import split
+    from firable.decompose.proving import prove as prove_split
+    from firable.decompose.splitting import split
 
     loaded = load_net(argument)
     with loaded.placing():

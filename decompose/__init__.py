@@ -1,1 +1,35 @@
-"""firable.decompose"""
+"""Splitting a net over its controllers, proving the parts equal to the whole, and sealing what is proved.
+
+What a program imports from here: `split` gives the `Decomposition` of a net over its controllers and `join` undoes it;
+`table_text` is its coordinator table as the paper prints it. `prove` discharges the obligations, Eq. (7)-(10) and what
+belongs to them, in a `ProofReport`. `make_bundle` does all this for a net that `firable.analysis` has checked, and
+refuses what is not proved. `explore_protocol` follows every run of a protocol `Variant`, with its kind of `Votes`.
+
+    from firable.analysis.check import check
+    from firable.decompose import make_bundle
+    from firable.nets import read_net, write_bundle
+
+    write_bundle("cell.bundle", make_bundle(check(read_net("cell.firable.yaml"))))
+
+The functions `assumptions` and `nonpersistent` are imported from the modules `assumptions` and `persistence`.
+"""
+
+from firable.decompose.bundling import make_bundle
+from firable.decompose.joining import join
+from firable.decompose.protocol import ProtocolVerdict, Variant, Votes, explore_protocol
+from firable.decompose.proving import ProofReport, prove
+from firable.decompose.splitting import split
+from firable.decompose.table import table_text
+
+__all__ = [
+    "ProofReport",
+    "ProtocolVerdict",
+    "Variant",
+    "Votes",
+    "explore_protocol",
+    "join",
+    "make_bundle",
+    "prove",
+    "split",
+    "table_text",
+]

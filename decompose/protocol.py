@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from firable.decompose.protocol_model import LEFT, Configuration, Event, Model, Variant, Votes
-from firable.decompose.split import split
+from firable.decompose.splitting import split
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Status

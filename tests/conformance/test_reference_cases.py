@@ -22,7 +22,7 @@ from firable.analysis.starvation import eager_run, scan, starved
 from firable.decompose.persistence import nonpersistent
 from firable.decompose.protocol import explore_protocol
 from firable.decompose.protocol_model import Variant
-from firable.decompose.split import split, unowned
+from firable.decompose.splitting import split, unowned
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Arbiter, ArbitrationRule, Marking, Net
 from firable.nets.verdict import Status

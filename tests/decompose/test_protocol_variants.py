@@ -5,7 +5,7 @@ from support.reference import Case, cases, load_net, local
 
 from firable.decompose.persistence import nonpersistent
 from firable.decompose.protocol import ProtocolVerdict, Variant, Votes, explore_protocol
-from firable.decompose.split import split
+from firable.decompose.splitting import split
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.verdict import Status
 

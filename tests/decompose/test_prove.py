@@ -15,8 +15,8 @@ from firable.analysis.check import CheckReport, check
 from firable.analysis.smt import Terms, value
 from firable.decompose.bundling import make_bundle
 from firable.decompose.obligations import greedy
-from firable.decompose.prove import ProofReport, prove
-from firable.decompose.split import split
+from firable.decompose.proving import ProofReport, prove
+from firable.decompose.splitting import split
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.decomposition import Decomposition, Part
@@ -310,7 +310,7 @@ def test_refutation_shows_the_differing_assignment_in_the_names_of_the_net() -> 
 def test_out_of_time_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     from firable.analysis.smt import Answer, Decision
 
-    monkeypatch.setattr("firable.decompose.prove.decide", lambda *_, **__: Decision(Answer.UNKNOWN, {}, "timeout"))
+    monkeypatch.setattr("firable.decompose.proving.decide", lambda *_, **__: Decision(Answer.UNKNOWN, {}, "timeout"))
     report = prove(split(load_net("ring")))
     assert {verdict.status for verdict in report.verdicts} == {Status.UNKNOWN}
     assert all("timeout" in verdict.bound for verdict in report.verdicts)

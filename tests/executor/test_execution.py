@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from support.owned_nets import owned_net
 
-from firable.decompose.split import split
+from firable.decompose.splitting import split
 from firable.executor.drivers import SimulatedDriver
 from firable.executor.execution import Execution
 from firable.executor.messages import ProtocolError
@@ -276,6 +276,37 @@ def test_after_a_stop_nothing_fires_and_every_machine_stands_still() -> None:
     driver = kept[0].driver
     assert isinstance(driver, SimulatedDriver)
     assert all(machine.busy is None for machine in driver.plant.machines.values())
+
+
+@pytest.mark.parametrize("yields", range(6))
+def test_nothing_fires_in_a_step_that_a_stop_overtakes(yields: int) -> None:
+    fired: list[int] = []
+
+    async def operator(execution: Execution) -> None:
+        execution.pause()
+        step = asyncio.create_task(execution.step())
+        for _ in range(yields):
+            await asyncio.sleep(0)
+        execution.stop()
+        fired.append(firings(execution))
+        await step
+        fired.append(firings(execution))
+
+    stopped, _ = run_decomposition(ALWAYS_FIRABLE, operator)
+    assert stopped.state is State.STOPPED
+    assert fired[0] == fired[1]
+
+
+def test_a_trace_that_breaks_while_a_command_is_overdue_ends_the_run() -> None:
+    class Full(io.StringIO):
+        def write(self, line: str) -> int:
+            if "overdue" in line:
+                raise OSError("no space left")
+            return super().write(line)
+
+    never = NeverCompletes("R", "GRASP", 1)
+    with pytest.raises(OSError, match="no space left"):
+        execute(decomposition_of("one_robot"), plant_of("one_robot"), workpieces=1, trace=Full(), disturbances=[never])
 
 
 def test_stop_at_the_end_of_the_cycle_leaves_an_empty_cell() -> None:

@@ -9,7 +9,7 @@ from firable.nets.bundle import Bundle, write_bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
-from firable.nets.load import load
+from firable.nets.loading import load
 from firable.nets.net import Net, Place
 from firable.nets.pnml_writer import write_pnml
 
