@@ -3,7 +3,8 @@
 What a program imports from here: `split` gives the `Decomposition` of a net over its controllers and `join` undoes it;
 `table_text` is its coordinator table as the paper prints it. `prove` discharges the obligations, Eq. (7)-(10) and what
 belongs to them, in a `ProofReport`. `make_bundle` does all this for a net that `firable.analysis` has checked, and
-refuses what is not proved. `explore_protocol` follows every run of a protocol `Variant`, with its kind of `Votes`.
+refuses what is not proved. `explore_protocol` follows every run of a protocol `Variant`, with its kind of `Votes`,
+and says in a `ProtocolVerdict` whether it does what the central net does.
 
     from firable.analysis.check import check
     from firable.decompose import make_bundle

@@ -11,17 +11,28 @@ from types import ModuleType
 import pytest
 
 import firable.analysis
+import firable.decompose
+import firable.nets
 import firable.semantics
 
 ROOT = Path(__file__).parents[2]
-ROOMS = pytest.mark.parametrize("room", [firable.analysis, firable.semantics], ids=lambda room: room.__name__)
+ROOMS = pytest.mark.parametrize(
+    "room",
+    [firable.nets, firable.semantics, firable.analysis, firable.decompose],
+    ids=lambda room: room.__name__,
+)
+
+
+def modules_of(room: ModuleType) -> set[str]:
+    folder = ROOT / room.__name__.removeprefix("firable.")
+    files = {file.stem for file in folder.glob("*.py") if file.stem[0] != "_"}
+    return files | {file.parent.name for file in folder.glob("*/__init__.py")}
 
 
 @ROOMS
 def test_each_public_name_is_defined_in_one_module_of_its_room_and_explained(room: ModuleType) -> None:
     assert len(set(room.__all__)) == len(room.__all__)
-    folder = ROOT / room.__name__.removeprefix("firable.")
-    modules = [import_module(f"{room.__name__}.{file.stem}") for file in folder.glob("*.py") if file.stem[0] != "_"]
+    modules = [import_module(f"{room.__name__}.{name}") for name in modules_of(room)]
     for name in room.__all__:
         value = getattr(room, name)
         defined_in = {getattr(value, "__module__", "")} & {module.__name__ for module in modules}
@@ -34,13 +45,21 @@ def test_each_public_name_is_defined_in_one_module_of_its_room_and_explained(roo
 
 @ROOMS
 def test_no_public_name_hides_a_module(room: ModuleType) -> None:
-    folder = ROOT / room.__name__.removeprefix("firable.")
-    assert not {file.stem for file in folder.glob("*.py")} & set(room.__all__)
+    assert not modules_of(room) & set(room.__all__)
 
 
 def test_the_analysis_loads_nothing_heavy_before_it_is_asked() -> None:
     heavy = ("numpy", "sympy", "z3", "networkx")
     program = f"import sys, firable.analysis; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_the_records_of_a_net_load_no_reader_and_neither_does_the_right_to_run() -> None:
+    program = (
+        "import sys; from firable.nets import Net, Verdict; import firable.nets.right_to_run;"
+        " print([name for name in ('yaml', 'pydantic') if name in sys.modules])"
+    )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
 
