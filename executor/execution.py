@@ -185,19 +185,23 @@ class Execution:
                 self._post(name, Continue())
 
     async def step(self) -> str | None:
-        """While paused, fire one transition; returns its name, or None where none is enabled."""
-        if not self.paused or self.stopping:
-            return None
+        """While paused, fire one transition; returns its name, or None where none is enabled.
+
+        Whatever else the operator says meanwhile, a stop most of all, ends the step before it fires.
+        """
         await self.quiet()
         before = dict(self.recorder.firings)
         # Locals of each controller and the coordinator take turns to be first.
         names = [COORDINATOR, *self.controllers]
         order = names[self.turn :] + names[: self.turn]
         for name in order:
+            if not self.paused or self.stopping:
+                return None
             if name == COORDINATOR:
                 self._perform(self.coordinator.permit(1))
                 await self.quiet()
-                self._perform(self.coordinator.permit(0))
+                if self.paused:
+                    self._perform(self.coordinator.permit(0))
             else:
                 self._perform(self.controllers[name].fire())
                 self._perform(self.controllers[name].report())
@@ -285,9 +289,12 @@ class Execution:
         self._settle()
 
     def _task_ended(self, task: asyncio.Task[None]) -> None:
-        if self.outcome is None or self.outcome.done() or task.cancelled():
-            return
-        if (error := task.exception()) is not None:
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._broken(error)
+
+    def _broken(self, error: BaseException) -> None:
+        """End the run by an error of the program or of the trace's file; the machines are stopped on the way out."""
+        if self.outcome is not None and not self.outcome.done():
             self.outcome.set_exception(error)
 
     # Effects
@@ -326,9 +333,15 @@ class Execution:
             if (earlier := self.overdue.pop(sender.completion, None)) is not None:
                 earlier.cancel()
             self.overdue[sender.completion] = asyncio.get_running_loop().call_later(
-                self.overdue_seconds / self.speed, self._overdue, place, self.now_seconds()
+                self.overdue_seconds / self.speed, self._alarm, place, self.now_seconds()
             )
         self.driver.send(sender, entry)
+
+    def _alarm(self, place: str, sent_at: float) -> None:
+        try:
+            self._overdue(place, sent_at)
+        except Exception as error:  # a timer has no caller: it must end the run, as an error in a task does
+            self._broken(error)
 
     def _overdue(self, place: str, sent_at: float) -> None:
         sender = self.net.place(place)
@@ -341,8 +354,8 @@ class Execution:
     def _fail(self, message: str) -> None:
         if not self.fault:
             self.fault = message
+            self.stopping = self.paused = True  # first, so that nothing fires whatever happens to the trace
             self.recorder.note(self.now_seconds(), "fault", message=message)
-            self.stopping = self.paused = True
             self._perform(self.coordinator.permit(0))
             self._settle()
 

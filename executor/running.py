@@ -10,9 +10,10 @@ The simulated cell runs in virtual time unless a speed is given; then a run is a
 from __future__ import annotations
 
 import asyncio
+import signal
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
-from contextlib import closing, nullcontext
+from contextlib import closing, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -142,7 +143,8 @@ def execute(
         is_complete=lambda: len(cell.delivered) == workpieces,
         operator=operator,
     )
-    situation = run_in_virtual_time(execution.main()) if speed is None else asyncio.run(execution.main())
+    main = _terminable(execution)
+    situation = run_in_virtual_time(main) if speed is None else asyncio.run(main)
     recorder.end(execution.now_seconds(), situation.state.value)
     delivered = tuple(workpiece.id for workpiece in cell.delivered)
     seen = Counter((*delivered, *cell.inside))
@@ -157,6 +159,16 @@ def execute(
         messages=execution.messages,
         simulated_seconds=execution.now_seconds(),
     )
+
+
+async def _terminable(execution: Execution) -> Situation:
+    """The execution, which a request to terminate ends in order, as Ctrl-C does: no machine is left on."""
+    task = asyncio.current_task()
+    if task is not None:
+        # Signals reach the main thread only, and event loops on some systems not at all.
+        with suppress(NotImplementedError, RuntimeError, ValueError):
+            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
+    return await execution.main()
 
 
 def _check(

@@ -103,8 +103,16 @@ def test_the_dialogue_keeps_out_of_the_json(bundle: str) -> None:
     assert stepped(done.stderr) == ["G1", "G2"]
 
 
-@pytest.mark.parametrize("options", [[], ["--step"], ["--step", "--speed", "max"]], ids=" ".join)
-def test_interrupt_ends_a_run_in_order(options: list[str], bundle: str, tmp_path: Path) -> None:
+INTERRUPT, TERMINATE = signal.SIGINT, signal.SIGTERM
+
+
+@pytest.mark.parametrize(
+    ("options", "sent"),
+    [([], INTERRUPT), (["--step"], INTERRUPT), (["--step", "--speed", "max"], INTERRUPT), ([], TERMINATE)],
+)
+def test_interrupt_and_terminate_end_a_run_in_order(
+    options: list[str], sent: signal.Signals, bundle: str, tmp_path: Path
+) -> None:
     trace = tmp_path / "trace"
     command = [sys.executable, "-m", "firable.cli", "run", bundle, "--speed", "1", "--trace", str(trace), *options]
     pipe = subprocess.PIPE
@@ -120,7 +128,7 @@ def test_interrupt_ends_a_run_in_order(options: list[str], bundle: str, tmp_path
             while not (trace.exists() and '"fired"' in trace.read_text(encoding="utf-8")):
                 assert process.poll() is None
                 time.sleep(0.05)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(sent)
         process.wait(timeout=60)  # and nothing is typed, nor the input ended
         said, errors = process.communicate()
     assert process.returncode == 3, said + errors

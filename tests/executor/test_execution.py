@@ -278,25 +278,6 @@ def test_after_a_stop_nothing_fires_and_every_machine_stands_still() -> None:
     assert all(machine.busy is None for machine in driver.plant.machines.values())
 
 
-@pytest.mark.parametrize("yields", range(6))
-def test_nothing_fires_in_a_step_that_a_stop_overtakes(yields: int) -> None:
-    fired: list[int] = []
-
-    async def operator(execution: Execution) -> None:
-        execution.pause()
-        step = asyncio.create_task(execution.step())
-        for _ in range(yields):
-            await asyncio.sleep(0)
-        execution.stop()
-        fired.append(firings(execution))
-        await step
-        fired.append(firings(execution))
-
-    stopped, _ = run_decomposition(ALWAYS_FIRABLE, operator)
-    assert stopped.state is State.STOPPED
-    assert fired[0] == fired[1]
-
-
 def test_a_trace_that_breaks_while_a_command_is_overdue_ends_the_run() -> None:
     class Full(io.StringIO):
         def write(self, line: str) -> int:
@@ -324,7 +305,7 @@ def test_stop_at_the_end_of_the_cycle_leaves_an_empty_cell() -> None:
 def test_cancelled_run_is_an_operators_stop() -> None:
     async def cancelled(execution: Execution) -> None:
         await asyncio.sleep(20.0)
-        (main,) = (task for task in asyncio.all_tasks() if "Execution.main" in repr(task.get_coro()))
+        (main,) = (task for task in asyncio.all_tasks() if "_terminable" in repr(task.get_coro()))
         main.cancel()
 
     report, _ = run_cell("one_robot", 5, operator=cancelled)
@@ -393,6 +374,25 @@ NO_MACHINES = parse_plant(
     "firable_plant: 1\nplant: none\nstations: [s]\nmachines: {}\n"
     "arrivals: {station: s, every_s: 1}\ndepartures: {station: s}\n"
 )
+
+
+@pytest.mark.parametrize("yields", range(6))
+def test_nothing_fires_in_a_step_that_a_stop_overtakes(yields: int) -> None:
+    fired: list[int] = []
+
+    async def operator(execution: Execution) -> None:
+        execution.pause()
+        step = asyncio.create_task(execution.step())
+        for _ in range(yields):
+            await asyncio.sleep(0)
+        execution.stop()
+        fired.append(firings(execution))
+        await step
+        fired.append(firings(execution))
+
+    stopped = execute(circles("a", "b"), NO_MACHINES, workpieces=1, operator=operator)
+    assert stopped.state is State.STOPPED
+    assert fired[0] == fired[1]
 
 
 def test_net_that_runs_in_circles_without_its_cell_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
