@@ -69,14 +69,16 @@ def eager_run(net: Net, *, steps_max: int = STEPS_MAX) -> EagerRun:
     marking, turns = net.initial_marking, arbitration.first_turns
     seen = {(marking, turns): 0}
     fired: list[tuple[str, ...]] = []
+    enabled = player.may_fire(marking)
     while len(fired) < steps_max:
-        enabled = player.may_fire(marking)
         if not enabled:
             return EagerRun(tuple(fired), ())
         if not jointly_openable(net, enabled):
             raise GatesCannotBeOpenError("transitions that are firable together want a signal both 1 and 0")
         step, turns = arbitration.decide(enabled, turns)
-        marking = player.fire(marking, step)
+        after = player.fire(marking, step)
+        enabled = player.may_fire_next(marking, enabled, after)
+        marking = after
         fired.append(tuple(net.transitions[t].name for t in step))
         if (start := seen.setdefault((marking, turns), len(fired))) < len(fired):
             return EagerRun(tuple(fired[:start]), tuple(fired[start:]))
