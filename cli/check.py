@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.option(
     "--structure", is_flag=True, help="Also net class, invariants, siphons, traps; in --max-seconds more, or 30."
 )
-@click.option("-v", "--verbose", is_flag=True, help="Tell the firing sequences of warnings too.")
+@click.option("-v", "--verbose", is_flag=True, help="Tell methods, costs and the sequences of warnings too.")
 @format_option
 def check(
     nets: tuple[str, ...],

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from firable.cli.report import Report
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
-    from firable.nets.verdict import Verdict, Witness
+    from firable.nets.verdict import Cost, Verdict, Witness
 
 _HEADINGS = {"required": "must hold", "warning": "warnings", "information": "for information"}
 
@@ -53,7 +53,7 @@ def counted(n: int, word: str) -> str:
 def show_verdicts(net: Net, verdicts: Sequence[Verdict], *, verbose: bool = False) -> None:
     """Print all verdicts, those that must hold first, with the witnesses of what is violated.
 
-    The witnesses of warnings, and of what is reachable and shall be, are told only if `verbose`.
+    Method and cost, and the witnesses of warnings and of what is reachable and shall be, are told only if `verbose`.
     """
     told: dict[tuple[object, ...], str] = {}
     width = max((len(verdict.name) for verdict in verdicts), default=0)
@@ -90,6 +90,8 @@ def _mark(verdict: Verdict) -> tuple[str, str, str | None]:
 
 def _reasons(net: Net, verdict: Verdict, told: dict[tuple[object, ...], str], verbose: bool) -> Iterator[str]:
     status = verdict.status.value
+    if verbose:
+        yield f"by {verdict.method}{_cost(verdict.cost)}"
     if status == "unknown" and verdict.bound:
         yield f"reached: {verdict.bound}"
     if status == "violated" and verdict.subjects:
@@ -100,6 +102,13 @@ def _reasons(net: Net, verdict: Verdict, told: dict[tuple[object, ...], str], ve
     if status != "proved" and verdict.hint:
         code = f"[{verdict.code}] " if verdict.code else ""
         yield f"hint: {code}{verdict.hint}"
+
+
+def _cost(cost: Cost) -> str:
+    """What a verdict took, as far as it is known."""
+    counts = [counted(n, word) for n, word in ((cost.markings, "marking"), (cost.edges, "edge")) if n is not None]
+    seconds = [] if cost.seconds is None else [f"{cost.seconds:.2g} s"]
+    return "".join(f", {part}" for part in (*counts, *seconds))
 
 
 def _witness(net: Net, name: str, witness: Witness, told: dict[tuple[object, ...], str]) -> Iterator[str]:
@@ -148,9 +157,3 @@ def show_summary(report: Report) -> None:
         parts.append(counted(warnings, "warning"))
     word, colour = {0: ("all hold", "green"), 1: ("violated", "red")}.get(report.exit_code, ("not decided", "yellow"))
     click.echo(f"\n{click.style(word, fg=colour, bold=True)}: {', '.join(parts) or 'there is nothing to hold'}")
-
-
-def show_files(files: Sequence[str], words: str) -> None:
-    """Print where files were written."""
-    for file in files:
-        click.echo(f"  {words} {file}")
