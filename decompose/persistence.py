@@ -8,7 +8,10 @@ parts whose places other transitions touch only when the part is not firable any
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from firable.nets.decomposition import Decomposition
+from firable.nets.net import Marking, Net
 from firable.semantics.algebra import BOOL
 from firable.semantics.firing import firable
 from firable.semantics.player import Player
@@ -29,11 +32,7 @@ def nonpersistent(decomposition: Decomposition) -> dict[str, list[str]]:
             subnet = decomposition.subnet(part.controller)
             t = subnet.transition_index[part.name]
             places = [net.place_index[place.name] for place in subnet.places]
-
-            def votes_yes(marking: int) -> bool:
-                return firable(BOOL, subnet, t, lambda p: bool(marking >> places[p] & 1))  # noqa: B023
-
-            yes = {marking: votes_yes(marking) for marking in graph}
+            yes = {marking: _votes_yes(subnet, t, places, marking) for marking in graph}
             against = {
                 fired[0]
                 for marking, edges in graph.items()
@@ -44,3 +43,8 @@ def nonpersistent(decomposition: Decomposition) -> dict[str, list[str]]:
             if against:
                 found[part.name] = [net.transitions[u].name for u in sorted(against)]
     return found
+
+
+def _votes_yes(subnet: Net, t: int, places: Sequence[int], marking: Marking) -> bool:
+    """Whether the part is firable in a marking of the central net, where `places` are those of the subnet."""
+    return firable(BOOL, subnet, t, lambda p: bool(marking >> places[p] & 1))

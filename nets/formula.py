@@ -105,17 +105,9 @@ class _Token:
 
 
 def _tokens(text: str) -> list[_Token]:
-    tokens = []
-    position = 0
-    end = len(text.rstrip())
-    while position < end:
-        match = _TOKEN.match(text, position)
-        if match is None:  # unreachable: every non-blank character is a symbol or part of a name
-            raise FormulaError(f"unexpected {text[position:]!r}", position)
-        found = match["symbol"] or match["name"]
-        tokens.append(_Token(found, match.end() - len(found)))
-        position = match.end()
-    return tokens
+    # Nothing is passed over but blanks: every other character is a symbol or part of a name.
+    words = ((match["symbol"] or match["name"], match.end()) for match in _TOKEN.finditer(text))
+    return [_Token(word, end - len(word)) for word, end in words]
 
 
 class _Parser:

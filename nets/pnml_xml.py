@@ -76,7 +76,7 @@ def parse_xml(source: Source, data: bytes, encoding: str | None = None) -> PnmlR
         raise source.refuse("F1002", "the file is empty", "a PNML file begins with `<pnml>`")
     reader = _Reader(source, encoding)
     try:
-        reader.parser.Parse(data, True)  # noqa: FBT003
+        reader.parser.Parse(data, True)  # noqa: FBT003 - expat takes no keywords
     except expat.ExpatError as error:
         raise source.refuse(
             "F1013", f"not valid XML: {expat.ErrorString(error.code)}", "export the net again, or repair the element",

@@ -12,7 +12,7 @@ The alternative, `yaml.dump`, prints neither short entries on one line nor align
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Final
 
@@ -150,7 +150,9 @@ def _lines(net: Net) -> Iterator[str]:
 
 
 def _scope(places: list[Place], inputs: list[Signal], prefix: str, indent: str) -> Iterator[str]:
-    local: Callable[[str], str] = lambda name: name.removeprefix(prefix)  # noqa: E731
+    def local(name: str) -> str:
+        return name.removeprefix(prefix)
+
     if marked := [local(place.name) for place in places if place.marked]:
         yield f"{indent}start: {_names(marked)}"
     if inputs:
