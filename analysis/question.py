@@ -76,6 +76,7 @@ class Question:
             answer.subjects,
             answer.witness,
             cost=self._cost(graph, start),
+            discipline=graph.discipline.value,
         )
 
     @staticmethod

@@ -1,6 +1,6 @@
 """Splitting a net over its controllers, proving the parts equal to the whole, and sealing what is proved.
 
-What a program imports from here: `split` gives the `Decomposition` of a net over its controllers and `join` undoes it;
+What a program imports from here: `split` gives the `Decomposition` of a net over its controllers;
 `table_text` is its coordinator table as the paper prints it. `prove` discharges the obligations, Eq. (7)-(10) and what
 belongs to them, in a `ProofReport`. `make_bundle` does all this for a net that `firable.analysis` has checked, and
 refuses what is not proved. `explore_protocol` follows every run of a protocol `Variant`, with its kind of `Votes`,
@@ -16,7 +16,6 @@ The functions `assumptions` and `nonpersistent` are imported from the modules `a
 """
 
 from firable.decompose.bundling import make_bundle
-from firable.decompose.joining import join
 from firable.decompose.protocol import ProtocolVerdict, Variant, Votes, explore_protocol
 from firable.decompose.proving import ProofReport, prove
 from firable.decompose.splitting import split
@@ -28,7 +27,6 @@ __all__ = [
     "Variant",
     "Votes",
     "explore_protocol",
-    "join",
     "make_bundle",
     "prove",
     "split",

@@ -123,6 +123,7 @@ class _VerdictRecord(_Record):
     evidence: tuple[str, ...] = ()
     markings: int | None = None
     edges: int | None = None
+    discipline: str = ""
 
     def verdict(self) -> Verdict:
         seen = self.witness
@@ -139,6 +140,7 @@ class _VerdictRecord(_Record):
             Witness(seen.firings, seen.cycle, seen.marking, seen.assignment, seen.note) if seen else None,
             self.evidence,
             Cost(self.markings, self.edges),
+            self.discipline,
         )
 
 

@@ -11,9 +11,12 @@ To require a further verdict: its name in `required_verdicts`, and a test that t
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from firable.nets.diagnostics import Diagnostic
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.joining import join
+from firable.nets.net import Net
 from firable.nets.verdict import Verdict, Weight
 
 if TYPE_CHECKING:
@@ -21,6 +24,9 @@ if TYPE_CHECKING:
     from firable.nets.decomposition import Decomposition
 
 _REMEDY: Final = "make the bundle anew with `firable bundle`"
+
+EXECUTED_BY: Final = "interleaving"
+"""The discipline of the executor."""
 
 CHECKED: Final = ("contact-free", "deadlock-free", "quasi-live", "conflicting-commands", "shared-completions")
 """The verdicts on every net, whatever its file states, without which it may not run."""
@@ -33,20 +39,29 @@ def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
     transition, Eq. (9)-(10) for every place, ownership, M0, commands, and arbitration.
     """
     net = decomposition.net
-    yield from CHECKED
-    yield from (f"property.{prop.name}" for prop in net.properties)
+    yield from _required_of_the_net(net)
     yield from (f"{equation}.{t.name}" for t in net.transitions for equation in ("eq7", "eq8"))
     yield from (f"eq9-10.{place.name}" for place in net.places)
     yield from ("ownership", "initial-marking", "commands", "arbitration")
     yield from (f"arbitration.{group.name}" for group in decomposition.groups)
 
 
+def _required_of_the_net(net: Net) -> Iterator[str]:
+    """The verdicts on the central net, which depend on how transitions fire."""
+    yield from CHECKED
+    yield from (f"property.{prop.name}" for prop in net.properties)
+
+
 def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
     """What keeps a bundle from running (F5002): nothing where every required verdict is PROVED, with its evidence.
 
-    Required is what the net requires, and whatever else a verdict of the bundle says that it does.
+    Required is what the net requires, and whatever else a verdict of the bundle says that it does. Verdicts on the net
+    must be on interleaving, by which it is executed; obligations must bring what another solver can check; and the
+    subnets must join into the very net.
     """
     problems = []
+    on_the_net = set(_required_of_the_net(bundle.net))
+    obligations = set(required_verdicts(bundle.decomposition)) - on_the_net
     by_name: dict[str, list[Verdict]] = {}
     for verdict in bundle.verdicts:
         by_name.setdefault(verdict.name, []).append(verdict)
@@ -61,11 +76,36 @@ def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
                 message = f"'{name}' is {verdict.status.value}, not proved: {verdict.statement}"
                 hint = verdict.hint or "`firable check` and `firable prove` show why"
                 problems.append(Diagnostic("F5002", message, hint, subject))
+            elif name in on_the_net and verdict.discipline != EXECUTED_BY:
+                proved_of = f"'{name}' is proved of the discipline '{verdict.discipline}'"
+                message = f"{proved_of}, and the net is executed by {EXECUTED_BY}"
+                problems.append(Diagnostic("F5002", message, _REMEDY, subject))
+            elif name in obligations and not verdict.evidence:
+                message = f"'{name}' is said to be proved, without evidence"
+                problems.append(Diagnostic("F5002", message, _REMEDY, subject))
             for file in verdict.evidence:
                 if file not in bundle.evidence:
                     message = f"the evidence '{file}' for '{name}' is missing"
                     problems.append(Diagnostic("F5002", message, _REMEDY, subject))
+    if not _joins(bundle.decomposition):
+        message = "the subnets do not make the net together, of which the verdicts are"
+        problems.append(Diagnostic("F5002", message, _REMEDY, ("subnets",)))
     return (*problems, *_undecided_conflicts(bundle.decomposition))
+
+
+def _joins(decomposition: Decomposition) -> bool:
+    """Whether the subnets and the table make the central net, but for numbers that the split gave, and words."""
+    try:
+        joined = join(decomposition)
+    except (KeyError, InputError):  # a part without its subnet, or subnets that make no net
+        return False
+    return _bare(joined) == _bare(decomposition.net)
+
+
+def _bare(net: Net) -> Net:
+    return replace(
+        net, transitions=tuple(replace(transition, number=None, description="") for transition in net.transitions)
+    )
 
 
 def _undecided_conflicts(decomposition: Decomposition) -> Iterator[Diagnostic]:

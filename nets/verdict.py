@@ -59,7 +59,8 @@ class Cost:
 class Verdict:
     """The verdict on the property `name`, which says `statement`.
 
-    `bound` says how far an UNKNOWN was looked at. `subjects` are the transitions or places concerned. `evidence` names
+    `discipline` says how transitions fire, where the verdict depends on it: `interleaving` or `step`. `bound` says how
+    far an UNKNOWN was looked at. `subjects` are the transitions or places concerned. `evidence` names
     the files that an independent checker reads.
     """
 
@@ -75,6 +76,7 @@ class Verdict:
     witness: Witness | None = None
     evidence: tuple[str, ...] = ()
     cost: Cost = Cost()
+    discipline: str = ""
 
     @property
     def holds(self) -> bool:
@@ -90,7 +92,7 @@ class Verdict:
             "method": self.method,
             "weight": self.weight.value,
         }
-        for key in ("code", "hint", "bound"):
+        for key in ("discipline", "code", "hint", "bound"):
             if getattr(self, key):
                 data[key] = getattr(self, key)
         for key in ("subjects", "evidence"):

@@ -6,12 +6,12 @@ import pytest
 from support.published import COORDINATOR_TABLE
 from support.reference import Case, cases, load_net
 
-from firable.decompose.joining import join
 from firable.decompose.splitting import participants, split, unowned
 from firable.decompose.table import table_text
 from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.decomposition import Decomposition, Part
 from firable.nets.diagnostics import InputError
+from firable.nets.joining import join
 from firable.nets.net import Arbiter, Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 
 ALL_NETS = [

@@ -463,7 +463,11 @@ def test_command_order_of_a_wrong_net_crashes_in_the_cell() -> None:
 def proved_bundle(cell: str = "one_robot") -> Bundle:
     decomposition = decomposition_of(cell)
     names = dict.fromkeys(required_verdicts(decomposition))
-    return Bundle(decomposition, tuple(Verdict(name, Status.PROVED, "holds", "by hand") for name in names))
+    verdicts = (
+        Verdict(name, Status.PROVED, "holds", "by hand", evidence=("file",), discipline="interleaving")
+        for name in names
+    )
+    return Bundle(decomposition, tuple(verdicts), {"file": "unsat"})
 
 
 def test_proved_bundle_is_loaded_and_run(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from firable.nets.diagnostics import InputError
 from firable.nets.formula import Holds
 from firable.nets.interchange import canonical_json
 from firable.nets.net import ArbitrationRule, Command, Controller, Net, Place, Property, PropertyKind, Transition
-from firable.nets.right_to_run import required_verdicts, unproved
+from firable.nets.right_to_run import CHECKED, required_verdicts, unproved
 from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
 
 A, B = Controller("a"), Controller("b")
@@ -43,8 +43,11 @@ DECOMPOSITION = Decomposition(
     (Coordinated("G", 1, (Part("a", "t0-1"), Part("b", "t1-11")), "over"), Coordinated("l", None, (Part("a", "l"),))),
     (ArbitrationGroup("next", ("l", "G"), (), ArbitrationRule.PRIORITY),),
 )
+ON_THE_NET = (*CHECKED, "property.apart")
 VERDICTS = tuple(
-    Verdict(name, Status.PROVED, "it holds", "by hand", evidence=("eq7-G.smt2",) if name == "eq7.G" else ())
+    Verdict(name, Status.PROVED, "it holds", "by hand", discipline="interleaving")
+    if name in ON_THE_NET
+    else Verdict(name, Status.PROVED, "it holds", "by hand", evidence=("eq7-G.smt2",))
     for name in required_verdicts(DECOMPOSITION)
 )
 BUNDLE = Bundle(DECOMPOSITION, VERDICTS, {"eq7-G.smt2": "(check-sat)\n"})
@@ -192,6 +195,7 @@ def test_every_field_of_a_verdict_is_read_back() -> None:
         witness=witness,
         evidence=("eq7-G.smt2",),
         cost=Cost(3, 0),
+        discipline="step",
     )
     assert all(getattr(full, field.name) for field in fields(full))
     bundle = replace(BUNDLE, verdicts=(*VERDICTS, full))
@@ -312,7 +316,25 @@ def test_each_required_verdict_must_be_there_and_proved(name: str) -> None:
 
 
 def test_proof_without_its_evidence_is_none() -> None:
-    assert [d.code for d in unproved(replace(BUNDLE, evidence={}))] == ["F5002"]
+    missing = unproved(replace(BUNDLE, evidence={}))
+    assert {d.code for d in missing} == {"F5002"}
+    assert {d.subject[1] for d in missing} == {v.name for v in VERDICTS if v.evidence}
+    bare = unproved(replace(BUNDLE, verdicts=tuple(replace(v, evidence=()) for v in VERDICTS)))
+    assert {d.subject[1] for d in bare} == {v.name for v in VERDICTS if v.evidence}
+
+
+@pytest.mark.parametrize("name", ON_THE_NET)
+def test_a_verdict_on_another_discipline_than_that_of_the_executor_gives_no_right_to_run(name: str) -> None:
+    stepped = tuple(replace(v, discipline="step") if v.name == name else v for v in VERDICTS)
+    assert [(d.code, d.subject) for d in unproved(replace(BUNDLE, verdicts=stepped))] == [("F5002", ("verdicts", name))]
+
+
+def test_subnets_that_do_not_make_the_net_may_not_run() -> None:
+    first, second = DECOMPOSITION.subnets
+    idle = replace(first, transitions=first.transitions[:1])
+    for subnets in ((idle, second), (first,), (first, replace(second, places=(replace(Q, marked=True),)))):
+        found = unproved(replace(BUNDLE, decomposition=replace(DECOMPOSITION, subnets=subnets)))
+        assert [(d.code, d.subject) for d in found] == [("F5002", ("subnets",))]
 
 
 def test_conflict_that_no_group_decides_may_not_run() -> None:
