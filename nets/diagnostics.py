@@ -66,6 +66,8 @@ CODES: Final[dict[str, str]] = {
     "F2018": "a signal that is both a sensor and a completion",
     "F2019": "the owner and the name of a place or signal disagree",
     "F2020": "a change of the net that would change its meaning",
+    "F2021": "unknown source of a gate",
+    "F2022": "double gate",
     # F3: analysis
     "F3001": "a machine is started that no command ever stops",
     "F3002": "an output signal on a place marked in M0",

@@ -52,7 +52,7 @@ PROBLEMS_MAX: Final = 100  # enough to join and to read; a file of noise has mil
 def read_net(path: str | Path) -> Net:
     """Read a net file.
 
-    Raises `InputError` with the position of every problem: F1001-F1012 for the text, F2001-F2019 for the net, but for
+    Raises `InputError` with the position of every problem: F1001-F1012 for the text, F2001-F2022 for the net, but for
     F2010 and F2011: the text cannot say the one, and only a split asks for the other.
     """
     return read_positioned(path)[0]

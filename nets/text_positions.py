@@ -22,10 +22,10 @@ from firable.nets.yaml_tree import Mapping, Node, Scalar, Sequence, node_span, n
 
 DIAGNOSTICS_MAX: Final = 20
 
-_SECOND: Final = frozenset({"F2001", "F2006", "F2007"})
+_SECOND: Final = frozenset({"F2001", "F2006", "F2007", "F2022"})
 """What is about the second of two equal names."""
 
-_UNKNOWN: Final = frozenset({"F2002", "F2003", "F2004"})
+_UNKNOWN: Final = frozenset({"F2002", "F2003", "F2004", "F2021"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -163,7 +163,7 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
             subject: Subject = ("transitions", transition.name, key, name)
             if name in seen:
                 yield Diagnostic(
-                    "F2007",
+                    "F2022" if is_gate else "F2007",
                     f"'{name}' stands twice in `{key}` of '{transition.name}'",
                     "arcs and gates are sets, without weights: write it once",
                     subject,
@@ -191,7 +191,7 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
             elif not is_gate:
                 yield _unknown("F2002", "place", name, sorted(places), subject)
             elif name not in signals:
-                yield _unknown("F2002", "place or signal", name, sorted(places | signals), subject)
+                yield _unknown("F2021", "place or signal", name, sorted(places | signals), subject)
     seen_gates: set[ExternalGate] = set()
     for gate in transition.external:
         subject = ("transitions", transition.name, "if" if gate.wanted else "unless", gate.signal)
@@ -199,7 +199,7 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
             yield _unknown("F2003", "signal", gate.signal, sorted(signals), subject)
         if gate in seen_gates:
             yield Diagnostic(
-                "F2007", f"the gate '{gate.signal}' of '{transition.name}' stands twice", "write it once", subject
+                "F2022", f"the gate '{gate.signal}' of '{transition.name}' stands twice", "write it once", subject
             )
         seen_gates.add(gate)
 

@@ -28,7 +28,7 @@ MISTAKES: dict[str, tuple[Callable[[str], str], str]] = {
     "a wrong name": (lambda text: text.replace("to: robot.busy}", "to: robot.buzy}"), "F2002"),
     "wrong indentation": (lambda text: text.replace("    start", "   start"), "F1005"),
     "a missing owner": (lambda text: text.replace("from: robot.free", "from: free"), "F2002"),
-    "an unknown gate": (lambda text: text.replace("to: robot.busy}", "to: robot.busy, if: robot.ready}"), "F2002"),
+    "an unknown gate": (lambda text: text.replace("to: robot.busy}", "to: robot.busy, if: robot.ready}"), "F2021"),
     "a self-loop": (lambda text: text.replace("to: robot.busy}", "to: [robot.busy, robot.free]}"), "F2009"),
     "a duplicate key": (lambda text: text + "  end: {from: robot.busy, to: robot.free}\n", "F1006"),
     "an unknown key": (lambda text: text.replace("cell: small", "cell: small\nplaces_: {}"), "F1008"),
