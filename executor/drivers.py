@@ -88,6 +88,8 @@ class SimulatedDriver:
     def __init__(self, plant: Plant, net: Net) -> None:
         self.plant = plant
         self.sensors = {signal.name for signal in net.signals if signal.kind is SignalKind.SENSOR}
+        self.shown = dict(plant.shown)
+        """What each sensor showed in the report told last; the plant may have gone on when a report is told."""
         self.awaited: dict[str, _Awaited] = {}
         """For each completion signal, the command that it will complete."""
         self.tickets: dict[int, _Awaited] = {}
@@ -149,6 +151,7 @@ class SimulatedDriver:
                     self._listener.driver_fault(machine, message)
 
     def _sensor(self, signal: str, value: bool) -> None:
+        self.shown[signal] = value
         if signal in self.sensors:
             self._listener.signal(signal, value, None)
         elif (awaited := self.awaited.get(signal)) is not None:
@@ -156,7 +159,7 @@ class SimulatedDriver:
 
     def _form(self, awaited: _Awaited) -> None:
         """Set the completion bit, if its command is acknowledged and its sensor, if it has one, agrees."""
-        shown = self.plant.shown.get(awaited.signal, True)
+        shown = self.shown.get(awaited.signal, True)
         if awaited.acknowledged and shown and self.awaited.get(awaited.signal) is awaited:
             del self.awaited[awaited.signal]
             self._listener.signal(awaited.signal, value=True, entry=awaited.entry)

@@ -142,6 +142,12 @@ def test_command_that_never_completes_is_a_fault_and_not_a_deadlock() -> None:
     assert len(report.delivered) == 1
 
 
+def test_completion_is_formed_where_its_sensor_drops_at_the_same_instant() -> None:
+    # So it is, too, where a slow host learns at one time of all that has happened in the meantime.
+    report, _ = run_cell("one_robot", 3, plant=replace_text("one_robot", "after_s: 1", "after_s: 0"))
+    assert report.state is State.DONE
+
+
 def test_slow_command_is_no_fault_within_its_limit() -> None:
     slow = replace_text("one_robot", "takes_s: 12.0", "takes_s: 110")
     assert run_cell("one_robot", 2, plant=slow)[0].state is State.DONE
