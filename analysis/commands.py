@@ -26,13 +26,14 @@ sensor by itself.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 
 from firable.analysis.question import Answer, Question, listed, no, yes
 from firable.analysis.reachability import Column, ReachabilityGraph, first, indexes
-from firable.nets.net import Net
+from firable.nets.net import Net, Place
 from firable.nets.verdict import Verdict, Weight
 from firable.semantics.player import Player
 
@@ -71,28 +72,16 @@ def commands_agree(graph: ReachabilityGraph) -> Verdict:
         hint="let the two places exclude each other, by a place that stands for the machine being free",
     )
 
-    def find() -> Answer:
-        net, clashes = graph.net, []
-        for machine, names in machines(net).items():
-            places = sorted(p for sending in names.values() for p in sending)
-            # The columns of one machine at a time: there are few.
-            columns = {p: graph.marked(p) for p in places}
-            for k, p in enumerate(places):
-                for q in places[k + 1 :]:
-                    if net.places[p].command == net.places[q].command:
-                        continue
-                    index = first(columns[p] & columns[q])
-                    if index is not None:
-                        clashes.append((index, machine, p, q))
-        if not clashes:
-            graph.require_complete()
-            return yes()
-        index, machine, p, q = min(clashes)
-        note = f"{machine} is under '{net.places[p].command}' and '{net.places[q].command}'"
-        subjects = dict.fromkeys(net.places[place].name for *_, p, q in sorted(clashes) for place in (p, q))
-        return no(tuple(subjects), graph.witness(index, note))
-
-    return question.ask(graph, find)
+    places = {
+        machine: sorted(p for sent in names.values() for p in sent) for machine, names in machines(graph.net).items()
+    }
+    return _kept_apart(
+        graph,
+        question,
+        places,
+        lambda p, q: p.command != q.command,
+        lambda machine, p, q: f"{machine} is under '{p.command}' and '{q.command}'",
+    )
 
 
 def completions_apart(graph: ReachabilityGraph) -> Verdict:
@@ -104,26 +93,43 @@ def completions_apart(graph: ReachabilityGraph) -> Verdict:
         hint="give each of the two commands a completion signal of its own",
     )
 
+    waiting: dict[str, list[int]] = {}
+    for p, place in enumerate(graph.net.places):
+        if place.completion is not None:
+            waiting.setdefault(place.completion, []).append(p)
+    return _kept_apart(
+        graph,
+        question,
+        waiting,
+        lambda p, q: p.completion == q.completion,
+        lambda signal, p, q: f"both '{p.command}' and '{q.command}' wait for {signal}",
+    )
+
+
+def _kept_apart(
+    graph: ReachabilityGraph,
+    question: Question,
+    groups: Mapping[str, Sequence[int]],
+    clash: Callable[[Place, Place], bool],
+    note: Callable[[str, Place, Place], str],
+) -> Verdict:
+    """No two clashing places of a group hold a token at one reachable marking; violated by the nearest that do."""
+
     def find() -> Answer:
-        net, waiting = graph.net, dict[str, list[int]]()
-        for p, place in enumerate(net.places):
-            if place.completion is not None:
-                waiting.setdefault(place.completion, []).append(p)
-        clashes = []
-        for signal, places in waiting.items():
-            columns = [graph.marked(p) for p in places] if places[1:] else []
-            for k, column in enumerate(columns):
-                for j in range(k):
-                    index = first(column & columns[j])
-                    if index is not None:
-                        clashes.append((index, signal, places[j], places[k]))
+        places, clashes = graph.net.places, []
+        for name, group in groups.items():
+            pairs = [(p, q) for p, q in combinations(group, 2) if clash(places[p], places[q])]
+            columns = {p: graph.marked(p) for p in dict.fromkeys(p for pair in pairs for p in pair)}
+            for p, q in pairs:
+                index = first(columns[p] & columns[q])
+                if index is not None:
+                    clashes.append((index, name, p, q))
         if not clashes:
             graph.require_complete()
             return yes()
-        index, signal, p, q = min(clashes)
-        note = f"both '{net.places[p].command}' and '{net.places[q].command}' wait for {signal}"
-        subjects = dict.fromkeys(net.places[place].name for *_, p, q in sorted(clashes) for place in (p, q))
-        return no(tuple(subjects), graph.witness(index, note))
+        index, name, p, q = min(clashes)
+        subjects = dict.fromkeys(places[place].name for *_, p, q in sorted(clashes) for place in (p, q))
+        return no(tuple(subjects), graph.witness(index, note(name, places[p], places[q])))
 
     return question.ask(graph, find)
 
