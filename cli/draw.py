@@ -31,8 +31,8 @@ def draw(net: str, output: str, marking: str | None, trace: str | None) -> int:
         raise click.UsageError("--marking and --trace both say which tokens to show: leave one out")
     loaded = load_net(net).net
     if trace is not None:
+        from firable.semantics.replaying import replay as play
         from firable.semantics.trace import Fired, read_trace
-        from firable.semantics.trace import replay as play
 
         read = read_trace(trace)
         done = play(loaded, read)

@@ -59,7 +59,7 @@ def _report(file: str, argument: str) -> Report:
 def _verdict(net: Net, trace: Trace) -> tuple[Verdict, tuple[str, ...]]:
     from firable.nets.diagnostics import InputError
     from firable.nets.verdict import Status, Verdict
-    from firable.semantics.trace import replay as play
+    from firable.semantics.replaying import replay as play
 
     name, method = "trace", "replay by the reference player"
     try:

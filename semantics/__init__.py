@@ -17,7 +17,8 @@ The rule itself is in `firable.semantics.firing`, over the Boolean algebras of `
 from firable.semantics.arbitration import Arbitration
 from firable.semantics.judgement import Judgement, judge
 from firable.semantics.player import NotFirableError, Player
-from firable.semantics.trace import Discipline, Replay, Trace, read_trace, replay
+from firable.semantics.replaying import Replay, replay
+from firable.semantics.trace import Discipline, Trace, read_trace
 
 __all__ = [
     "Arbitration",

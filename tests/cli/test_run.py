@@ -12,7 +12,8 @@ import pytest
 
 from firable.cli.main import main
 from firable.nets.catalogue import catalogue_net, catalogue_path
-from firable.semantics.trace import Noted, read_trace, replay
+from firable.semantics.replaying import replay
+from firable.semantics.trace import Noted, read_trace
 
 PLANT = catalogue_path("one_robot").with_name("one_robot.plant.yaml")
 

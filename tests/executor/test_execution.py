@@ -33,7 +33,8 @@ from firable.nets.text import parse_net
 from firable.nets.verdict import Status, Verdict
 from firable.semantics.judgement import Judgement, judge
 from firable.semantics.player import Player
-from firable.semantics.trace import CommandSent, Fired, Noted, Trace, parse_trace, replay
+from firable.semantics.replaying import replay
+from firable.semantics.trace import CommandSent, Fired, Noted, Trace, parse_trace
 
 CELLS = ["one_robot", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"]
 

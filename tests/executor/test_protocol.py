@@ -46,7 +46,7 @@ from firable.nets.net import (
     Transition,
 )
 from firable.semantics.player import Player
-from firable.semantics.trace import replay
+from firable.semantics.replaying import replay
 
 SMALL = [
     *("local_conflict", "local_gate", "local_output_conflict", "read_before_order", "remote_gate", "ring"),

@@ -6,6 +6,7 @@ import pytest
 
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Command, ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.semantics.replaying import replay
 from firable.semantics.trace import (
     CommandSent,
     Discipline,
@@ -17,7 +18,6 @@ from firable.semantics.trace import (
     SignalChanged,
     Trace,
     parse_trace,
-    replay,
 )
 
 NET = Net(
