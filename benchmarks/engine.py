@@ -124,6 +124,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="speed and memory of the explicit engine")
     parser.add_argument("--repeat", type=int, default=3, help="runs of which the best counts")
     repeat = parser.parse_args().repeat
+    if repeat < 1:
+        parser.error("--repeat must be at least 1")
     build = ["cargo", "build", "--release", "--locked", "--quiet", "--example", "std_hash_set"]
     subprocess.run(build, cwd=CRATE, check=True)
 
@@ -133,7 +135,7 @@ def main() -> None:
     for make in FAMILIES:
         family = make()
         graph = explored(family)
-        seconds = min(graph.seconds, *(explored(family).seconds for _ in range(repeat - 1)))
+        seconds = min([graph.seconds, *(explored(family).seconds for _ in range(repeat - 1))])
         baseline = [plain(family) for _ in range(repeat)]
         markings, edges, plain_seconds = min(baseline, key=lambda run: run[2])
         if (markings, edges) != (graph.n_markings, graph.n_edges):
