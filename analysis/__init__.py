@@ -22,11 +22,11 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from firable.analysis.check import CheckReport, Figures, report_on
     from firable.analysis.deadline import Deadline
-    from firable.analysis.equivalence import isomorphic, weakly_bisimilar
-    from firable.analysis.invariants import p_invariants, t_invariants
-    from firable.analysis.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
-    from firable.analysis.siphons import deadlock_trap, minimal_siphons, minimal_traps
-    from firable.analysis.starvation import eager_run
+    from firable.analysis.spaces.equivalence import isomorphic, weakly_bisimilar
+    from firable.analysis.spaces.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
+    from firable.analysis.structure.invariants import p_invariants, t_invariants
+    from firable.analysis.structure.siphons import deadlock_trap, minimal_siphons, minimal_traps
+    from firable.analysis.verdicts.starvation import eager_run
 
 __all__ = [
     "Budget",
@@ -51,11 +51,11 @@ __all__ = [
 _MODULES: Final = {
     "check": ("CheckReport", "Figures", "report_on"),
     "deadline": ("Deadline",),
-    "equivalence": ("isomorphic", "weakly_bisimilar"),
-    "invariants": ("p_invariants", "t_invariants"),
-    "reachability": ("Budget", "BudgetExceeded", "IncompleteGraph", "ReachabilityGraph", "explore"),
-    "siphons": ("deadlock_trap", "minimal_siphons", "minimal_traps"),
-    "starvation": ("eager_run",),
+    "spaces.equivalence": ("isomorphic", "weakly_bisimilar"),
+    "structure.invariants": ("p_invariants", "t_invariants"),
+    "spaces.reachability": ("Budget", "BudgetExceeded", "IncompleteGraph", "ReachabilityGraph", "explore"),
+    "structure.siphons": ("deadlock_trap", "minimal_siphons", "minimal_traps"),
+    "verdicts.starvation": ("eager_run",),
 }
 _MODULE_OF: Final = {name: module for module, names in _MODULES.items() for name in names}
 

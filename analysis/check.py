@@ -15,20 +15,20 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
-from firable.analysis import behaviour as behaviour_of
-from firable.analysis import conflict_verdicts as conflict
-from firable.analysis.behaviour import Behaviour
-from firable.analysis.commands import (
+from firable.analysis.question import Answer, Question
+from firable.analysis.spaces.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
+from firable.analysis.verdicts import behaviour as behaviour_of
+from firable.analysis.verdicts import conflicts as conflict
+from firable.analysis.verdicts.behaviour import Behaviour
+from firable.analysis.verdicts.commands import (
     commands_agree,
     completions_apart,
     machines_stopped,
     no_command_in_initial_marking,
 )
-from firable.analysis.conflict_verdicts import ConflictAnalysis, Pairs
-from firable.analysis.properties import decide_properties
-from firable.analysis.question import Answer, Question
-from firable.analysis.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
-from firable.analysis.starvation import starvation_free
+from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pairs
+from firable.analysis.verdicts.properties import decide_properties
+from firable.analysis.verdicts.starvation import starvation_free
 from firable.nets.net import Net
 from firable.nets.verdict import Status, Verdict, Weight, overall
 from firable.semantics.player import Player

@@ -1,5 +1,8 @@
 """A deadline: the moment after which a technique stops and hands out what it has found so far.
 
+The moment comes by the clock, or because somebody no longer needs the answer: techniques that race each other share
+a flag that the winner sets.
+
 A limit of seconds for each question to a solver bounds nothing where there are thousands of questions. So several
 techniques share one moment, and each of them asks whether it is over between two steps of its own.
 """
@@ -8,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil, inf
+from threading import Event
 from time import monotonic
 from typing import Final
 
@@ -16,23 +20,29 @@ _MILLISECONDS_MAX: Final = 2**31 - 1  # the longest timeout of z3 that is safe t
 
 @dataclass(frozen=True, slots=True)
 class Deadline:
-    """A moment of the monotonic clock, in seconds; by default it never comes."""
+    """A moment of the monotonic clock, in seconds, or the setting of a flag; by default it never comes."""
 
     at_seconds: float = inf
+    cancelled: Event | None = None
 
     @classmethod
-    def after(cls, seconds: float) -> Deadline:
-        """The moment that is so many seconds away.
+    def after(cls, seconds: float, cancelled: Event | None = None) -> Deadline:
+        """The moment that is so many seconds away, or the setting of the flag.
 
         >>> Deadline.after(0).over, Deadline().over
         (True, False)
         """
-        return cls(monotonic() + seconds)
+        return cls(monotonic() + seconds, cancelled)
 
     @property
     def over(self) -> bool:
         """Whether the moment has come."""
-        return monotonic() >= self.at_seconds
+        return monotonic() >= self.at_seconds or (self.cancelled is not None and self.cancelled.is_set())
+
+    @property
+    def left_seconds(self) -> float | None:
+        """The time left, not below 0; None where the clock sets no end."""
+        return None if self.at_seconds == inf else max(0.0, self.at_seconds - monotonic())
 
     @property
     def left_milliseconds(self) -> int:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from time import perf_counter
 
-from firable.analysis.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
+from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
 from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
 from firable.semantics.trace import Discipline
 

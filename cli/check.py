@@ -14,7 +14,7 @@ from firable.cli.structure import structure_json, structure_lines
 
 if TYPE_CHECKING:
     from firable.analysis.check import CheckReport
-    from firable.analysis.reachability import Budget
+    from firable.analysis.spaces.reachability import Budget
 
 
 @click.command(short_help="Check nets: deadlock, contact, liveness, conflicts, their own properties.")

@@ -11,7 +11,7 @@ import click
 from firable.cli.report import Report, document, exit_code_of, worst
 
 if TYPE_CHECKING:
-    from firable.analysis.reachability import Budget
+    from firable.analysis.spaces.reachability import Budget
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.loading import Loaded
 
@@ -60,7 +60,7 @@ def analysis_options(command: F) -> F:
 
 def budget(max_markings: int, max_memory: int, max_seconds: float | None) -> Budget:
     """The budget that the options name."""
-    from firable.analysis.reachability import Budget
+    from firable.analysis.spaces.reachability import Budget
 
     return Budget(max_markings, max_memory * _MEBIBYTE, max_seconds)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from firable.analysis.deadline import Deadline
-    from firable.analysis.invariants import Invariants
+    from firable.analysis.structure.invariants import Invariants
     from firable.nets.net import Net
 
 T = TypeVar("T")
@@ -27,9 +27,9 @@ def structure_json(net: Net, *, contact_free: bool | None, seconds: float | None
     those not finished are not `complete`.
     """
     from firable.analysis.deadline import Deadline
-    from firable.analysis.invariants import Invariants, p_invariants, t_invariants
-    from firable.analysis.net_class import net_class
-    from firable.analysis.siphons import DeadlockTrap, PlaceSets, deadlock_trap, minimal_traps
+    from firable.analysis.structure.invariants import Invariants, p_invariants, t_invariants
+    from firable.analysis.structure.net_class import net_class
+    from firable.analysis.structure.siphons import DeadlockTrap, PlaceSets, deadlock_trap, minimal_traps
 
     deadline, ended_early = Deadline.after(SECONDS_DEFAULT if seconds is None else seconds), ""
 

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
 
-from firable.analysis.smt import Term, Terms
+from firable.analysis.induction.smt import Term, Terms
 from firable.decompose.splitting import participants
 from firable.nets.decomposition import ArbitrationGroup, Decomposition
 from firable.nets.formula import Start

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from firable.analysis.smt import Answer, Decision, Operator, decide, smtlib, value, variables
+from firable.analysis.induction.smt import Answer, Decision, Operator, decide, smtlib, value, variables
 from firable.decompose.obligations import Obligation, obligations
 from firable.nets.bundle import file_stem
 from firable.nets.decomposition import Decomposition

@@ -9,14 +9,14 @@ from support.reference import load_net, reference_names
 from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
-from firable.analysis.commands import (
+from firable.analysis.spaces.reachability import Budget, explore
+from firable.analysis.verdicts.commands import (
     commands_agree,
     completions_apart,
     entries,
     machines_stopped,
     no_command_in_initial_marking,
 )
-from firable.analysis.reachability import Budget, explore
 from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.net import Command, ExternalGate, Marking, Net, Place, Signal, SignalKind, Transition
 from firable.nets.verdict import Status, Weight, overall

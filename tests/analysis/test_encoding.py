@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from support.dense_nets import dense_nets
 
-from firable.analysis.encoding import Relation, interleaving_relation, step_relation
-from firable.analysis.smt import Answer, Term, Terms, decide, value
+from firable.analysis.induction.encoding import Relation, interleaving_relation, step_relation
+from firable.analysis.induction.smt import Answer, Term, Terms, decide, value
 from firable.nets.net import ExternalGate, Marking, Net, Place, Signal, Transition
 from firable.semantics.player import FiringSet, Player
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from support.reference import load_net
 from support.ring_nets import ring_nets
 
-from firable.analysis.equivalence import isomorphic, weakly_bisimilar
-from firable.analysis.reachability import Budget, IncompleteGraph, explore
+from firable.analysis.spaces.equivalence import isomorphic, weakly_bisimilar
+from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore
 from firable.nets.net import Net, Place, Transition
 from firable.semantics.complement import complement
 from firable.semantics.player import Player

@@ -11,7 +11,7 @@ from support.reference import load_net, reference_names
 from support.ring_nets import ring_nets
 
 from firable.analysis.deadline import Deadline
-from firable.analysis.invariants import incidence, p_invariants, rank, t_invariants
+from firable.analysis.structure.invariants import incidence, p_invariants, rank, t_invariants
 from firable.nets.net import Net, Place, Transition
 from firable.semantics.player import Player
 

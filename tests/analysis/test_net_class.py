@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from support.dense_nets import dense_nets
 from support.reference import load_net
 
-from firable.analysis.net_class import arcs, net_class
+from firable.analysis.structure.net_class import arcs, net_class
 from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
 
 

@@ -11,9 +11,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from support.ring_nets import ring_nets
 
-from firable.analysis.leads_to import check_lasso
-from firable.analysis.properties import decide_property, statement
-from firable.analysis.reachability import Budget, ReachabilityGraph, WitnessError, explore
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, WitnessError, explore
+from firable.analysis.verdicts.leads_to import check_lasso
+from firable.analysis.verdicts.properties import decide_property, statement
 from firable.nets.formula import Formula, parse_formula
 from firable.nets.net import Fairness, Marking, Net, Place, Property, PropertyKind, Transition
 from firable.nets.verdict import Status, Verdict

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from support.reference import load_net
 from support.ring_nets import ring_nets
 
-from firable.analysis import reachability
 from firable.analysis.check import check
-from firable.analysis.reachability import Budget, IncompleteGraph, WitnessError, explore, first
+from firable.analysis.spaces import reachability
+from firable.analysis.spaces.reachability import Budget, IncompleteGraph, WitnessError, explore, first
 from firable.nets.formula import parse_formula
 from firable.nets.net import Net, Place, Transition
 from firable.nets.verdict import Status

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from support.reference import Case, cases, load_net, local
 
-from firable.analysis.behaviour import Behaviour
 from firable.analysis.check import CheckReport, check
-from firable.analysis.commands import entries
-from firable.analysis.equivalence import isomorphic
-from firable.analysis.reachability import explore
-from firable.analysis.starvation import eager_run, scan, starved
+from firable.analysis.spaces.equivalence import isomorphic
+from firable.analysis.spaces.reachability import explore
+from firable.analysis.verdicts.behaviour import Behaviour
+from firable.analysis.verdicts.commands import entries
+from firable.analysis.verdicts.starvation import eager_run, scan, starved
 from firable.nets.net import Arbiter, ArbitrationRule, Net
 from firable.semantics.arbitration import per_place_choice
 from firable.semantics.complement import complement

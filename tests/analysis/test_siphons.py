@@ -14,7 +14,13 @@ from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
 from firable.analysis.deadline import Deadline
-from firable.analysis.siphons import deadlock_trap, largest_siphon, largest_trap, minimal_siphons, minimal_traps
+from firable.analysis.structure.siphons import (
+    deadlock_trap,
+    largest_siphon,
+    largest_trap,
+    minimal_siphons,
+    minimal_traps,
+)
 from firable.nets.net import Net, Place, Transition
 from firable.nets.verdict import Status
 from firable.semantics.player import Player
@@ -141,7 +147,7 @@ def test_siphons_that_the_deadline_leaves_unread_prove_nothing(monkeypatch: pyte
     net = load_net("cell1")
     found = minimal_siphons(net)
     assert found.complete
-    monkeypatch.setattr("firable.analysis.siphons.minimal_siphons", lambda *_, **__: found)
+    monkeypatch.setattr("firable.analysis.structure.siphons.minimal_siphons", lambda *_, **__: found)
     assert deadlock_trap(net, contact_free=True).excludes_deadlock
     assert not deadlock_trap(net, contact_free=True, deadline=Deadline.after(0)).excludes_deadlock
 

@@ -8,8 +8,20 @@ import z3
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firable.analysis.siphons import minimal_siphons
-from firable.analysis.smt import SEED, Answer, Operator, Term, Terms, decide, smtlib, subterms, symbol, value, variables
+from firable.analysis.induction.smt import (
+    SEED,
+    Answer,
+    Operator,
+    Term,
+    Terms,
+    decide,
+    smtlib,
+    subterms,
+    symbol,
+    value,
+    variables,
+)
+from firable.analysis.structure.siphons import minimal_siphons
 from firable.nets.net import Net, Place
 
 TERMS = Terms()

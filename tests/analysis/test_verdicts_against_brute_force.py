@@ -12,8 +12,8 @@ from support.reference import cases
 from support.ring_nets import ring_nets
 
 from firable.analysis.check import CheckReport, check, report_on
-from firable.analysis.conflict_verdicts import ConflictAnalysis
-from firable.analysis.reachability import Budget, IncompleteGraph, explore
+from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore
+from firable.analysis.verdicts.conflicts import ConflictAnalysis
 from firable.nets.net import Marking, Net, Place, Transition
 from firable.nets.verdict import Status, Witness
 from firable.semantics.conflict import gate_races, jointly_openable

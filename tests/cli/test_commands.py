@@ -106,7 +106,7 @@ def test_an_interrupted_check_shows_what_is_known(tmp_path: Path) -> None:
     net.write_text("\n".join(lines) + "\n")
     # The signal comes once the exploration runs: the interpreter's own thread sends it from beside the engine.
     script = (
-        "import os, signal, sys, threading, firable.analysis.reachability as r\n"
+        "import os, signal, sys, threading, firable.analysis.spaces.reachability as r\n"
         "from firable.cli.main import main\n"
         "engine = r._engine.explore\n"
         "def explore(*arguments, **options):\n"

@@ -12,8 +12,8 @@ from typing import Final
 
 import pytest
 
-from firable.analysis.behaviour import Behaviour
-from firable.analysis.reachability import explore
+from firable.analysis.spaces.reachability import explore
+from firable.analysis.verdicts.behaviour import Behaviour
 from firable.nets.pnml import read_pnml
 
 FOLDER = os.environ.get("FIRABLE_NETS", "")

@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 from support.reference import Case, cases, local
 
-from firable.analysis.behaviour import Behaviour
 from firable.analysis.check import self_loops
-from firable.analysis.commands import entries
-from firable.analysis.conflict_verdicts import ConflictAnalysis, Pair
-from firable.analysis.equivalence import isomorphic
-from firable.analysis.reachability import ReachabilityGraph, explore
-from firable.analysis.starvation import eager_run, scan, starved
+from firable.analysis.spaces.equivalence import isomorphic
+from firable.analysis.spaces.reachability import ReachabilityGraph, explore
+from firable.analysis.verdicts.behaviour import Behaviour
+from firable.analysis.verdicts.commands import entries
+from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pair
+from firable.analysis.verdicts.starvation import eager_run, scan, starved
 from firable.decompose.persistence import nonpersistent
 from firable.decompose.protocol import explore_protocol
 from firable.decompose.protocol_model import Variant

@@ -11,9 +11,9 @@ from itertools import islice
 import pytest
 from support.small_scope import Shape, all_nets, net_with
 
-from firable.analysis.encoding import Relation, interleaving_relation, step_relation
-from firable.analysis.reachability import explore
-from firable.analysis.smt import Answer, Term, Terms, decide
+from firable.analysis.induction.encoding import Relation, interleaving_relation, step_relation
+from firable.analysis.induction.smt import Answer, Term, Terms, decide
+from firable.analysis.spaces.reachability import explore
 from firable.nets.net import Marking, Net
 from firable.semantics.player import FiringSet, Player
 from firable.semantics.trace import Discipline

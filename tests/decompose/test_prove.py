@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from support.reference import load_net
 
 from firable.analysis.check import CheckReport, check
-from firable.analysis.smt import Terms, value
+from firable.analysis.induction.smt import Terms, value
 from firable.decompose.bundling import make_bundle
 from firable.decompose.obligations import greedy
 from firable.decompose.proving import ProofReport, prove
@@ -308,7 +308,7 @@ def test_refutation_shows_the_differing_assignment_in_the_names_of_the_net() -> 
 
 
 def test_out_of_time_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
-    from firable.analysis.smt import Answer, Decision
+    from firable.analysis.induction.smt import Answer, Decision
 
     monkeypatch.setattr("firable.decompose.proving.decide", lambda *_, **__: Decision(Answer.UNKNOWN, {}, "timeout"))
     report = prove(split(load_net("ring")))

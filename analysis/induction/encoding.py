@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from firable.analysis.smt import Term, Terms
+from firable.analysis.induction.smt import Term, Terms
 from firable.nets.net import Marking, Net
 from firable.semantics.conflict import conflicts
 from firable.semantics.firing import enabled, next_token

@@ -2,15 +2,15 @@
 
 Each kind is one temporal pattern over state formulas, with its own method and its own counterexample: `never` and
 `always` by looking at every marking, `reachable` by finding one, `always_possible` (AG EF p) by the backward closure
-of p, `leads_to` by fair components (`firable.analysis.leads_to`). The shortest firing sequence to a marking that
-violates the property is the evidence; for `reachable` the sequence is the proof.
+of p, `leads_to` by fair components (`firable.analysis.verdicts.leads_to`). The shortest firing sequence to a marking
+that violates the property is the evidence; for `reachable` the sequence is the proof.
 """
 
 from __future__ import annotations
 
-from firable.analysis.leads_to import leads_to
 from firable.analysis.question import Answer, Question, no, yes
-from firable.analysis.reachability import ReachabilityGraph, first
+from firable.analysis.spaces.reachability import ReachabilityGraph, first
+from firable.analysis.verdicts.leads_to import leads_to
 from firable.nets.formula import format_formula
 from firable.nets.net import Fairness, Property, PropertyKind
 from firable.nets.verdict import Verdict

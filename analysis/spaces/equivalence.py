@@ -20,7 +20,7 @@ from collections.abc import Mapping
 
 import networkx as nx
 
-from firable.analysis.reachability import ReachabilityGraph
+from firable.analysis.spaces.reachability import ReachabilityGraph
 
 Label = frozenset[str]
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from firable.analysis.question import Answer, Question, listed, no, yes
-from firable.analysis.reachability import Column, ReachabilityGraph, WitnessError, first
+from firable.analysis.spaces.reachability import Column, ReachabilityGraph, WitnessError, first
 from firable.nets.verdict import Verdict, Weight
 
 

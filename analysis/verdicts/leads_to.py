@@ -29,7 +29,7 @@ import numpy as np
 import numpy.typing as npt
 
 from firable.analysis.question import Answer, no, yes
-from firable.analysis.reachability import (
+from firable.analysis.spaces.reachability import (
     NO_COMPONENT,
     Column,
     Components,

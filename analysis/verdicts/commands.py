@@ -32,7 +32,7 @@ from itertools import combinations
 import numpy as np
 
 from firable.analysis.question import Answer, Question, listed, no, yes
-from firable.analysis.reachability import Column, ReachabilityGraph, first, indexes
+from firable.analysis.spaces.reachability import Column, ReachabilityGraph, first, indexes
 from firable.nets.net import Net, Place
 from firable.nets.verdict import Verdict, Weight
 from firable.semantics.player import Player

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from firable.analysis.question import Answer, Question, listed, no, yes
-from firable.analysis.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
+from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
 from firable.nets.net import Net
 from firable.nets.verdict import Verdict, Weight
 from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts

@@ -27,7 +27,7 @@ from typing import Final
 import z3
 
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.smt import SEED
+from firable.analysis.induction.smt import SEED
 from firable.nets.net import Marking, Net
 
 SIPHONS_MAX: Final = 2_000

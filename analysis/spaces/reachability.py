@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.analysis.spaces.space import WitnessError
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
@@ -61,10 +62,6 @@ _REASONS: Final = {
     "time": "the budget of time is used up",
     "interrupted": "interrupted",
 }
-
-
-class WitnessError(RuntimeError):
-    """A witness does not replay: an error of firable, never of the net."""
 
 
 @dataclass(frozen=True, slots=True)

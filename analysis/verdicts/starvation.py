@@ -16,9 +16,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from firable.analysis.behaviour import Behaviour
 from firable.analysis.question import Answer, Question, no, unknown, yes
-from firable.analysis.reachability import ReachabilityGraph, WitnessError
+from firable.analysis.spaces.reachability import ReachabilityGraph, WitnessError
+from firable.analysis.verdicts.behaviour import Behaviour
 from firable.nets.net import Net
 from firable.nets.verdict import Verdict, Weight, Witness
 from firable.semantics.arbitration import Arbitration

@@ -1,0 +1,41 @@
+"""A goal: is a marking reachable in which a state formula holds? The question that most methods answer.
+
+Contact, deadlock, a dead transition, a conflict, two commands at once and the properties `never`, `always` and
+`reachable` are all of this kind. So every technique that decides it, by whatever means, is one function
+
+    decide_by_...(net: Net, goal: Formula, limits: Limits) -> Finding
+
+and the race (`firable.analysis.race`) may run any of them. A finding is an answer with what it rests on: a firing
+sequence where the goal is reachable, and where it is not a certificate that can be checked without the technique that
+found it (where the technique has one). Not decided is an answer too, with how far was looked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from firable.analysis.deadline import Deadline
+from firable.nets.verdict import Cost, Witness
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a technique may take: until when (or until it is cancelled), and how many bytes."""
+
+    deadline: Deadline = field(default_factory=Deadline)
+    memory_bytes: int = 2 * 2**30
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Whether the goal is reachable (None: not decided), by which method, with its evidence.
+
+    `witness` is a firing sequence into the goal, replayed by the reference player; `bound` says how far an undecided
+    search went.
+    """
+
+    reachable: bool | None
+    method: str
+    witness: Witness | None = None
+    bound: str = ""
+    cost: Cost = field(default_factory=Cost)

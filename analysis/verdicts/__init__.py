@@ -1,0 +1,1 @@
+"""The verdicts of `check`: one file for each family of questions, asked of any state space."""
