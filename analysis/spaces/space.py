@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeVar
 
 from firable.nets.formula import Formula
-from firable.nets.net import Net
+from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
 from firable.semantics.algebra import BooleanAlgebra
 from firable.semantics.firing import Valuation
@@ -113,6 +113,10 @@ class StateSpace(Protocol[S]):
 
     def in_contact(self, t: int) -> S:
         """The markings in contact at a transition."""
+        ...
+
+    def contains(self, markings: S, marking: Marking) -> bool:
+        """Whether a marking is in a set; False for one that was not found."""
         ...
 
     def count(self, markings: S) -> int:
