@@ -82,7 +82,7 @@ $(MADE)/venv:
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
 	@mkdir -p $(MADE) && touch $@
 
-$(MADE)/install: $(MADE)/venv pyproject.toml $(CRATE)/Cargo.toml $(CRATE)/Cargo.lock $(wildcard $(CRATE)/src/*.rs)
+$(MADE)/install: $(MADE)/venv pyproject.toml $(CRATE)/Cargo.toml $(CRATE)/Cargo.lock $(shell find $(CRATE)/src -name "*.rs")
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[prove]'
 	@touch $@
 

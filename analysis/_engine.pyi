@@ -8,12 +8,17 @@ interleaving).
 
 What needs the whole graph raises `IncompleteGraph` where `complete` is false, so that nothing is concluded from a
 part. The rest (markings, contacts, deadlocks, paths) holds of the part explored.
+
+What may take long releases the interpreter and takes `max_seconds`, the time left, and `cancelled`, which is asked some
+twenty times a second and says whether the answer is no longer needed. What they raise, and what a signal handler
+raises, comes out. An exploration that is ended so is incomplete; any other work raises `BudgetExceeded`.
 """
 
+from collections.abc import Callable
 from typing import final
 
 class BudgetExceeded(RuntimeError):  # noqa: N818 - what happened is no error of anybody's, and so not named one
-    """The answer needs more memory than the graph's `max_memory_bytes` leaves."""
+    """The answer needs more memory or time than is allowed, or is no longer needed."""
 
 class IncompleteGraph(RuntimeError):  # noqa: N818 - likewise
     """The answer needs the whole reachability graph, and the exploration ended early."""
@@ -27,6 +32,8 @@ def explore(
     max_markings: int,
     max_memory_bytes: int,
     max_seconds: float | None,
+    cancelled: Callable[[], bool] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Graph:
     """Explore the reachability graph from the marking `initial`, external gates free.
 
@@ -37,7 +44,8 @@ def explore(
     left out.
 
     Running out of a budget, and Ctrl-C, give an incomplete graph with its `reason`. `max_memory_bytes` counts all
-    that the engine holds, copies while a table grows included; time is looked at every few thousand edges.
+    that the engine holds, copies while a table grows included; time is looked at every few thousand edges. `progress`
+    is told the number of markings and edges found so far, some twenty times a second, in the calling thread.
 
     Raises `ValueError` for a place out of range or a negative time, `BudgetExceeded` where not even the net fits.
 
@@ -56,7 +64,7 @@ class Graph:
         """Whether every reachable marking was found and expanded."""
     @property
     def reason(self) -> str | None:
-        """Why not: "markings", "memory", "time" or "interrupted"; None where complete."""
+        """Why not: "markings", "memory", "time", "interrupted" or "cancelled"; None where complete."""
     @property
     def step(self) -> bool:
         """Whether edges are synchronous steps."""
@@ -100,44 +108,75 @@ class Graph:
         """
     def contact_witness(self, t: int) -> int | None:
         """The lowest marking in contact for a transition."""
-    def successors(self, index: int) -> list[tuple[list[int], int]]:
+    def successors(
+        self, index: int, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None
+    ) -> list[tuple[list[int], int]]:
         """The edges that leave a marking: what fires and the marking after.
 
         In the order of the transitions (interleaving) or of the choices (step). In an incomplete graph, edges to
         markings that were not found are left out.
         """
-    def path_to(self, index: int) -> list[list[int]]:
+    def path_to(
+        self, index: int, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None
+    ) -> list[list[int]]:
         """A shortest firing sequence from M0 to a marking; the same one every time."""
     def path_between(
-        self, index: int, targets: list[int] | bytes, within: list[int] | bytes | None = None
+        self,
+        index: int,
+        targets: list[int] | bytes,
+        within: list[int] | bytes | None = None,
+        *,
+        max_seconds: float | None = None,
+        cancelled: Callable[[], bool] | None = None,
     ) -> tuple[list[list[int]], int] | None:
         """A shortest firing sequence from a marking to one of `targets`, and the target reached; None: there is none.
 
         Every marking before the last is in `within` (E[within U targets]). Empty where the marking is itself a
         target. That there is none needs the whole graph.
         """
-    def backward(self, targets: list[int] | bytes, within: list[int] | bytes | None = None) -> bytes:
+    def backward(
+        self,
+        targets: list[int] | bytes,
+        within: list[int] | bytes | None = None,
+        *,
+        max_seconds: float | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> bytes:
         """The bitmap of the markings from which some target can be reached, targets included (EF targets).
 
         With `within`, every marking before the target is in it (E[within U targets]). Needs the whole graph.
         """
-    def components(self, within: list[int] | bytes | None = None) -> Components:
+    def components(
+        self,
+        within: list[int] | bytes | None = None,
+        *,
+        max_seconds: float | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> Components:
         """The strongly connected components of the graph, or of the part within a set. Needs the whole graph."""
-    def edges(self) -> tuple[bytes, bytes]:
+    def edges(
+        self, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None
+    ) -> tuple[bytes, bytes]:
         """The edges as compressed rows: offsets (`n_markings + 1` "<u8") and targets (`n_edges` "<u4").
 
         The row of a marking has the order of `successors`. Needs the whole graph.
         """
-    def live(self) -> list[bool]:
+    def live(self, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None) -> list[bool]:
         """For each transition, whether from every marking it can fire again: it fires in every bottom component."""
-    def reversible(self) -> bool:
+    def reversible(self, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None) -> bool:
         """Whether M0 can be reached from every marking. Needs the whole graph."""
-    def home_markings(self) -> bytes:
+    def home_markings(self, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None) -> bytes:
         """The bitmap of the home markings, those of the only bottom component; none where there are several.
 
         Needs the whole graph.
         """
-    def effective_conflicts(self, pairs: list[tuple[int, int]]) -> list[int | None]:
+    def effective_conflicts(
+        self,
+        pairs: list[tuple[int, int]],
+        *,
+        max_seconds: float | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> list[int | None]:
         """For each pair of transitions, the lowest marking at which both are firable by Eq. (1), or None.
 
         Whether the two conflict in structure, and whether one valuation opens both, is the caller's question. None

@@ -441,6 +441,71 @@ def test_what_a_signal_handler_raises_is_not_swallowed() -> None:
         signal.signal(signal.SIGINT, before)
 
 
+def test_an_exploration_that_is_cancelled_is_incomplete_and_tells_how_far_it_is() -> None:
+    told: list[tuple[int, int]] = []
+    graph = _engine.explore(
+        52,
+        machines(26).rows,
+        machines(26).initial,
+        max_markings=1 << 26,
+        max_memory_bytes=1 << 30,
+        max_seconds=None,
+        cancelled=lambda: len(told) == 3,
+        progress=lambda markings, edges: told.append((markings, edges)),
+    )
+    assert (graph.complete, graph.reason) == (False, "cancelled")
+    assert 0 < told[0][0] < told[1][0] < told[2][0] <= graph.n_markings
+    assert 0 < told[0][1] < told[1][1] < told[2][1] <= graph.n_edges
+
+
+def test_what_a_callable_raises_is_not_swallowed() -> None:
+    def fails(*_: int) -> bool:
+        raise LookupError
+
+    graph = explored(machines(16), step=False)
+    with pytest.raises(LookupError):
+        graph.edges(cancelled=fails)
+    for role in ("cancelled", "progress"):
+        with pytest.raises(LookupError):
+            _engine.explore(
+                32,
+                machines(16).rows,
+                machines(16).initial,
+                max_markings=1 << 26,
+                max_memory_bytes=1 << 30,
+                max_seconds=None,
+                **{role: fails},  # type: ignore[arg-type]
+            )
+
+
+@pytest.mark.parametrize("step", [False, True])
+def test_every_long_question_ends_by_the_clock_and_when_cancelled(step: bool) -> None:
+    # Under steps without gates every machine moves, so a signal each; 2^9 markings then have 2^18 edges.
+    def lasting() -> _engine.Graph:
+        return explored(machines(9, gated=True) if step else machines(16), step=step)
+
+    graph = lasting()
+    far = bytes(graph.n_markings - 1) + b"\1"
+    never = bytes(graph.n_markings)
+    questions: list[Callable[..., object]] = [
+        lambda **limits: graph.backward(far, **limits),
+        lambda **limits: lasting().components(**limits),
+        lambda **limits: lasting().live(**limits),
+        lambda **limits: lasting().reversible(**limits),
+        lambda **limits: lasting().home_markings(**limits),
+        lambda **limits: graph.edges(**limits),
+        lambda **limits: graph.path_between(0, never, **limits),
+    ]
+    for ask in questions:
+        with pytest.raises(_engine.BudgetExceeded, match="max_seconds"):
+            ask(max_seconds=0.0)
+        with pytest.raises(_engine.BudgetExceeded, match="cancelled"):
+            ask(cancelled=lambda: True)
+        ask(max_seconds=600.0, cancelled=lambda: False)
+    with pytest.raises(ValueError, match="not a time"):
+        graph.edges(max_seconds=-1.0)
+
+
 def test_the_empty_net_has_one_marking_which_is_a_deadlock() -> None:
     graph = explored(Drawn(0, [], []), step=False)
     assert (graph.n_markings, graph.n_edges, graph.deadlocks(), graph.live(), graph.reversible()) == (

@@ -1,11 +1,12 @@
-//! What an exploration may spend: memory, markings, time, and the patience of the person who pressed Ctrl-C.
+//! What an exploration may spend: memory, markings, time, and the patience of whoever waits: a person who presses
+//! Ctrl-C, or a race that another method has won.
 //!
 //! Running out is a value (`Stop`) that travels up by `?`, never an abort: every structure that grows claims its bytes
 //! here first, and asks the allocator by `try_reserve`. A budget counted from outside (resident memory) was rejected:
 //! it sees the shortage only when it has happened.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Why an exploration or an analysis ended early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,8 +17,10 @@ pub enum Stop {
     Memory,
     /// The time allowed is over.
     Time,
-    /// The caller's `poll` said so.
+    /// A signal handler said so.
     Interrupted,
+    /// Nobody needs the answer any more.
+    Cancelled,
 }
 
 impl Stop {
@@ -28,6 +31,7 @@ impl Stop {
             Stop::Memory => "memory",
             Stop::Time => "time",
             Stop::Interrupted => "interrupted",
+            Stop::Cancelled => "cancelled",
         }
     }
 }
@@ -117,24 +121,46 @@ impl Memory {
 
 /// Units of work between two looks at the clock.
 const CLOCK_EVERY: usize = 1 << 12;
-/// Units of work between two calls of `poll`.
-const POLL_EVERY: usize = 1 << 16;
+/// Units of work before the first call of `poll`.
+const FIRST_POLL: usize = 1 << 16;
+/// Time between two calls of `poll`. By the clock and not by work: a caller may have to wait for its turn (the
+/// interpreter lock) at each call, and what a unit of work takes differs by a factor of a thousand.
+const POLL_EVERY: Duration = Duration::from_millis(40);
 
-/// Looks at the clock and at the caller's `poll` now and then, counted in work done and not in time.
+/// What was found so far: what `poll` is told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// Markings.
+    pub markings: u64,
+    /// Edges followed.
+    pub edges: u64,
+}
+
+/// A `poll` that always lets the work go on.
+pub fn unwatched(_: Found) -> Result<(), Stop> {
+    Ok(())
+}
+
+/// Looks at the clock and calls the caller's `poll` now and then.
 pub struct Watch<'a> {
     deadline: Option<Instant>,
-    poll: &'a mut dyn FnMut() -> bool,
+    poll: &'a mut dyn FnMut(Found) -> Result<(), Stop>,
     since_clock: usize,
-    since_poll: usize,
+    /// Work left before the first call of `poll`, which soon follows the start.
+    before_first: Option<usize>,
+    polled: Instant,
+    /// What was found so far; the work that knows it keeps it up to date.
+    pub found: Found,
 }
 
 impl<'a> Watch<'a> {
-    /// `poll` is asked about every 2^16 units of work and returns true to stop.
-    pub fn new(deadline: Option<Instant>, poll: &'a mut dyn FnMut() -> bool) -> Self {
-        Watch { deadline, poll, since_clock: 0, since_poll: 0 }
+    /// `poll` is called after 2^16 units of work and then some twenty times a second; it says whether to stop and why.
+    pub fn new(deadline: Option<Instant>, poll: &'a mut dyn FnMut(Found) -> Result<(), Stop>) -> Self {
+        let found = Found::default();
+        Watch { deadline, poll, since_clock: 0, before_first: Some(FIRST_POLL), polled: Instant::now(), found }
     }
 
-    /// Reports work done: markings expanded and edges followed.
+    /// Reports work done: markings expanded and edges followed, some nanoseconds each.
     #[inline]
     pub fn tick(&mut self, work: usize) -> Result<(), Stop> {
         self.since_clock += work;
@@ -143,16 +169,17 @@ impl<'a> Watch<'a> {
 
     #[cold]
     fn look(&mut self) -> Result<(), Stop> {
-        self.since_poll += self.since_clock;
-        self.since_clock = 0;
-        if self.deadline.is_some_and(|deadline| Instant::now() >= deadline) {
+        let now = Instant::now();
+        if self.deadline.is_some_and(|deadline| now >= deadline) {
             return Err(Stop::Time);
         }
-        if self.since_poll >= POLL_EVERY {
-            self.since_poll = 0;
-            if (self.poll)() {
-                return Err(Stop::Interrupted);
-            }
+        self.before_first = self.before_first.map(|left| left.saturating_sub(self.since_clock));
+        let due = self.before_first == Some(0) || now.duration_since(self.polled) >= POLL_EVERY;
+        self.since_clock = 0;
+        if due {
+            self.before_first = None;
+            (self.poll)(self.found)?;
+            self.polled = Instant::now();
         }
         Ok(())
     }

@@ -143,6 +143,7 @@ impl<'a> Edges<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::unwatched;
     use crate::explore::tests::{explore, machines};
 
     #[test]
@@ -150,7 +151,7 @@ mod tests {
         for step in [false, true] {
             let space = explore(machines(7, 60), step);
             let memory = Memory::new(1 << 20);
-            let mut poll = || false;
+            let mut poll = unwatched;
             let mut watch = Watch::new(None, &mut poll);
             let mut edges = Edges::new(&space);
             let mut count = 0;

@@ -15,7 +15,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::budget::{Memory, Stop, Watch};
+use crate::budget::{Found, Memory, Stop, Watch};
 use crate::marking::{Dynamic, Width, holds, linear_hash, slice};
 use crate::net::{Net, Rules};
 use crate::step::{Components, Factor, Steps};
@@ -106,7 +106,7 @@ impl Batch {
 
 impl Space {
     /// Explores from M0 until all is found or a budget is used up.
-    pub fn explore(net: Net, limits: Limits, poll: &mut dyn FnMut() -> bool) -> Result<Self, Stop> {
+    pub fn explore(net: Net, limits: Limits, poll: &mut dyn FnMut(Found) -> Result<(), Stop>) -> Result<Self, Stop> {
         let start = Instant::now();
         let memory = Memory::new(limits.memory_bytes);
         let count = net.transitions.len();
@@ -226,7 +226,8 @@ impl Space {
             }
             self.note_deadlocks(next, batch.valid & !alive)?;
             self.table.insert_batch(width, &mut candidates, max, &self.memory)?;
-            watch.tick((stop - next) + (self.edges - before) as usize)?;
+            watch.found = Found { markings: self.table.store.len() as u64, edges: self.edges };
+            watch.tick((stop - next) + (self.edges - before) as usize + net.transitions.len())?;
             next = stop;
         }
         Ok(())
@@ -278,6 +279,7 @@ impl Space {
                 })?;
                 self.edges += edges;
                 self.note_fired(&factors);
+                watch.found = Found { markings: self.table.store.len() as u64, edges: self.edges };
                 watch.tick(1)?;
             }
             next = stop;
@@ -369,6 +371,7 @@ impl Space {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::budget::unwatched;
     use crate::net::Transition;
 
     /// `n` machines of two places each, `pad` unused places before them.
@@ -385,7 +388,7 @@ pub(crate) mod tests {
 
     pub(crate) fn explore(net: Net, step: bool) -> Space {
         let limits = Limits { step, markings: 1 << 20, memory_bytes: 1 << 28, time: None };
-        Space::explore(net, limits, &mut || false).expect("fits")
+        Space::explore(net, limits, &mut unwatched).expect("fits")
     }
 
     #[test]
@@ -408,19 +411,19 @@ pub(crate) mod tests {
 
     #[test]
     fn each_budget_stops_with_its_reason() {
-        let run = |limits| Space::explore(machines(16, 0), limits, &mut || true).expect("begins");
+        let run = |limits| Space::explore(machines(16, 0), limits, &mut |_| Err(Stop::Cancelled)).expect("begins");
         let all = Limits { step: false, markings: 1 << 20, memory_bytes: 1 << 28, time: None };
         assert_eq!(run(Limits { markings: 100, ..all }).stop, Some(Stop::Markings));
         assert_eq!(run(Limits { markings: 100, ..all }).len(), 100);
         assert_eq!(run(Limits { memory_bytes: 100_000, ..all }).stop, Some(Stop::Memory));
         assert_eq!(run(Limits { time: Some(Duration::ZERO), ..all }).stop, Some(Stop::Time));
-        assert_eq!(run(all).stop, Some(Stop::Interrupted));
+        assert_eq!(run(all).stop, Some(Stop::Cancelled));
     }
 
     #[test]
     fn a_budget_below_the_net_is_refused() {
         let limits = Limits { step: false, markings: 10, memory_bytes: 10, time: None };
-        assert_eq!(Space::explore(machines(2, 0), limits, &mut || false).err(), Some(Stop::Memory));
+        assert_eq!(Space::explore(machines(2, 0), limits, &mut unwatched).err(), Some(Stop::Memory));
     }
 
     #[test]

@@ -199,6 +199,7 @@ fn backward_interleaving<W: Width>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::unwatched;
     use crate::explore::Limits;
     use crate::net::{Net, Transition};
 
@@ -207,14 +208,14 @@ mod tests {
         let arc = |from, to| Transition::new(&[from], &[to], &[], &[], &[]);
         let net = Net::new(4, vec![arc(0, 1), arc(1, 2), arc(2, 0), arc(1, 3)], &[0]).expect("well formed");
         let limits = Limits { step, markings: 100, memory_bytes: 1 << 20, time: None };
-        Space::explore(net, limits, &mut || false).expect("fits")
+        Space::explore(net, limits, &mut unwatched).expect("fits")
     }
 
     #[test]
     fn paths_are_shortest_and_backward_reach_excludes_the_dead_end() {
         for step in [false, true] {
             let space = lasso(step);
-            let mut poll = || false;
+            let mut poll = unwatched;
             let mut watch = Watch::new(None, &mut poll);
             let dead = space.deadlocks[0];
             assert_eq!(path_to(&space, dead, &mut watch), Ok(vec![vec![0], vec![3]]));

@@ -188,10 +188,11 @@ pub fn live(space: &Space, scc: &Scc, watch: &mut Watch<'_>) -> Result<Vec<bool>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::unwatched;
 
     fn components(edges: &[&[u32]]) -> Scc {
         let memory = Memory::new(1 << 20);
-        let mut poll = || false;
+        let mut poll = unwatched;
         let mut watch = Watch::new(None, &mut poll);
         let mut csr = Csr { offsets: vec![0], targets: Vec::new() };
         for row in edges {

@@ -406,6 +406,7 @@ fn satisfiable(clauses: &[Clause], mut valuation: Vec<Option<bool>>, watch: &mut
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::unwatched;
     use crate::net::Transition;
 
     type Row<'a> = (&'a [u32], &'a [u32], &'a [(u32, bool)]);
@@ -416,7 +417,7 @@ mod tests {
         let components = Components::new(&net);
         let mut enumerator = Steps::new(&net, &components);
         let memory = Memory::new(1 << 20);
-        let mut poll = || false;
+        let mut poll = unwatched;
         let mut watch = Watch::new(None, &mut poll);
         let firable: Vec<u32> = (0..rows.len() as u32).collect();
         let factors = enumerator.factors(&firable, &memory, &mut watch).expect("fits");
@@ -483,7 +484,7 @@ mod tests {
             let expected = (0..16_u32).any(|valuation| {
                 clauses.iter().all(|clause| clause.iter().any(|&(s, value)| (valuation >> s & 1 == 1) == value))
             });
-            let mut poll = || false;
+            let mut poll = unwatched;
             let mut watch = Watch::new(None, &mut poll);
             assert_eq!(satisfiable(&clauses, vec![None; 4], &mut watch), Ok(expected), "{clauses:?}");
             if expected { yes += 1 } else { no += 1 }

@@ -1,0 +1,39 @@
+//! `explore`: the way from a net of Python to a graph.
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::graph::Graph;
+use super::{BudgetExceeded, Patience, Row, but_ctrl_c, detached, net};
+use crate::explore::{Limits, Space};
+
+/// Explores the reachability graph from a marking, breadth first.
+#[pyfunction]
+#[pyo3(signature = (n_places, transitions, initial, *, step=false, max_markings, max_memory_bytes, max_seconds,
+                    cancelled=None, progress=None))]
+#[allow(clippy::too_many_arguments)]
+pub(crate) fn explore(
+    py: Python<'_>,
+    n_places: usize,
+    transitions: Vec<Row>,
+    initial: Vec<u32>,
+    step: bool,
+    max_markings: usize,
+    max_memory_bytes: usize,
+    max_seconds: Option<f64>,
+    cancelled: Option<Py<PyAny>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Graph> {
+    let patience = Patience::new(max_seconds, cancelled)?.telling(progress);
+    let limits = Limits { step, markings: max_markings, memory_bytes: max_memory_bytes, time: patience.time };
+    let mut raised = None;
+    let space = detached(py, &patience, &mut raised, |poll| {
+        net(n_places, &transitions, &initial).map(|net| Space::explore(net, limits, poll))
+    })
+    .map_err(PyValueError::new_err)?;
+    but_ctrl_c(py, raised)?;
+    match space {
+        Ok(space) => Ok(Graph::new(space)),
+        Err(_) => Err(BudgetExceeded::new_err("max_memory_bytes does not hold the net itself")),
+    }
+}

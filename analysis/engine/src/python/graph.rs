@@ -1,0 +1,349 @@
+//! `Graph`: a reachability graph, its figures, and the questions that are asked of it.
+
+use std::sync::{Arc, OnceLock};
+
+use pyo3::exceptions::{PyIndexError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyInt};
+
+use super::components::Components;
+use super::{IncompleteGraph, Patience, answered, little_endian, marking_of, mask};
+use crate::budget::{Memory, Stop, Watch};
+use crate::csr::Csr;
+use crate::edges::Edges;
+use crate::explore::{NONE, Space};
+use crate::scc::Scc;
+use crate::{paths, scc};
+
+/// A reachability graph; see the stub `_engine.pyi` for the meaning of each member.
+#[pyclass(frozen, module = "firable.analysis._engine")]
+pub(crate) struct Graph {
+    space: Space,
+    scc: OnceLock<Arc<Scc>>,
+}
+
+/// A set of markings from Python: indexes, or one byte for each marking.
+#[derive(FromPyObject)]
+enum Markings<'py> {
+    Bitmap(Bound<'py, PyBytes>),
+    Indexes(Vec<usize>),
+}
+
+impl Graph {
+    pub(crate) fn new(space: Space) -> Self {
+        Graph { space, scc: OnceLock::new() }
+    }
+
+    fn long<T: Send>(
+        &self,
+        py: Python<'_>,
+        patience: &Patience,
+        work: impl FnOnce(&Space, &mut Watch<'_>) -> Result<T, Stop> + Send,
+    ) -> PyResult<T> {
+        let space = &self.space;
+        answered(py, patience, |watch| work(space, watch))
+    }
+
+    fn whole(&self, what: &str) -> PyResult<()> {
+        match self.space.stop {
+            None => Ok(()),
+            Some(stop) => Err(IncompleteGraph::new_err(format!(
+                "{what} needs the whole graph, and the exploration ended early: {}",
+                stop.as_str()
+            ))),
+        }
+    }
+
+    fn check(&self, index: usize) -> PyResult<u32> {
+        if index < self.space.len() {
+            Ok(index as u32)
+        } else {
+            Err(PyIndexError::new_err(format!("there is no marking {index} of {}", self.space.len())))
+        }
+    }
+
+    fn check_transition(&self, t: usize) -> PyResult<usize> {
+        let count = self.space.net.transitions.len();
+        if t < count { Ok(t) } else { Err(PyIndexError::new_err(format!("there is no transition {t} of {count}"))) }
+    }
+
+    fn bitmap(&self, markings: Markings<'_>) -> PyResult<Vec<u8>> {
+        match markings {
+            Markings::Bitmap(bytes) if bytes.as_bytes().len() == self.space.len() => Ok(bytes.as_bytes().to_vec()),
+            Markings::Bitmap(bytes) => Err(PyValueError::new_err(format!(
+                "a bitmap has one byte for each of the {} markings, not {}",
+                self.space.len(),
+                bytes.as_bytes().len()
+            ))),
+            Markings::Indexes(indexes) => {
+                let mut bitmap = vec![0; self.space.len()];
+                for index in indexes {
+                    bitmap[self.check(index)? as usize] = 1;
+                }
+                Ok(bitmap)
+            }
+        }
+    }
+
+    fn scc(&self, py: Python<'_>, patience: &Patience) -> PyResult<Arc<Scc>> {
+        self.whole("strongly connected components")?;
+        if let Some(scc) = self.scc.get() {
+            return Ok(Arc::clone(scc));
+        }
+        let scc = Arc::new(self.long(py, patience, |space, watch| Scc::new(space, None, watch))?);
+        Ok(Arc::clone(self.scc.get_or_init(|| scc)))
+    }
+}
+
+#[pymethods]
+impl Graph {
+    #[getter]
+    fn complete(&self) -> bool {
+        self.space.stop.is_none()
+    }
+
+    #[getter]
+    fn reason(&self) -> Option<&'static str> {
+        self.space.stop.map(Stop::as_str)
+    }
+
+    #[getter]
+    fn step(&self) -> bool {
+        self.space.step
+    }
+
+    #[getter]
+    fn n_markings(&self) -> usize {
+        self.space.len()
+    }
+
+    #[getter]
+    fn n_edges(&self) -> u64 {
+        self.space.edges
+    }
+
+    #[getter]
+    fn words(&self) -> usize {
+        self.space.net.words
+    }
+
+    #[getter]
+    fn memory_bytes(&self) -> usize {
+        self.space.memory.used()
+    }
+
+    #[getter]
+    fn bytes_per_marking(&self) -> f64 {
+        self.space.memory.used() as f64 / self.space.len() as f64
+    }
+
+    #[getter]
+    fn seconds(&self) -> f64 {
+        self.space.seconds
+    }
+
+    #[getter]
+    fn n_levels(&self) -> usize {
+        self.space.levels.len()
+    }
+
+    fn __len__(&self) -> usize {
+        self.space.len()
+    }
+
+    fn __repr__(&self) -> String {
+        let Space { edges, step, stop, .. } = &self.space;
+        let discipline = if *step { "step" } else { "interleaving" };
+        let end = stop.map_or(String::new(), |stop| format!(", incomplete: {}", stop.as_str()));
+        format!("<Graph {discipline}, {} markings, {edges} edges{end}>", self.space.len())
+    }
+
+    fn marking<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyAny>> {
+        let index = self.check(index)?;
+        mask(py, self.space.marking(index as usize))
+    }
+
+    fn markings_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let words = self.space.net.words;
+        PyBytes::new_with(py, self.space.len() * words * 8, |bytes| {
+            for (index, place) in bytes.chunks_exact_mut(words * 8).enumerate() {
+                for (to, word) in place.chunks_exact_mut(8).zip(self.space.marking(index)) {
+                    to.copy_from_slice(&word.to_le_bytes());
+                }
+            }
+            Ok(())
+        })
+    }
+
+    fn find(&self, mask: &Bound<'_, PyInt>) -> PyResult<Option<u32>> {
+        Ok(marking_of(mask, self.space.net.words)?.and_then(|marking| self.space.find(&marking)))
+    }
+
+    fn fired(&self) -> Vec<u64> {
+        self.space.fired.clone()
+    }
+
+    fn deadlocks(&self) -> Vec<u32> {
+        self.space.deadlocks.clone()
+    }
+
+    fn contacts(&self) -> Vec<u64> {
+        self.space.contacts.clone()
+    }
+
+    fn contact_witness(&self, t: usize) -> PyResult<Option<u32>> {
+        Ok(Some(self.space.contact_witness[self.check_transition(t)?]).filter(|&index| index != NONE))
+    }
+
+    #[pyo3(signature = (index, *, max_seconds=None, cancelled=None))]
+    fn successors(
+        &self,
+        py: Python<'_>,
+        index: usize,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Vec<(Vec<u32>, u32)>> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        let index = self.check(index)?;
+        self.long(py, &patience, |space, watch| {
+            let memory = Memory::new(paths::WITNESS_BYTES);
+            let mut all = Vec::new();
+            Edges::new(space).visit(&[index], &memory, watch, &mut |_, fired, target| {
+                memory.push(&mut all, (fired.transitions(), target))
+            })?;
+            Ok(all)
+        })
+    }
+
+    #[pyo3(signature = (index, *, max_seconds=None, cancelled=None))]
+    fn path_to(
+        &self,
+        py: Python<'_>,
+        index: usize,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Vec<Vec<u32>>> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        let index = self.check(index)?;
+        self.long(py, &patience, |space, watch| paths::path_to(space, index, watch))
+    }
+
+    #[pyo3(signature = (index, targets, within=None, *, max_seconds=None, cancelled=None))]
+    fn path_between(
+        &self,
+        py: Python<'_>,
+        index: usize,
+        targets: Markings<'_>,
+        within: Option<Markings<'_>>,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Option<(Vec<Vec<u32>>, u32)>> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        let index = self.check(index)?;
+        let targets = self.bitmap(targets)?;
+        let within = within.map(|within| self.bitmap(within)).transpose()?;
+        let found = self.long(py, &patience, |space, watch| {
+            paths::path_between(space, index, &targets, within.as_deref(), watch)
+        })?;
+        if found.is_none() {
+            self.whole("that there is no path")?;
+        }
+        Ok(found)
+    }
+
+    #[pyo3(signature = (targets, within=None, *, max_seconds=None, cancelled=None))]
+    fn backward<'py>(
+        &self,
+        py: Python<'py>,
+        targets: Markings<'_>,
+        within: Option<Markings<'_>>,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        self.whole("backward reach")?;
+        let targets = self.bitmap(targets)?;
+        let within = within.map(|within| self.bitmap(within)).transpose()?;
+        let reach =
+            self.long(py, &patience, |space, watch| paths::backward(space, &targets, within.as_deref(), watch))?;
+        Ok(PyBytes::new(py, &reach))
+    }
+
+    #[pyo3(signature = (within=None, *, max_seconds=None, cancelled=None))]
+    fn components(
+        &self,
+        py: Python<'_>,
+        within: Option<Markings<'_>>,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Components> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        let Some(within) = within else { return Ok(Components { scc: self.scc(py, &patience)? }) };
+        self.whole("strongly connected components")?;
+        let within = self.bitmap(within)?;
+        let scc = self.long(py, &patience, |space, watch| Scc::new(space, Some(&within), watch))?;
+        Ok(Components { scc: Arc::new(scc) })
+    }
+
+    #[pyo3(signature = (*, max_seconds=None, cancelled=None))]
+    fn edges<'py>(
+        &self,
+        py: Python<'py>,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<(Bound<'py, PyBytes>, Bound<'py, PyBytes>)> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        self.whole("the list of edges")?;
+        let csr = self.long(py, &patience, |space, watch| Csr::new(space, None, &space.memory.clone(), watch))?;
+        let offsets: Vec<u8> = csr.offsets.iter().flat_map(|offset| offset.to_le_bytes()).collect();
+        Ok((PyBytes::new(py, &offsets), little_endian(py, &csr.targets)?))
+    }
+
+    #[pyo3(signature = (*, max_seconds=None, cancelled=None))]
+    fn live(&self, py: Python<'_>, max_seconds: Option<f64>, cancelled: Option<Py<PyAny>>) -> PyResult<Vec<bool>> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        let components = self.scc(py, &patience)?;
+        self.long(py, &patience, |space, watch| scc::live(space, &components, watch))
+    }
+
+    #[pyo3(signature = (*, max_seconds=None, cancelled=None))]
+    fn reversible(&self, py: Python<'_>, max_seconds: Option<f64>, cancelled: Option<Py<PyAny>>) -> PyResult<bool> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        Ok(self.scc(py, &patience)?.sizes.len() == 1)
+    }
+
+    #[pyo3(signature = (*, max_seconds=None, cancelled=None))]
+    fn home_markings<'py>(
+        &self,
+        py: Python<'py>,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        let components = self.scc(py, &patience)?;
+        let home = components.bottom.iter().filter(|&&bottom| bottom != 0).count() == 1;
+        let markings: Vec<u8> =
+            components.of.iter().map(|&of| if home { components.bottom[of as usize] } else { 0 }).collect();
+        Ok(PyBytes::new(py, &markings))
+    }
+
+    #[pyo3(signature = (pairs, *, max_seconds=None, cancelled=None))]
+    fn effective_conflicts(
+        &self,
+        py: Python<'_>,
+        pairs: Vec<(usize, usize)>,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Vec<Option<u32>>> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        for &(t, u) in &pairs {
+            self.check_transition(t)?;
+            self.check_transition(u)?;
+        }
+        let found = self.long(py, &patience, |space, watch| space.firable_together(&pairs, watch))?;
+        if found.contains(&None) {
+            self.whole("that two transitions are never firable together")?;
+        }
+        Ok(found)
+    }
+}
