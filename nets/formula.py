@@ -1,9 +1,10 @@
 """State formulas over the markings of a net, and the text they are written in.
 
 A property of a net file speaks about markings: `never: robot.put_mc and mc.machining`. The formulas
-are Boolean combinations of four kinds of atoms: a place holds a token, a transition is firable
-(Eq. 1, with its external gates free), the marking is a deadlock, the marking is the initial one. They
-are a syntax tree only. `firable.semantics.formulas` evaluates them, over any Boolean algebra.
+are Boolean combinations of five kinds of atoms: a place holds a token, a transition is firable
+(Eq. 1, with its external gates free), the marking is a deadlock, the marking is the initial one, so many
+of some places hold a token. They are a syntax tree only. `firable.semantics.formulas` evaluates them, over
+any Boolean algebra.
 
 The grammar, loosest binding first (`->` groups to the right)::
 
@@ -11,18 +12,24 @@ The grammar, loosest binding first (`->` groups to the right)::
     disjunction = conjunction { "or" conjunction }
     conjunction = literal { "and" literal }
     literal = "not" literal | "(" formula ")" | atom
-    atom = "true" | "false" | "start" | "deadlock" | "firable" "(" name ")" | place name
+    atom = "true" | "false" | "start" | "deadlock" | "firable" "(" name ")" | count sign count | place name
+    count = number | "tokens" "(" place name { "," place name } ")" [ "+" number ]
+    sign = "<=" | "<" | "=" | "!=" | ">=" | ">"
 
-Temporal operators are not part of formulas: a property is one temporal pattern over state formulas, so
-that each has a method of its own and a counterexample that an engineer can read. The rejected alternative,
-full CTL in the net file, reads badly and answers questions nobody at the cell asks.
+A name in double quotes is a name, also where the word means something else. A name may hold nearly every
+character, `<` too, so a number that begins a comparison stands before a blank, or before `tokens`.
+
+Temporal operators are not part of formulas: most properties are one temporal pattern over state formulas, so
+that each has a method of its own and a counterexample that an engineer can read. `firable.nets.temporal` has the
+operators of CTL and LTL, for what the patterns cannot say.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Final
 
 
@@ -57,6 +64,34 @@ class Deadlock:
     """No transition is firable and openable in the marking."""
 
 
+class Sign(StrEnum):
+    """How two numbers are compared."""
+
+    AT_MOST = "<="
+    LESS = "<"
+    EQUAL = "="
+    UNEQUAL = "!="
+    AT_LEAST = ">="
+    MORE = ">"
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """How many of the places hold a token, and a number added; a place that stands twice counts twice."""
+
+    places: tuple[str, ...] = ()
+    added: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """Two counts of tokens, or a count and a number, compared."""
+
+    left: Count
+    sign: Sign
+    right: Count
+
+
 @dataclass(frozen=True, slots=True)
 class Not:
     """Negation."""
@@ -78,7 +113,7 @@ class Or:
     operands: tuple[Formula, ...]
 
 
-Formula = Constant | Holds | Firable | Start | Deadlock | Not | And | Or
+Formula = Constant | Holds | Firable | Start | Deadlock | Compare | Not | And | Or
 
 
 class FormulaError(ValueError):
@@ -90,31 +125,51 @@ class FormulaError(ValueError):
         self.column = column
 
 
-_TOKEN: Final = re.compile(r"\s*(?:(?P<symbol>->|[()])|(?P<name>[^\s()]+?(?=\s|[()]|->|$)))")
+_SIGN: Final = r"<=|>=|!=|=|<|>"
+_END: Final = r"(?=\s|[()\[\],]|->|$)"
+_TOKEN: Final = re.compile(
+    rf"""\s*(?:(?P<symbol>->|[()\[\],])
+        |"(?P<quoted>[^\s"]+)"{_END}
+        |(?P<number>[0-9]+)(?=\s*(?:{_SIGN})\s*tokens\s*\()
+        |(?P<name>[^\s()\[\],]+?){_END})""",
+    re.VERBOSE,
+)
+_IN_COMPARISON: Final = re.compile(rf"\s*(?:(?P<sign>{_SIGN}|\+)|(?P<number>[0-9]+)(?=\s*(?:{_SIGN}|[()\]]|\s|->|$)))")
 _KEYWORDS: Final = frozenset({"and", "or", "not"})
+_SYMBOLS: Final = frozenset({"->", "(", ")", "[", "]", ","})
+_NUMBER: Final = re.compile(r"[0-9]{1,9}")
 NESTING_MAX: Final = 100
 
 CONSTANT_ATOMS: Final = frozenset({"true", "false", "start", "deadlock"})
-"""Words that are atoms by themselves, so a place of that name cannot be named in a formula."""
+"""Words that are atoms by themselves, so a place of that name is named in quotes."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Token:
     text: str
     column: int
+    quoted: bool = False
 
 
-def _tokens(text: str) -> list[_Token]:
-    # Nothing is passed over but blanks: every other character is a symbol or part of a name.
-    words = ((match["symbol"] or match["name"], match.end()) for match in _TOKEN.finditer(text))
-    return [_Token(word, end - len(word)) for word, end in words]
+def _tokens(text: str) -> Iterator[_Token]:
+    # Nothing is passed over but blanks: every other character is a symbol or part of a name. `<` and `+` may be part of
+    # a name too, but no name can follow a closing bracket.
+    position, comparing = 0, False
+    while True:
+        match = (_IN_COMPARISON.match(text, position) if comparing else None) or _TOKEN.match(text, position)
+        if match is None:
+            return
+        kind = match.lastgroup or ""
+        position = match.end()
+        comparing = kind in {"sign", "number"} or match[kind] == ")"
+        yield _Token(match[kind], match.start(kind), kind == "quoted")
 
 
 class _Parser:
     """Recursive descent over the grammar of the module's docstring."""
 
     def __init__(self, text: str) -> None:
-        self.tokens = _tokens(text)
+        self.tokens = list(_tokens(text))
         self.position = 0
         self.end = len(text)
         self.depth = 0
@@ -182,34 +237,80 @@ class _Parser:
             formula = Not(formula)
         return formula
 
-    def atom(self) -> Formula:
+    def name(self, of: str) -> str:
+        """The name that stands here, in quotes or not."""
         column = self.column()
-        token = self.take()
-        match token:
+        quoted = self.position < len(self.tokens) and self.tokens[self.position].quoted
+        name = self.take()
+        if not quoted and (name in _SYMBOLS or name in _KEYWORDS):
+            raise FormulaError(f"expected the name of a {of}, found {name!r}", column)
+        return name
+
+    def atom(self) -> Formula:
+        if self.tokens[self.position : self.position + 1] and self.tokens[self.position].quoted:
+            return Holds(self.take())
+        following = self.tokens[self.position + 1].text if self.position + 1 < len(self.tokens) else ""
+        match self.peek():
             case "(":
+                self.take()
                 self.deeper(1)
                 inner = self.implication()
                 self.deeper(-1)
                 self.expect(")")
                 return inner
-            case "true" | "false":
-                return Constant(token == "true")
+            case "true" | "false" as word:
+                self.take()
+                return Constant(word == "true")
             case "start":
+                self.take()
                 return Start()
             case "deadlock":
-                return Deadlock()
-            case "firable" if self.peek() == "(":
                 self.take()
-                name_column = self.column()
-                name = self.take()
-                if name in {"(", ")", "->"} or name in _KEYWORDS:
-                    raise FormulaError(f"expected the name of a transition, found {name!r}", name_column)
-                self.expect(")")
-                return Firable(name)
-            case ")" | "->" | "and" | "or":
-                raise FormulaError(f"expected a place, found {token!r}", column)
-            case _:
-                return Holds(token)
+                return Deadlock()
+            case "firable" if following == "(":
+                return Firable(self.in_brackets("transition"))
+            case "tokens" if following == "(":
+                return self.comparison()
+            case str(number) if number.isdecimal() and following in {*Sign}:
+                return self.comparison()
+        return Holds(self.name("place"))
+
+    def in_brackets(self, of: str) -> str:
+        """The name in `word(name)`."""
+        self.take()
+        self.expect("(")
+        name = self.name(of)
+        self.expect(")")
+        return name
+
+    def comparison(self) -> Formula:
+        left, column = self.counted(), self.column()
+        sign = self.take()
+        if sign not in {*Sign}:
+            raise FormulaError(f"expected one of {' '.join(Sign)}, found {sign!r}", column)
+        return Compare(left, Sign(sign), self.counted())
+
+    def counted(self) -> Count:
+        if self.peek() != "tokens":
+            return Count(added=self.number())
+        self.take()
+        self.expect("(")
+        places = [self.name("place")]
+        while self.peek() == ",":
+            self.take()
+            places.append(self.name("place"))
+        self.expect(")")
+        if self.peek() != "+":
+            return Count(tuple(places))
+        self.take()
+        return Count(tuple(places), self.number())
+
+    def number(self) -> int:
+        column = self.column()
+        token = self.take()
+        if not _NUMBER.fullmatch(token):
+            raise FormulaError(f"expected a number of at most 9 digits or `tokens(...)`, found {token!r}", column)
+        return int(token)
 
 
 def parse_formula(text: str) -> Formula:
@@ -233,31 +334,53 @@ def parse_formula(text: str) -> Formula:
 _LOOSE, _TIGHT = 0, 1
 
 
-def format_formula(formula: Formula, _binding: int = _LOOSE) -> str:
-    """Print a formula so that `parse_formula` reads the same tree back.
+def format_formula(formula: Formula, reserved: Set[str] = CONSTANT_ATOMS) -> str:
+    """Print a formula so that `parse_formula` reads the same tree back; names among `reserved` stand in quotes.
 
-    >>> format_formula(parse_formula("(a or b) and firable(t)"))
-    '(a or b) and firable(t)'
+    >>> format_formula(parse_formula("(a or b) and firable(t) and tokens(a, b)<=1"))
+    '(a or b) and firable(t) and tokens(a, b) <= 1'
     """
+    return _format(formula, _LOOSE, reserved)
+
+
+def _format(formula: Formula, binding: int, reserved: Set[str]) -> str:
     match formula:
         case Constant(value):
             return "true" if value else "false"
         case Holds(place):
-            return place
+            return format_name(place, reserved)
         case Firable(transition):
             return f"firable({transition})"
         case Start():
             return "start"
         case Deadlock():
             return "deadlock"
+        case Compare(left, sign, right):
+            return f"{format_count(left)} {sign} {format_count(right)}"
         case Not(operand):
-            return f"not {format_formula(operand, _TIGHT)}"
+            return f"not {_format(operand, _TIGHT, reserved)}"
         case And(operands) | Or(operands):
             if not operands:
                 return "true" if isinstance(formula, And) else "false"
             word = " and " if isinstance(formula, And) else " or "
-            text = word.join(format_formula(operand, _TIGHT) for operand in operands)
-            return f"({text})" if _binding == _TIGHT and len(operands) > 1 else text
+            text = word.join(_format(operand, _TIGHT, reserved) for operand in operands)
+            return f"({text})" if binding == _TIGHT and len(operands) > 1 else text
+
+
+def format_name(name: str, reserved: Set[str]) -> str:
+    """The name of a place, in quotes where it would be read as something else."""
+    return f'"{name}"' if name in reserved else name
+
+
+def format_count(count: Count) -> str:
+    """A side of a comparison.
+
+    >>> format_count(Count(("a", "b"), 1))
+    'tokens(a, b) + 1'
+    """
+    if not count.places:
+        return str(count.added)
+    return f"tokens({', '.join(count.places)}){f' + {count.added}' if count.added else ''}"
 
 
 def names_in(formula: Formula) -> Iterator[Holds | Firable]:
@@ -265,6 +388,8 @@ def names_in(formula: Formula) -> Iterator[Holds | Firable]:
     match formula:
         case Holds() | Firable():
             yield formula
+        case Compare(left, _, right):
+            yield from map(Holds, (*left.places, *right.places))
         case Not(operand):
             yield from names_in(operand)
         case And(operands) | Or(operands):

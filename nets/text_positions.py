@@ -115,8 +115,8 @@ class Positions:
         for name, key, body in _entries(self.tree, "properties"):
             yield ("properties", name), key
             for formula in _scalars(body):
-                # A formula names its places without quotes, between blanks and brackets.
-                for match in re.finditer(r"[^\s()]+", formula.text):
+                # A formula names its places between blanks, brackets, commas and quotes.
+                for match in re.finditer(r"[^\s()\[\],\"]+", formula.text):
                     yield ("properties", name, match.group()), _Within(formula, match.start(), len(match.group()))
 
     def _scope(self, scope: Node, path: Subject, prefix: str) -> Iterator[tuple[Subject, _Found]]:

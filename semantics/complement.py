@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.formula import And, Formula, Holds, Not, Or
+from firable.nets.formula import And, Compare, Count, Formula, Holds, Not, Or
 from firable.nets.net import Net, Transition
 
 
@@ -60,10 +60,18 @@ def complement(net: Net, place: str, *, new_name: str | None = None, flip_gates:
             inhibitive=moved(inhibitive, permissive) if flip_gates else renamed(inhibitive),
         )
 
+    def sides(this: Count, other: Count) -> Count:
+        # A token on the place is one less on its complement: what it adds here, the complement adds on the other side.
+        kept = tuple(p for p in this.places if p != place)
+        added = tuple(name for p in other.places if p == place)
+        return Count((*kept, *added), this.added + len(this.places) - len(kept))
+
     def reversed_in(formula: Formula) -> Formula:
         match formula:
             case Holds(p) if p == place:
                 return Not(Holds(name))
+            case Compare(left, sign, right):
+                return Compare(sides(left, right), sign, sides(right, left))
             case Not(operand):
                 return Not(reversed_in(operand))
             case And(operands):

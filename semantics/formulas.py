@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start
+from firable.nets.formula import And, Compare, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start
 from firable.nets.net import Net
 from firable.semantics.algebra import BooleanAlgebra
+from firable.semantics.counting import compared
 from firable.semantics.firing import Valuation, firable
 
 B = TypeVar("B")
@@ -40,6 +41,8 @@ def evaluate(algebra: BooleanAlgebra[B], net: Net, formula: Formula, holds: Valu
                 for t, transition in enumerate(net.transitions)
                 if transition.openable
             )
+        case Compare():
+            return compared(algebra, net, formula, holds)
         case Not(operand):
             return algebra.negation(evaluate(algebra, net, operand, holds))
         case And(operands):

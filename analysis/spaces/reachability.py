@@ -13,7 +13,7 @@ graph. The rejected alternative, evaluating formulas in Rust, would be a second 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
@@ -51,7 +51,19 @@ __all__ = [
 Column = npt.NDArray[np.bool_]
 """A set of markings of a graph: one Boolean for each index."""
 
-COLUMNS: Final[Bitwise[Any]] = Bitwise(true=np.True_, false=np.False_)
+
+class _Columns(Bitwise[Any]):
+    """Columns count tokens by adding, which is faster than by Boolean terms."""
+
+    def at_most(self, terms: Sequence[tuple[Any, int]], bound: int, /) -> Any:
+        """Where the weights of the terms that are true sum up to at most the bound."""
+        total = np.int64(0)
+        for term, weight in terms:
+            total = total + np.multiply(term, np.int64(weight))
+        return total <= bound
+
+
+COLUMNS: Final[Bitwise[Any]] = _Columns(true=np.True_, false=np.False_)
 """The algebra of columns: numpy arrays of Booleans, with numpy's own scalars for true and false."""
 
 NO_COMPONENT: Final = 2**32 - 1

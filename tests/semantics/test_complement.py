@@ -5,9 +5,12 @@ from hypothesis import given
 from support.dense_nets import dense_nets
 
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Command, Net, Place, Transition
+from firable.nets.formula import parse_formula
+from firable.nets.net import Command, Net, Place, Property, PropertyKind, Transition
+from firable.semantics.algebra import BOOL
 from firable.semantics.complement import complement
-from firable.semantics.player import Player
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import Player, holds_in
 
 
 @given(dense_nets())
@@ -26,6 +29,16 @@ def test_the_complement_of_the_complement_is_the_net(net: Net) -> None:
     twice = complement(complement(net, "c"), "not_c", new_name="c")
     assert Player(twice).reachable() == Player(net).reachable()
     assert twice.places == net.places
+
+
+def test_a_property_says_of_the_complement_what_it_said_of_the_place() -> None:
+    formula = parse_formula("(p -> q) and tokens(p, q) + 1 <= tokens(r, p, p) and not tokens(q, p) < 1")
+    places = tuple(map(Place, "pqr"))
+    net = Net("n", places, properties=(Property("x", PropertyKind.NEVER, formula),))
+    other = complement(net, "p")
+    for marking in range(8):
+        changed = evaluate(BOOL, other, other.properties[0].formula, holds_in(marking ^ 1))
+        assert changed is evaluate(BOOL, net, formula, holds_in(marking))
 
 
 def test_a_place_that_sends_a_command_has_no_complement() -> None:
