@@ -1,8 +1,8 @@
-"""`check`: everything that the reachability graph of a net decides, as verdicts and figures.
+"""`check`: everything that the state space of a net decides, as verdicts and figures.
 
-One exploration, then one question after the other to the same graph. The verdicts say what holds, with their
+One exploration, then one question after the other to the same space. The verdicts say what holds, with their
 evidence; the figures are the numbers and sets behind them, for tables, tests and comparisons. A figure that needs the
-whole graph is None where the budget ended first: an unknown number is not zero.
+whole space is None where the budget ended first: an unknown number is not zero.
 
 The tables below hold the verdicts in the order of the report. To add one: its technique in a file of its own, one row
 here.
@@ -17,6 +17,7 @@ from typing import Any, Final, TypeVar
 
 from firable.analysis.question import Answer, Question
 from firable.analysis.spaces.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
+from firable.analysis.spaces.space import StateSpace
 from firable.analysis.verdicts import behaviour as behaviour_of
 from firable.analysis.verdicts import conflicts as conflict
 from firable.analysis.verdicts.behaviour import Behaviour
@@ -26,7 +27,7 @@ from firable.analysis.verdicts.commands import (
     machines_stopped,
     no_command_in_initial_marking,
 )
-from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pairs
+from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pairs, Steps
 from firable.analysis.verdicts.properties import decide_properties
 from firable.analysis.verdicts.starvation import starvation_free
 from firable.nets.net import Net
@@ -39,7 +40,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """The numbers and sets behind the verdicts, by the names of the net; None is unknown, because the budget ended.
+    """The numbers and sets behind the verdicts, by the names of the net; None is unknown, as the budget ended.
 
     `deadlocks`, `doomed`, `home` and the values of `contacts` count markings. `nonserialisable` holds the steps of a
     step graph that no order replays; it is None for an interleaving graph, which has no steps.
@@ -48,7 +49,7 @@ class Figures:
     markings: int
     edges: int
     complete: bool
-    bytes_per_marking: float
+    bytes_per_marking: float | None
     deadlocks: int | None
     doomed: int | None
     home: int | None
@@ -84,13 +85,13 @@ class Figures:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """What `check` found of a net under one discipline; `graph` is there for further questions."""
+    """What `check` found of a net under one discipline; `space` is there for further questions."""
 
     net: Net
     discipline: Discipline
     figures: Figures
     verdicts: tuple[Verdict, ...]
-    graph: ReachabilityGraph
+    space: StateSpace[Any]
 
     @property
     def status(self) -> Status:
@@ -120,22 +121,23 @@ def check(
     return report_on(explore(net, discipline, budget))
 
 
-def report_on(graph: ReachabilityGraph) -> CheckReport:
-    """Decide every verdict of this room on a graph that was explored before."""
-    behaviour, conflicts = Behaviour(graph), ConflictAnalysis(graph)
+def report_on(space: StateSpace[Any]) -> CheckReport:
+    """Decide every verdict of this room on a state space that was explored before."""
+    behaviour, conflicts = Behaviour(space), ConflictAnalysis(space)
+    steps = _steps(space)
     verdicts = [
         *(decide(behaviour) for decide in _ON_BEHAVIOUR),
-        self_loop_free(graph),
+        self_loop_free(space),
         *(decide(conflicts) for decide in _ON_CONFLICTS),
-        *([conflict.steps_serialisable(conflicts)] if graph.discipline is Discipline.STEP else []),
-        *(decide(graph) for decide in _ON_GRAPH),
+        *([] if steps is None else [conflict.steps_serialisable(steps)]),
+        *(decide(space) for decide in _ON_SPACE),
         starvation_free(behaviour),
-        *decide_properties(graph),
+        *decide_properties(space),
     ]
-    return CheckReport(graph.net, graph.discipline, figures(behaviour, conflicts), tuple(verdicts), graph)
+    return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), tuple(verdicts), space)
 
 
-_ON_BEHAVIOUR: Final[tuple[Callable[[Behaviour], Verdict], ...]] = (
+_ON_BEHAVIOUR: Final[tuple[Callable[[Behaviour[Any]], Verdict], ...]] = (
     behaviour_of.contact_free,
     behaviour_of.deadlock_free,
     behaviour_of.no_doomed,
@@ -144,12 +146,12 @@ _ON_BEHAVIOUR: Final[tuple[Callable[[Behaviour], Verdict], ...]] = (
     behaviour_of.reversible,
     behaviour_of.home_markings,
 )
-_ON_CONFLICTS: Final[tuple[Callable[[ConflictAnalysis], Verdict], ...]] = (
+_ON_CONFLICTS: Final[tuple[Callable[[ConflictAnalysis[Any]], Verdict], ...]] = (
     conflict.structural_conflict_free,
     conflict.effective_conflict_free,
     conflict.race_free,
 )
-_ON_GRAPH: Final[tuple[Callable[[ReachabilityGraph], Verdict], ...]] = (
+_ON_SPACE: Final[tuple[Callable[[StateSpace[Any]], Verdict], ...]] = (
     commands_agree,
     completions_apart,
     machines_stopped,
@@ -162,7 +164,11 @@ def self_loops(net: Net) -> tuple[str, ...]:
     return tuple(t.name for t in net.transitions if t.self_loops)
 
 
-def self_loop_free(graph: ReachabilityGraph) -> Verdict:
+def _steps(space: StateSpace[Any]) -> Steps | None:
+    return Steps(space) if isinstance(space, ReachabilityGraph) and space.discipline is Discipline.STEP else None
+
+
+def self_loop_free(space: StateSpace[Any]) -> Verdict:
     """No place is both input and output of a transition."""
     question = Question(
         "self-loops",
@@ -170,24 +176,23 @@ def self_loop_free(graph: ReachabilityGraph) -> Verdict:
         Weight.WARNING,
         hint="the transition is dead; if it only reads the place, write a permissive gate",
     )
-    found = self_loops(graph.net)
-    return question.ask(graph, lambda: Answer(not found, found))
+    found = self_loops(space.net)
+    return question.ask(space, lambda: Answer(not found, found))
 
 
-def figures(behaviour: Behaviour, conflicts: ConflictAnalysis) -> Figures:
-    """The figures of a graph, each None where the budget ended before it was known."""
-    graph, net = behaviour.graph, behaviour.graph.net
-    whole = graph.complete
+def figures(behaviour: Behaviour[Any], conflicts: ConflictAnalysis[Any], steps: Steps | None) -> Figures:
+    """The figures of a state space, each None where the budget ended before it was known."""
+    space, net = behaviour.space, behaviour.space.net
+    whole = space.complete
     nonlive = _known(lambda: behaviour.nonlive)
-    stepwise = graph.discipline is Discipline.STEP
     firable = Player(net).firable(net.initial_marking)
     return Figures(
-        markings=graph.n_markings,
-        edges=graph.n_edges,
+        markings=space.n_markings,
+        edges=space.n_edges,
         complete=whole,
-        bytes_per_marking=graph.engine.bytes_per_marking,
-        deadlocks=int(graph.deadlocks.sum()) if whole else None,
-        doomed=_known(lambda: int(behaviour.doomed.sum())),
+        bytes_per_marking=space.engine.bytes_per_marking if isinstance(space, ReachabilityGraph) else None,
+        deadlocks=space.count(space.deadlocks) if whole else None,
+        doomed=_known(lambda: space.count(behaviour.doomed)),
         home=_known(lambda: behaviour.home),
         reversible=_known(lambda: behaviour.reversible),
         live=None if nonlive is None else not nonlive,
@@ -199,7 +204,7 @@ def figures(behaviour: Behaviour, conflicts: ConflictAnalysis) -> Figures:
         structural_conflicts=conflicts.structural,
         effective_conflicts=conflicts.effective if whole else None,
         gate_races=conflicts.races,
-        nonserialisable=_known(lambda: conflicts.nonserialisable) if stepwise else None,
+        nonserialisable=None if steps is None else _known(lambda: steps.nonserialisable),
     )
 
 

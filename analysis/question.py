@@ -1,10 +1,9 @@
 """A question about a net, and how its answer becomes a verdict.
 
-The verdicts of the explicit method share their shape: a statement, a weight, a method (mostly the graph), a cost, and
-a way to be unknown, which is that the budget ended first. That shape is written here once; each technique says only
-what it found. An answer that needs the whole graph asks for it, and the refusal becomes UNKNOWN with the bound reached,
-so that no technique can conclude from a part by forgetting a check. A technique with another way to be unknown answers
-so itself.
+The verdicts share their shape: a statement, a weight, a method (mostly the state space), a cost, and a way to be
+unknown, which is that the budget ended first. That shape is written here once; each technique says only what it found.
+An answer that needs the whole space asks for it, and the refusal becomes UNKNOWN with the bound reached, so that no
+technique can conclude from a part by forgetting a check. A technique with another way to be unknown answers so itself.
 """
 
 from __future__ import annotations
@@ -12,15 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Any
 
-from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
+from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.analysis.spaces.space import StateSpace
 from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
-from firable.semantics.trace import Discipline
-
-METHOD = {
-    Discipline.INTERLEAVING: "reachability graph, interleaving",
-    Discipline.STEP: "reachability graph, synchronous steps",
-}
 
 _STATUS = {True: Status.PROVED, False: Status.VIOLATED, None: Status.UNKNOWN}
 
@@ -45,7 +40,7 @@ class Answer:
 class Question:
     """A property of a net that some technique decides; `code` and `hint` go with a violation.
 
-    `method` is named where it is not the graph itself.
+    `method` is named where it is not the state space itself.
     """
 
     name: str
@@ -55,33 +50,33 @@ class Question:
     hint: str = ""
     method: str = ""
 
-    def ask(self, graph: ReachabilityGraph, find: Callable[[], Answer]) -> Verdict:
-        """The verdict: what `find` answers, or UNKNOWN where it needs more of the graph than there is."""
+    def ask(self, space: StateSpace[Any], find: Callable[[], Answer]) -> Verdict:
+        """The verdict: what `find` answers, or UNKNOWN where it needs more of the space than there is."""
         start = perf_counter()
         try:
             answer = find()
         except (IncompleteGraph, BudgetExceeded) as error:
-            bound = graph.bound or f"{graph.n_markings:,} markings: {error}"
+            bound = space.bound or f"{space.n_markings:,} markings: {error}"
             answer = unknown(bound, "give it a larger budget of markings, memory or time", "F3004")
         violated = answer.holds is False
         return Verdict(
             self.name,
             _STATUS[answer.holds],
             self.statement,
-            self.method or METHOD[graph.discipline],
+            self.method or space.method,
             self.weight,
             answer.code or (self.code if violated else ""),
             answer.hint or (self.hint if violated else ""),
             answer.bound,
             answer.subjects,
             answer.witness,
-            cost=self._cost(graph, start),
-            discipline=graph.discipline.value,
+            cost=self._cost(space, start),
+            discipline=space.discipline.value,
         )
 
     @staticmethod
-    def _cost(graph: ReachabilityGraph, start: float) -> Cost:
-        return Cost(graph.n_markings, graph.n_edges, graph.engine.seconds + perf_counter() - start)
+    def _cost(space: StateSpace[Any], start: float) -> Cost:
+        return Cost(space.n_markings, space.n_edges, (space.cost.seconds or 0.0) + perf_counter() - start)
 
 
 def listed(names: Iterable[str], most: int = 8) -> str:

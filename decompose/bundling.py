@@ -29,10 +29,10 @@ def make_bundle(
     where the net cannot be split; F4003 where the report is not that of exploring this net by interleaving, which is
     how it will be executed, and for everything that must be proved and is not.
     """
-    if report.net != report.graph.net:
+    if report.net != report.space.net:
         message = f"the verdicts are on another net than '{report.net.name}'"
         raise InputError([Diagnostic("F4003", message, "check the net that is to be bundled")])
-    if not report.discipline is report.graph.discipline is Discipline.INTERLEAVING:
+    if not report.discipline is report.space.discipline is Discipline.INTERLEAVING:
         message = "the verdicts are on another discipline than interleaving, by which the net is executed"
         raise InputError([Diagnostic("F4003", message, "check the net with the discipline interleaving")])
     decomposition = split(report.net)

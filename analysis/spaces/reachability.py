@@ -13,7 +13,7 @@ graph. The rejected alternative, evaluating formulas in Rust, would be a second 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
@@ -23,15 +23,13 @@ import numpy.typing as npt
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
-from firable.analysis.spaces.space import WitnessError
+from firable.analysis.spaces.space import Derived, WitnessError, Witnesses
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
-from firable.nets.verdict import Witness
-from firable.semantics.algebra import Bitwise
-from firable.semantics.firing import Valuation, firable
-from firable.semantics.formulas import evaluate
-from firable.semantics.player import FiringSet, NotFirableError, Player
+from firable.nets.verdict import Cost, Witness
+from firable.semantics.algebra import Bitwise, BooleanAlgebra
+from firable.semantics.firing import Valuation
+from firable.semantics.player import FiringSet
 from firable.semantics.trace import Discipline
 
 __all__ = [
@@ -42,7 +40,6 @@ __all__ = [
     "Components",
     "IncompleteGraph",
     "ReachabilityGraph",
-    "WitnessError",
     "explore",
     "first",
     "indexes",
@@ -68,6 +65,10 @@ COLUMNS: Final[Bitwise[Any]] = _Columns(true=np.True_, false=np.False_)
 
 NO_COMPONENT: Final = 2**32 - 1
 _CHUNK: Final = 1 << 16
+_METHODS: Final = {
+    Discipline.INTERLEAVING: "reachability graph, interleaving",
+    Discipline.STEP: "reachability graph, synchronous steps",
+}
 _REASONS: Final = {
     "markings": "the budget of markings is used up",
     "memory": "the budget of memory is used up",
@@ -86,7 +87,7 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class ReachabilityGraph:
+class ReachabilityGraph(Derived):
     """The markings reachable from M0 under one discipline, numbered breadth first; M0 is 0.
 
     A marking with a lower number is never farther from M0, so the lowest number of a set is its shortest witness. What
@@ -97,6 +98,16 @@ class ReachabilityGraph:
     discipline: Discipline
     budget: Budget
     engine: _engine.Graph
+
+    @cached_property
+    def algebra(self) -> Bitwise[Column]:
+        """The sets of markings as a Boolean algebra; true is all of them."""
+        return Bitwise(true=np.ones(self.n_markings, dtype=np.bool_), false=self.none())
+
+    @property
+    def method(self) -> str:
+        """The technique, in words."""
+        return _METHODS[self.discipline]
 
     @property
     def complete(self) -> bool:
@@ -114,6 +125,11 @@ class ReachabilityGraph:
         return self.engine.n_edges
 
     @property
+    def cost(self) -> Cost:
+        """What the exploration took."""
+        return Cost(self.n_markings, self.n_edges, self.engine.seconds)
+
+    @property
     def bound(self) -> str:
         """How far an incomplete exploration went, in words; empty where it is complete."""
         if self.complete:
@@ -122,9 +138,9 @@ class ReachabilityGraph:
         return f"{self.n_markings:,} markings found, {self.n_edges:,} edges followed: {reason}"
 
     @cached_property
-    def player(self) -> Player:
-        """The reference player that replays every witness."""
-        return Player(self.net)
+    def witnesses(self) -> Witnesses:
+        """What replays every witness."""
+        return Witnesses(self.net, self.discipline)
 
     def require_complete(self) -> None:
         """Raise `IncompleteGraph` unless the whole graph is known."""
@@ -147,7 +163,7 @@ class ReachabilityGraph:
     def _words(self) -> npt.NDArray[np.uint64]:
         return np.frombuffer(self.engine.markings_bytes(), "<u8").reshape(self.n_markings, self.engine.words)
 
-    def column(self, term: Callable[[Bitwise[Any], Valuation[Any]], Any]) -> Column:
+    def where(self, term: Callable[[BooleanAlgebra[Any], Valuation[Any]], Any]) -> Column:
         """The value of a Boolean term at every marking; `term` gets the algebra and the reader of places."""
         result = np.empty(self.n_markings, dtype=np.bool_)
         for start in range(0, self.n_markings, _CHUNK):
@@ -155,35 +171,91 @@ class ReachabilityGraph:
             result[start : start + _CHUNK] = term(COLUMNS, _reader(rows))
         return result
 
-    def satisfying(self, formula: Formula) -> Column:
-        """The markings in which a state formula holds."""
-        return self.column(lambda algebra, holds: evaluate(algebra, self.net, formula, holds))
+    def none(self) -> Column:
+        """The empty set of markings."""
+        return np.zeros(self.n_markings, dtype=np.bool_)
 
-    def marked(self, place: int) -> Column:
-        """The markings in which a place holds a token."""
-        return self.column(lambda _, holds: holds(place))
-
-    def may_fire(self, t: int) -> Column:
-        """The markings in which a transition is firable and some valuation opens its external gates."""
-        if not self.net.transitions[t].openable:
-            return np.zeros(self.n_markings, dtype=np.bool_)
-        return self.column(lambda algebra, holds: firable(algebra, self.net, t, holds))
+    @property
+    def initial(self) -> Column:
+        """The set of M0 alone."""
+        found = self.none()
+        found[0] = True
+        return found
 
     @cached_property
     def deadlocks(self) -> Column:
         """The deadlocks among the markings that were expanded."""
-        found = np.zeros(self.n_markings, dtype=np.bool_)
+        found = self.none()
         found[self.engine.deadlocks()] = True
         return found
+
+    def contains(self, markings: Column, marking: Marking) -> bool:
+        """Whether a marking is in a set; False for one that was not found."""
+        index = self.index_of(marking)
+        return index is not None and bool(markings[index])
+
+    def count(self, markings: Column) -> int:
+        """How many markings a set holds."""
+        return int(np.count_nonzero(markings))
 
     def successors(self, index: int) -> list[tuple[FiringSet, int]]:
         """What may fire in a marking, and the number of the marking after it."""
         return [(tuple(fired), target) for fired, target in self.engine.successors(index)]
 
+    def before(self, targets: Column, by: Iterable[int] | None = None) -> Column:
+        """The markings with an edge into the targets (EX); with `by`, an edge that fires one of these transitions."""
+        chosen = None if by is None else set(by)
+        found = self.none()
+        for index in range(self.n_markings):
+            found[index] = any(
+                targets[target] and (chosen is None or not chosen.isdisjoint(fired))
+                for fired, target in self.successors(index)
+            )
+        return found
+
     def backward(self, targets: Column, within: Column | None = None) -> Column:
         """The markings from which a target can be reached (EF), going only through `within` (E[within U targets])."""
         bitmap = self.engine.backward(targets.tobytes(), None if within is None else within.tobytes())
         return _column(bitmap)
+
+    def endless(self, within: Column | None = None) -> Column:
+        """The markings from which a run can go on for ever inside `within` (EG over infinite runs only)."""
+        return self.backward(self.components(within).nontrivial, within)
+
+    def bottom(self) -> Column:
+        """The markings of the bottom component that is nearest to M0."""
+        components = self.components()
+        nearest = first(components.bottom[components.of])
+        if nearest is None:
+            raise WitnessError("a finite graph has a bottom component")
+        found: Column = components.of == components.of[nearest]
+        return found
+
+    def contacts(self) -> Sequence[int]:
+        """For each transition, in how many markings found it is in contact."""
+        return self.engine.contacts()
+
+    def fired(self) -> Sequence[int]:
+        """For each transition, on how many edges it fires."""
+        return self.engine.fired()
+
+    def live(self) -> Sequence[bool]:
+        """For each transition, whether from every marking one can be reached in which it may fire."""
+        return self.engine.live()
+
+    def reversible(self) -> bool:
+        """Whether M0 can be reached from every marking."""
+        return self.engine.reversible()
+
+    def home(self) -> Column:
+        """The home markings: those that can be reached from every reachable marking."""
+        return _column(self.engine.home_markings())
+
+    def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
+        """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""
+        if not self.complete:
+            return super().firable_together(pairs)
+        return tuple(lowest is not None for lowest in self.engine.effective_conflicts(list(pairs)))
 
     def components(self, within: Column | None = None) -> Components:
         """The strongly connected components of the graph, or of its part within a set of markings."""
@@ -200,45 +272,18 @@ class ReachabilityGraph:
         offsets, targets = self.engine.edges()
         return np.frombuffer(offsets, "<u8"), np.frombuffer(targets, "<u4")
 
-    def witness(self, index: int, note: str = "") -> Witness:
+    def witness(self, targets: Column, note: str = "") -> Witness | None:
+        """A shortest firing sequence from M0 into a set, replayed; None where no marking found is in it."""
+        index = first(targets)
+        return None if index is None else self.witness_at(index, note)
+
+    def witness_at(self, index: int, note: str = "") -> Witness:
         """A shortest firing sequence from M0 to a marking, replayed by the reference player.
 
         Raises `WitnessError` where it does not replay.
         """
         firings = [tuple(fired) for fired in self.engine.path_to(index)]
-        reached = self.replay(self.net.initial_marking, firings)
-        if reached != self.marking(index):
-            raise WitnessError("the firing sequence ends in another marking")
-        return self.named(firings, reached, note=note)
-
-    def named(
-        self, firings: list[FiringSet], marking: Marking, cycle: list[FiringSet] | None = None, note: str = ""
-    ) -> Witness:
-        """A firing sequence, and what is fired for ever after it, in the names of the net."""
-        return Witness(
-            tuple(self._names(fired) for fired in firings),
-            tuple(self._names(fired) for fired in cycle or ()),
-            self.net.names(marking),
-            note=note,
-        )
-
-    def _names(self, fired: FiringSet) -> tuple[str, ...]:
-        return tuple(self.net.transitions[t].name for t in fired)
-
-    def replay(self, marking: Marking, firings: list[FiringSet]) -> Marking:
-        """Play a firing sequence by the reference player under the graph's discipline; the marking after it.
-
-        Raises `WitnessError` where it is none of the net.
-        """
-        for fired in firings:
-            allowed = self.player.is_step(marking, fired) if self.discipline is Discipline.STEP else len(fired) == 1
-            if not allowed or not all(self.net.transitions[t].openable for t in fired):
-                raise WitnessError(f"{self._names(fired)} may not fire in {self.net.names(marking)}")
-            try:
-                marking = self.player.fire(marking, fired)
-            except NotFirableError as error:
-                raise WitnessError(str(error)) from error
-        return marking
+        return self.witnesses.replayed(firings, self.marking(index), note)
 
 
 @dataclass(frozen=True, slots=True)

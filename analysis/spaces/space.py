@@ -12,14 +12,18 @@ to disagree on what a word means.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
 from firable.semantics.algebra import BooleanAlgebra
-from firable.semantics.firing import Valuation
+from firable.semantics.firing import Valuation, firable, in_contact
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import FiringSet, NotFirableError, Player
 from firable.semantics.trace import Discipline
 
 S = TypeVar("S")
@@ -33,7 +37,8 @@ class StateSpace(Protocol[S]):
     """The markings reachable from M0 under one discipline, external gates free.
 
     A set is a value of type `S`. What needs all reachable markings raises `IncompleteGraph` where the space is not
-    `complete`, and `BudgetExceeded` where memory ends.
+    `complete`, and `BudgetExceeded` where memory or time ends. The second half follows from the first (`Derived`); a
+    technique writes of it what it knows a quicker way for.
     """
 
     @property
@@ -99,22 +104,6 @@ class StateSpace(Protocol[S]):
         """The markings in which a Boolean term holds; `term` gets the algebra and the reader of places."""
         ...
 
-    def satisfying(self, formula: Formula) -> S:
-        """The markings in which a state formula holds."""
-        ...
-
-    def marked(self, place: int) -> S:
-        """The markings in which a place holds a token."""
-        ...
-
-    def may_fire(self, t: int) -> S:
-        """The markings in which a transition is firable and some valuation opens its external gates."""
-        ...
-
-    def in_contact(self, t: int) -> S:
-        """The markings in contact at a transition."""
-        ...
-
     def contains(self, markings: S, marking: Marking) -> bool:
         """Whether a marking is in a set; False for one that was not found."""
         ...
@@ -135,8 +124,8 @@ class StateSpace(Protocol[S]):
         """The markings from which a run can go on for ever inside `within` (EG over infinite runs only)."""
         ...
 
-    def home(self) -> S:
-        """The home markings: those that can be reached from every reachable marking."""
+    def bottom(self) -> S:
+        """The markings of one bottom component: they reach each other, and nothing leads out of them."""
         ...
 
     def witness(self, targets: S, note: str = "") -> Witness | None:
@@ -145,3 +134,160 @@ class StateSpace(Protocol[S]):
         None where no marking found is in the set. Raises `WitnessError` where it does not replay.
         """
         ...
+
+    # What follows from these.
+
+    def satisfying(self, formula: Formula) -> S:
+        """The markings in which a state formula holds."""
+        ...
+
+    def marked(self, place: int) -> S:
+        """The markings in which a place holds a token."""
+        ...
+
+    def may_fire(self, t: int) -> S:
+        """The markings in which a transition is firable and some valuation opens its external gates."""
+        ...
+
+    def in_contact(self, t: int) -> S:
+        """The markings in contact at a transition."""
+        ...
+
+    def contacts(self) -> Sequence[int]:
+        """For each transition, in how many markings it is in contact."""
+        ...
+
+    def fired(self) -> Sequence[int]:
+        """For each transition, on how many edges it fires, or 1 for "some" where only that is known."""
+        ...
+
+    def live(self) -> Sequence[bool]:
+        """For each transition, whether from every marking one can be reached in which it may fire."""
+        ...
+
+    def reversible(self) -> bool:
+        """Whether M0 can be reached from every marking."""
+        ...
+
+    def home(self) -> S:
+        """The home markings: those that can be reached from every reachable marking."""
+        ...
+
+    def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
+        """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""
+        ...
+
+
+class Derived:
+    """The second half of a state space, from the first."""
+
+    def satisfying(self: StateSpace[S], formula: Formula) -> S:
+        """The markings in which a state formula holds."""
+        return self.where(lambda algebra, holds: evaluate(algebra, self.net, formula, holds))
+
+    def marked(self: StateSpace[S], place: int) -> S:
+        """The markings in which a place holds a token."""
+        return self.where(lambda _, holds: holds(place))
+
+    def may_fire(self: StateSpace[S], t: int) -> S:
+        """The markings in which a transition is firable and some valuation opens its external gates."""
+        if not self.net.transitions[t].openable:
+            return self.algebra.disjunction(())
+        return self.where(lambda algebra, holds: firable(algebra, self.net, t, holds))
+
+    def in_contact(self: StateSpace[S], t: int) -> S:
+        """The markings in contact at a transition."""
+        return self.where(lambda algebra, holds: in_contact(algebra, self.net, t, holds))
+
+    def contacts(self: StateSpace[S]) -> Sequence[int]:
+        """For each transition, in how many markings it is in contact."""
+        return tuple(self.count(self.in_contact(t)) for t in range(len(self.net.transitions)))
+
+    def fired(self: StateSpace[S]) -> Sequence[int]:
+        """For each transition, in how many markings it may fire."""
+        return tuple(self.count(self.may_fire(t)) for t in range(len(self.net.transitions)))
+
+    def live(self: StateSpace[S]) -> Sequence[bool]:
+        """For each transition, whether from every marking one can be reached in which it may fire.
+
+        It suffices to look at one bottom component where that is the only one, and else at each transition.
+        """
+        self.require_complete()
+        transitions = range(len(self.net.transitions))
+        if self.reversible():
+            return tuple(fired > 0 for fired in self.fired())
+        home = self.home()
+        if self.count(home):
+            return tuple(self.count(self.algebra.conjunction([home, self.may_fire(t)])) > 0 for t in transitions)
+        return tuple(self.count(self.backward(self.may_fire(t))) == self.n_markings for t in transitions)
+
+    def reversible(self: StateSpace[S]) -> bool:
+        """Whether M0 can be reached from every marking."""
+        self.require_complete()
+        return self.count(self.backward(self.initial)) == self.n_markings
+
+    def home(self: StateSpace[S]) -> S:
+        """The home markings: the bottom component, where every marking leads into it."""
+        bottom = self.bottom()
+        return bottom if self.count(self.backward(bottom)) == self.n_markings else self.algebra.disjunction(())
+
+    def firable_together(self: StateSpace[S], pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
+        """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""
+
+        def by_eq_1(t: int) -> S:
+            return self.where(lambda algebra, holds: firable(algebra, self.net, t, holds))
+
+        where = {t: by_eq_1(t) for t in sorted({t for pair in pairs for t in pair})}
+        return tuple(self.count(self.algebra.conjunction([where[t], where[u]])) > 0 for t, u in pairs)
+
+
+@dataclass(frozen=True)
+class Witnesses:
+    """Firing sequences of a net under a discipline: played by the reference player, and put into the net's names."""
+
+    net: Net
+    discipline: Discipline
+
+    @cached_property
+    def player(self) -> Player:
+        """The reference player."""
+        return Player(self.net)
+
+    def play(self, marking: Marking, firings: Iterable[FiringSet]) -> Marking:
+        """Play a firing sequence from a marking; the marking after it.
+
+        Raises `WitnessError` where it is none of the net.
+        """
+        for fired in firings:
+            allowed = self.player.is_step(marking, fired) if self.discipline is Discipline.STEP else len(fired) == 1
+            if not allowed or not all(self.net.transitions[t].openable for t in fired):
+                raise WitnessError(f"{self.names(fired)} may not fire in {self.net.names(marking)}")
+            try:
+                marking = self.player.fire(marking, fired)
+            except NotFirableError as error:
+                raise WitnessError(str(error)) from error
+        return marking
+
+    def named(
+        self, firings: Iterable[FiringSet], marking: Marking, cycle: Iterable[FiringSet] = (), note: str = ""
+    ) -> Witness:
+        """A firing sequence, the marking it ends in, and what is fired for ever after it, in the names of the net."""
+        return Witness(
+            tuple(self.names(fired) for fired in firings),
+            tuple(self.names(fired) for fired in cycle),
+            self.net.names(marking),
+            note=note,
+        )
+
+    def replayed(self, firings: Sequence[FiringSet], reached: Marking, note: str = "") -> Witness:
+        """The witness that a firing sequence from M0 is, which must end in the marking given.
+
+        Raises `WitnessError` where it does not replay or ends elsewhere.
+        """
+        if self.play(self.net.initial_marking, firings) != reached:
+            raise WitnessError("the firing sequence ends in another marking")
+        return self.named(firings, reached, note=note)
+
+    def names(self, fired: FiringSet) -> tuple[str, ...]:
+        """The names of the transitions fired together."""
+        return tuple(self.net.transitions[t].name for t in fired)

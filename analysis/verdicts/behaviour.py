@@ -1,6 +1,6 @@
-"""Contact, deadlock, liveness, reversibility, home and doomed markings: what the reachability graph says by its shape.
+"""Contact, deadlock, liveness, reversibility, home and doomed markings: what the state space says by its shape.
 
-All are the definitions of SEMANTICS, decided on the explicit graph:
+All are the definitions of SEMANTICS, decided on any state space:
 
 - a transition is *live* iff from every reachable marking one can be reached in which it may fire;
 - the net is *reversible* iff M0 can be reached from every reachable marking;
@@ -20,33 +20,38 @@ violation at the place where it can still be mended. Reversibility and home mark
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, Generic
 
 from firable.analysis.question import Answer, Question, listed, no, yes
-from firable.analysis.spaces.reachability import Column, ReachabilityGraph, WitnessError, first
-from firable.nets.verdict import Verdict, Weight
+from firable.analysis.spaces.space import S, StateSpace, WitnessError
+from firable.nets.verdict import Verdict, Weight, Witness
+from firable.semantics.algebra import BOOL
+from firable.semantics.firing import in_contact
+from firable.semantics.player import holds_in
 
 
 @dataclass(frozen=True)
-class Behaviour:
+class Behaviour(Generic[S]):
     """The sets of markings and transitions that the verdicts speak of; each is computed once, when asked for.
 
     Raises `IncompleteGraph` or `BudgetExceeded` where a set needs more than is there.
     """
 
-    graph: ReachabilityGraph
+    space: StateSpace[S]
 
     @cached_property
     def contacts(self) -> dict[str, int]:
         """For each transition that is in contact somewhere, the number of markings found where it is."""
-        counts = self.graph.engine.contacts()
+        counts = self.space.contacts()
         return {self._name(t): count for t, count in enumerate(counts) if count}
 
     @cached_property
     def fired(self) -> tuple[int, ...]:
         """The transitions that fire on some edge found, by index."""
-        return tuple(t for t, count in enumerate(self.graph.engine.fired()) if count)
+        return tuple(t for t, count in enumerate(self.space.fired()) if count)
 
     @cached_property
     def never_fire(self) -> tuple[str, ...]:
@@ -57,47 +62,55 @@ class Behaviour:
         """
         return tuple(
             transition.name
-            for transition in self.graph.net.transitions
+            for transition in self.space.net.transitions
             if transition.self_loops or not transition.openable
         )
 
     @cached_property
     def dead(self) -> tuple[str, ...]:
         """The transitions that never fire."""
-        self.graph.require_complete()
-        return tuple(t.name for i, t in enumerate(self.graph.net.transitions) if i not in self.fired)
+        self.space.require_complete()
+        return tuple(t.name for i, t in enumerate(self.space.net.transitions) if i not in self.fired)
+
+    @cached_property
+    def _live(self) -> Sequence[bool]:
+        return self.space.live()
 
     @cached_property
     def live(self) -> tuple[str, ...]:
         """The live transitions."""
-        return tuple(self._name(t) for t, live in enumerate(self.graph.engine.live()) if live)
+        return tuple(self._name(t) for t, live in enumerate(self._live) if live)
 
     @cached_property
     def nonlive(self) -> tuple[str, ...]:
         """The transitions that are not live, dead ones included."""
-        return tuple(self._name(t) for t, live in enumerate(self.graph.engine.live()) if not live)
+        return tuple(self._name(t) for t, live in enumerate(self._live) if not live)
 
     @cached_property
     def reversible(self) -> bool:
         """Whether M0 can be reached from every reachable marking."""
-        return self.graph.engine.reversible()
+        return self.space.reversible()
 
     @cached_property
     def home(self) -> int:
         """The number of home markings."""
-        return sum(self.graph.engine.home_markings())
+        return self.space.count(self.space.home())
 
     @cached_property
-    def doomed(self) -> Column:
-        """The markings from which every run ends in a deadlock."""
-        doomed: Column = ~self.graph.backward(self.graph.components().nontrivial)
-        return doomed
+    def doomed(self) -> S:
+        """The markings from which every run ends in a deadlock: no run goes on for ever."""
+        return self.space.algebra.negation(self.space.endless())
+
+    @property
+    def lost(self) -> S:
+        """The markings from which M0 cannot be reached again."""
+        return self.space.algebra.negation(self.space.backward(self.space.initial))
 
     def _name(self, t: int) -> str:
-        return self.graph.net.transitions[t].name
+        return self.space.net.transitions[t].name
 
 
-def contact_free(behaviour: Behaviour) -> Verdict:
+def contact_free(behaviour: Behaviour[Any]) -> Verdict:
     """No reachable marking is in contact: the guard of the firing rule hides no collision."""
     question = Question(
         "contact-free",
@@ -106,21 +119,30 @@ def contact_free(behaviour: Behaviour) -> Verdict:
     )
 
     def find() -> Answer:
-        graph, counts = behaviour.graph, behaviour.contacts
+        space, counts = behaviour.space, behaviour.contacts
         if counts:
-            lowest = {t: graph.engine.contact_witness(graph.net.transition_index[t]) for t in counts}
-            index, name = min((i, t) for t, i in lowest.items() if i is not None)
-            masks = graph.net.masks[graph.net.transition_index[name]]
-            full = graph.net.names(masks.outputs & ~masks.inputs & graph.marking(index))
-            note = f"the inputs of {name} are there and {listed(full)} is full"
-            return no(tuple(counts), graph.witness(index, note))
-        graph.require_complete()
+            net = space.net
+            blocked = [net.transition_index[name] for name in counts]
+            return no(tuple(counts), _nearest_contact(space, blocked))
+        space.require_complete()
         return yes()
 
-    return question.ask(behaviour.graph, find)
+    return question.ask(behaviour.space, find)
 
 
-def deadlock_free(behaviour: Behaviour) -> Verdict:
+def _nearest_contact(space: StateSpace[S], blocked: Sequence[int]) -> Witness:
+    """A sequence to a marking in contact, and what is full there."""
+    net = space.net
+    found = space.witness(space.algebra.disjunction(space.in_contact(t) for t in blocked))
+    if found is None:
+        raise WitnessError("there are markings in contact, and none of them is found")
+    marking = net.marking(found.marking)
+    t = next(t for t in blocked if in_contact(BOOL, net, t, holds_in(marking)))
+    full = net.names(net.masks[t].outputs & ~net.masks[t].inputs & marking)
+    return replace(found, note=f"the inputs of {net.transitions[t].name} are there and {listed(full)} is full")
+
+
+def deadlock_free(behaviour: Behaviour[Any]) -> Verdict:
     """No reachable marking is a deadlock."""
     question = Question(
         "deadlock-free",
@@ -129,22 +151,20 @@ def deadlock_free(behaviour: Behaviour) -> Verdict:
     )
 
     def find() -> Answer:
-        graph = behaviour.graph
-        deadlock = first(graph.deadlocks)
-        if deadlock is not None:
-            count = int(graph.deadlocks.sum())
+        space = behaviour.space
+        if count := space.count(space.deadlocks):
             found = (
                 "1 marking of the net is a deadlock" if count == 1 else f"{count:,} markings of the net are deadlocks"
             )
-            note = found if graph.complete else f"at least {found}"
-            return no((), graph.witness(deadlock, note))
-        graph.require_complete()
+            note = found if space.complete else f"at least {found}"
+            return no((), space.witness(space.deadlocks, note))
+        space.require_complete()
         return yes()
 
-    return question.ask(behaviour.graph, find)
+    return question.ask(behaviour.space, find)
 
 
-def quasi_live(behaviour: Behaviour) -> Verdict:
+def quasi_live(behaviour: Behaviour[Any]) -> Verdict:
     """Every transition can fire at least once; the ones that cannot are dead."""
     question = Question(
         "quasi-live",
@@ -153,18 +173,18 @@ def quasi_live(behaviour: Behaviour) -> Verdict:
     )
 
     def find() -> Answer:
-        if behaviour.graph.complete:
+        if behaviour.space.complete:
             return Answer(not behaviour.dead, behaviour.dead)
         if behaviour.never_fire:
             return no(behaviour.never_fire)
-        if len(behaviour.fired) < len(behaviour.graph.net.transitions):
-            behaviour.graph.require_complete()
+        if len(behaviour.fired) < len(behaviour.space.net.transitions):
+            behaviour.space.require_complete()
         return yes()
 
-    return question.ask(behaviour.graph, find)
+    return question.ask(behaviour.space, find)
 
 
-def all_live(behaviour: Behaviour) -> Verdict:
+def all_live(behaviour: Behaviour[Any]) -> Verdict:
     """Every transition is live."""
     question = Question(
         "live",
@@ -174,20 +194,21 @@ def all_live(behaviour: Behaviour) -> Verdict:
     )
 
     def find() -> Answer:
-        graph, nonlive = behaviour.graph, behaviour.nonlive
+        space, nonlive = behaviour.space, behaviour.nonlive
         if not nonlive:
             return yes()
         # One is shown, as each costs a closure; a dead one only where there is no other, since it has its own verdict.
         name = next((name for name in nonlive if name not in behaviour.dead), nonlive[0])
-        index = first(~graph.backward(graph.may_fire(graph.net.transition_index[name])))
-        if index is None:
+        again = space.backward(space.may_fire(space.net.transition_index[name]))
+        witness = space.witness(space.algebra.negation(again), f"{name} can never fire after this")
+        if witness is None:
             raise WitnessError(f"{name} is not live and can fire again from everywhere")
-        return no(nonlive, graph.witness(index, f"{name} can never fire after this"))
+        return no(nonlive, witness)
 
-    return question.ask(behaviour.graph, find)
+    return question.ask(behaviour.space, find)
 
 
-def reversible(behaviour: Behaviour) -> Verdict:
+def reversible(behaviour: Behaviour[Any]) -> Verdict:
     """M0 can be reached from every reachable marking."""
     question = Question(
         "reversible", "the initial marking can be reached from every reachable marking", Weight.INFORMATION
@@ -196,37 +217,25 @@ def reversible(behaviour: Behaviour) -> Verdict:
     def find() -> Answer:
         if behaviour.reversible:
             return yes()
-        graph = behaviour.graph
-        targets = graph.deadlocks & False
-        targets[0] = True
-        index = first(~graph.backward(targets))
-        witness = None if index is None else graph.witness(index, "the initial marking can never be reached again")
-        return no((), witness)
+        return no((), behaviour.space.witness(behaviour.lost, "the initial marking can never be reached again"))
 
-    return question.ask(behaviour.graph, find)
+    return question.ask(behaviour.space, find)
 
 
-def home_markings(behaviour: Behaviour) -> Verdict:
+def home_markings(behaviour: Behaviour[Any]) -> Verdict:
     """Some marking can be reached from every reachable marking."""
     question = Question("home-markings", "some marking can be reached from every reachable marking", Weight.INFORMATION)
 
     def find() -> Answer:
-        graph = behaviour.graph
         if behaviour.home:
             return yes()
-        components = graph.components()
-        index = first(components.bottom[components.of])
-        if index is None:
-            raise WitnessError("a finite graph has a bottom component")
-        note = (
-            f"nothing leads back from here, and {int(components.bottom.sum()) - 1:,} other parts of the graph are such"
-        )
-        return no((), graph.witness(index, note))
+        note = "nothing leads back from here, and another part of the state space is such too"
+        return no((), behaviour.space.witness(behaviour.space.bottom(), note))
 
-    return question.ask(behaviour.graph, find)
+    return question.ask(behaviour.space, find)
 
 
-def no_doomed(behaviour: Behaviour) -> Verdict:
+def no_doomed(behaviour: Behaviour[Any]) -> Verdict:
     """No reachable marking is doomed: while the cell runs, every deadlock can still be avoided."""
     question = Question(
         "doomed-markings",
@@ -236,11 +245,11 @@ def no_doomed(behaviour: Behaviour) -> Verdict:
     )
 
     def find() -> Answer:
-        graph = behaviour.graph
-        index = first(behaviour.doomed)
-        if index is None:
+        space, doomed = behaviour.space, behaviour.doomed
+        count = space.count(doomed)
+        if not count:
             return yes()
-        note = f"{int(behaviour.doomed.sum()):,} doomed markings; from here every run ends in a deadlock"
-        return no((), graph.witness(index, note))
+        note = f"{count:,} doomed markings; from here every run ends in a deadlock"
+        return no((), space.witness(doomed, note))
 
-    return question.ask(behaviour.graph, find)
+    return question.ask(behaviour.space, find)

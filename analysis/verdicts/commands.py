@@ -27,12 +27,12 @@ sensor by itself.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
-
-import numpy as np
+from typing import Any
 
 from firable.analysis.question import Answer, Question, listed, no, yes
-from firable.analysis.spaces.reachability import Column, ReachabilityGraph, first, indexes
+from firable.analysis.spaces.space import S, StateSpace, WitnessError
 from firable.nets.net import Net, Place
 from firable.nets.verdict import Verdict, Weight
 from firable.semantics.player import Player
@@ -63,7 +63,7 @@ def entries(net: Net, firings: Iterable[Iterable[str]], place: str) -> tuple[str
     return tuple(found)
 
 
-def commands_agree(graph: ReachabilityGraph) -> Verdict:
+def commands_agree(space: StateSpace[Any]) -> Verdict:
     """No two places that send different commands to one machine hold a token at one reachable marking."""
     question = Question(
         "conflicting-commands",
@@ -73,10 +73,10 @@ def commands_agree(graph: ReachabilityGraph) -> Verdict:
     )
 
     places = {
-        machine: sorted(p for sent in names.values() for p in sent) for machine, names in machines(graph.net).items()
+        machine: sorted(p for sent in names.values() for p in sent) for machine, names in machines(space.net).items()
     }
     return _kept_apart(
-        graph,
+        space,
         question,
         places,
         lambda p, q: p.command != q.command,
@@ -84,7 +84,7 @@ def commands_agree(graph: ReachabilityGraph) -> Verdict:
     )
 
 
-def completions_apart(graph: ReachabilityGraph) -> Verdict:
+def completions_apart(space: StateSpace[Any]) -> Verdict:
     """No two places that wait for the same completion signal hold a token at one reachable marking."""
     question = Question(
         "shared-completions",
@@ -94,11 +94,11 @@ def completions_apart(graph: ReachabilityGraph) -> Verdict:
     )
 
     waiting: dict[str, list[int]] = {}
-    for p, place in enumerate(graph.net.places):
+    for p, place in enumerate(space.net.places):
         if place.completion is not None:
             waiting.setdefault(place.completion, []).append(p)
     return _kept_apart(
-        graph,
+        space,
         question,
         waiting,
         lambda p, q: p.completion == q.completion,
@@ -107,7 +107,7 @@ def completions_apart(graph: ReachabilityGraph) -> Verdict:
 
 
 def _kept_apart(
-    graph: ReachabilityGraph,
+    space: StateSpace[Any],
     question: Question,
     groups: Mapping[str, Sequence[int]],
     clash: Callable[[Place, Place], bool],
@@ -116,25 +116,31 @@ def _kept_apart(
     """No two clashing places of a group hold a token at one reachable marking; violated by the nearest that do."""
 
     def find() -> Answer:
-        places, clashes = graph.net.places, []
+        places, algebra, clashes = space.net.places, space.algebra, []
+        together = algebra.disjunction(())
         for name, group in groups.items():
             pairs = [(p, q) for p, q in combinations(group, 2) if clash(places[p], places[q])]
-            columns = {p: graph.marked(p) for p in dict.fromkeys(p for pair in pairs for p in pair)}
+            marked = {p: space.marked(p) for p in dict.fromkeys(p for pair in pairs for p in pair)}
             for p, q in pairs:
-                index = first(columns[p] & columns[q])
-                if index is not None:
-                    clashes.append((index, name, p, q))
+                both = algebra.conjunction([marked[p], marked[q]])
+                if space.count(both):
+                    clashes.append((name, p, q))
+                    together = algebra.disjunction([together, both])
         if not clashes:
-            graph.require_complete()
+            space.require_complete()
             return yes()
-        index, name, p, q = min(clashes)
-        subjects = dict.fromkeys(places[place].name for *_, p, q in sorted(clashes) for place in (p, q))
-        return no(tuple(subjects), graph.witness(index, note(name, places[p], places[q])))
+        subjects = tuple(dict.fromkeys(places[place].name for _, p, q in clashes for place in (p, q)))
+        witness = space.witness(together)
+        if witness is None:
+            raise WitnessError("places hold a token together, and no marking shows it")
+        shown = set(witness.marking)
+        said = (note(name, places[p], places[q]) for name, p, q in clashes if {places[p].name, places[q].name} <= shown)
+        return no(subjects, replace(witness, note=next(said)))
 
-    return question.ask(graph, find)
+    return question.ask(space, find)
 
 
-def machines_stopped(graph: ReachabilityGraph) -> Verdict:
+def machines_stopped(space: StateSpace[Any]) -> Verdict:
     """Every command that is sent follows or is followed by a command of another name to its machine.
 
     Cost: next to none where M0 can be reached from everywhere; otherwise, at worst, one backward closure for each
@@ -148,70 +154,56 @@ def machines_stopped(graph: ReachabilityGraph) -> Verdict:
     )
 
     def find() -> Answer:
-        net, found = graph.net, []
+        net, found = space.net, []
         # Machines with one command first: their violation needs no more than the marking that shows it.
         for machine, names in sorted(machines(net).items(), key=lambda item: len(item[1])):
-            if len(names) > 1 and not graph.complete:
+            if len(names) > 1 and not space.complete:
                 break
-            for name, source in _unanswered(graph, names):
-                found.append((machine, name, names[name], source))
+            found += [(machine, name, names[name]) for name in _unanswered(space, names)]
         if not found:
-            graph.require_complete()
+            space.require_complete()
             return yes()
-        machine, name, _, index = found[0]
-        others = listed(f"{machine} {name}" for machine, name, _, _ in found)
+        machine, name, sending = found[0]
+        others = listed(f"{machine} {name}" for machine, name, _ in found)
         hint = (
             f"after {others} no other command is ever sent: make sure that the machine stops by itself, or add a stop"
         )
-        subjects = tuple(net.places[p].name for _, _, sending, _ in found for p in sending)
-        return no(subjects, graph.witness(index, f"the next firing can send {machine} {name}"), hint)
+        subjects = tuple(net.places[p].name for _, _, sending in found for p in sending)
+        witness = space.witness(_sources(space, sending), f"the next firing can send {machine} {name}")
+        return no(subjects, witness, hint)
 
-    return question.ask(graph, find)
+    return question.ask(space, find)
 
 
-def _unanswered(graph: ReachabilityGraph, names: dict[str, tuple[int, ...]]) -> Iterator[tuple[str, int]]:
-    """The commands of one machine that are sent, and that no other one follows or precedes; with a marking before."""
-    entered = {name: sources for name, sending in names.items() if (sources := _sources(graph, sending)).any()}
-    if len(entered) > 1 and graph.engine.reversible():
+def _unanswered(space: StateSpace[S], names: dict[str, tuple[int, ...]]) -> Iterator[str]:
+    """The commands of one machine that are sent, and that no other one follows or precedes."""
+    sources = {name: _sources(space, sending) for name, sending in names.items()}
+    sources = {name: markings for name, markings in sources.items() if space.count(markings)}
+    if len(sources) > 1 and space.reversible():
         return  # from every marking every other one can be reached, so each command follows each
-    closing: dict[str, Column] = {}
+    closing: dict[str, S] = {}
 
     def follows(after: str, before: str) -> bool:
-        entries_before = _after_entry(graph, names[before], entered[before])
-        # Mostly the other command is near, and a search that stops there spares a closure of the whole graph.
-        if graph.engine.path_between(next(entries_before), entered[after].tobytes()) is not None:
-            return True
         if after not in closing:
-            closing[after] = graph.backward(entered[after])
-        near = entered[before] & closing[after]  # what leads into the closure lies in it
-        return any(closing[after][target] for target in _after_entry(graph, names[before], near))
+            closing[after] = space.backward(sources[after])
+        return space.count(space.before(closing[after], _senders(space.net, names[before]))) > 0
 
-    for name, sources in entered.items():
-        source = first(sources)
-        if source is not None and not any(
-            follows(name, other) or follows(other, name) for other in entered if other != name
-        ):
-            yield name, source
+    for name in sources:
+        if not any(follows(name, other) or follows(other, name) for other in sources if other != name):
+            yield name
 
 
-def _sources(graph: ReachabilityGraph, places: tuple[int, ...]) -> Column:
+def _senders(net: Net, places: tuple[int, ...]) -> tuple[int, ...]:
+    """The transitions that put a token on one of the places; where one fires the place was empty, so it sends."""
+    return tuple(sorted({t for p in places for t in net.producers[p]}))
+
+
+def _sources(space: StateSpace[S], places: tuple[int, ...]) -> S:
     """The markings in which a transition may fire that puts a token on one of the places."""
-    found = np.zeros(graph.n_markings, dtype=np.bool_)
-    for t in sorted({t for p in places for t in graph.net.producers[p]}):
-        found |= graph.may_fire(t)
-    return found
+    return space.algebra.disjunction(space.may_fire(t) for t in _senders(space.net, places))
 
 
-def _after_entry(graph: ReachabilityGraph, places: tuple[int, ...], sources: Column) -> Iterator[int]:
-    """The markings after each firing that puts a token on one of the places, from the given markings."""
-    marked = [graph.marked(p) for p in places]
-    for index in indexes(sources):
-        for _, target in graph.successors(index):
-            if any(column[target] and not column[index] for column in marked):
-                yield target
-
-
-def no_command_in_initial_marking(graph: ReachabilityGraph) -> Verdict:
+def no_command_in_initial_marking(space: StateSpace[Any]) -> Verdict:
     """No place with an output signal is marked in M0."""
     question = Question(
         "output-signals-in-M0",
@@ -220,5 +212,5 @@ def no_command_in_initial_marking(graph: ReachabilityGraph) -> Verdict:
         "F3002",
         "no command is sent for a token that is there from the start: begin in a place without `send`",
     )
-    names = tuple(place.name for place in graph.net.places if place.marked and place.command is not None)
-    return question.ask(graph, lambda: Answer(not names, names))
+    names = tuple(place.name for place in space.net.places if place.marked and place.command is not None)
+    return question.ask(space, lambda: Answer(not names, names))

@@ -16,12 +16,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Generic
 
+from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.question import Answer, Question, listed, no, yes
-from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
+from firable.analysis.spaces.reachability import ReachabilityGraph
+from firable.analysis.spaces.space import S, StateSpace
 from firable.nets.net import Net
 from firable.nets.verdict import Verdict, Weight
 from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts
+from firable.semantics.firing import firable
 from firable.semantics.trace import Discipline
 
 Pair = tuple[str, str]
@@ -41,73 +45,51 @@ class Pairs:
 
 
 @dataclass(frozen=True)
-class ConflictAnalysis:
-    """The conflicts and races of the net of a graph; each is computed once, when asked for."""
+class ConflictAnalysis(Generic[S]):
+    """The conflicts and races of the net of a state space; each is computed once, when asked for."""
 
-    graph: ReachabilityGraph
+    space: StateSpace[S]
 
     @cached_property
     def structural(self) -> Pairs:
         """The pairs that share an input or an output place."""
-        by_input, by_output = structural_conflicts(self.graph.net)
+        by_input, by_output = structural_conflicts(self.space.net)
         return Pairs(self._named(by_input), self._named(by_output))
 
     @cached_property
-    def met(self) -> dict[Pair, int]:
-        """The pairs in effective conflict at a marking found, with the lowest such marking."""
+    def met(self) -> tuple[Pair, ...]:
+        """The pairs in effective conflict at a marking found."""
         pairs = [self._indexes(pair) for pair in self.structural.all]
-        pairs = [pair for pair in pairs if jointly_openable(self.graph.net, pair)]
-        found = self.graph.engine.effective_conflicts(pairs)
-        return {
-            self._named((pair,))[0]: marking for pair, marking in zip(pairs, found, strict=True) if marking is not None
-        }
+        pairs = [pair for pair in pairs if jointly_openable(self.space.net, pair)]
+        found = self.space.firable_together(pairs)
+        return self._named(tuple(pair for pair, met in zip(pairs, found, strict=True) if met))
+
+    def meeting(self, pair: Pair) -> S:
+        """The markings found in which two transitions are both firable by Eq. (1)."""
+        t, u = self._indexes(pair)
+        net = self.space.net
+        return self.space.where(lambda a, holds: a.conjunction([firable(a, net, t, holds), firable(a, net, u, holds)]))
 
     @cached_property
     def effective(self) -> Pairs:
         """The pairs in effective conflict; raises `IncompleteGraph` where more may come."""
-        self.graph.require_complete()
+        self.space.require_complete()
+        met = set(self.met)
         return Pairs(
-            tuple(pair for pair in self.structural.by_input if pair in self.met),
-            tuple(pair for pair in self.structural.by_output if pair in self.met),
+            tuple(pair for pair in self.structural.by_input if pair in met),
+            tuple(pair for pair in self.structural.by_output if pair in met),
         )
 
     @cached_property
     def races(self) -> tuple[Pair, ...]:
         """The gate races (t, u): t closes an internal gate of u."""
-        return self._named(tuple(gate_races(self.graph.net)))
-
-    @cached_property
-    def nonserialisable(self) -> tuple[tuple[str, ...], ...]:
-        """The steps of a step graph that no order can replay; raises `IncompleteGraph` where more may come.
-
-        Raises `ValueError` for an interleaving graph, which has no steps.
-        """
-        if races_may_cycle(self.graph.net):
-            self.graph.require_complete()
-        return tuple(self.unordered)
-
-    @cached_property
-    def unordered(self) -> dict[tuple[str, ...], int]:
-        """The steps found that no order can replay, with the lowest marking at which each may fire.
-
-        Of a part of the graph there may be more. Raises `ValueError` for an interleaving graph, which has no steps.
-        """
-        if self.graph.discipline is not Discipline.STEP:
-            raise ValueError("only the step graph has steps")
-        found: dict[tuple[str, ...], int] = {}
-        if not races_may_cycle(self.graph.net):
-            return found
-        for index in range(self.graph.n_markings):
-            for fired, _ in self.graph.successors(index):
-                if len(fired) > 1 and not self.graph.player.serialisable(fired):
-                    found.setdefault(tuple(self.graph.net.transitions[t].name for t in fired), index)
-        return found
+        return self._named(tuple(gate_races(self.space.net)))
 
     def _indexes(self, pair: Pair) -> tuple[int, int]:
-        return self.graph.net.transition_index[pair[0]], self.graph.net.transition_index[pair[1]]
+        return self.space.net.transition_index[pair[0]], self.space.net.transition_index[pair[1]]
 
     def _named(self, pairs: tuple[tuple[int, int], ...]) -> tuple[Pair, ...]:
-        names = [transition.name for transition in self.graph.net.transitions]
+        names = [transition.name for transition in self.space.net.transitions]
         return tuple((names[t], names[u]) for t, u in pairs)
 
 
@@ -127,21 +109,58 @@ def races_may_cycle(net: Net) -> bool:
     return False
 
 
-def structural_conflict_free(analysis: ConflictAnalysis) -> Verdict:
+@dataclass(frozen=True)
+class Steps:
+    """The steps of a step graph that no order of single firings replays.
+
+    Raises `ValueError` for an interleaving graph, which has no steps.
+    """
+
+    graph: ReachabilityGraph
+
+    def __post_init__(self) -> None:
+        if self.graph.discipline is not Discipline.STEP:
+            raise ValueError("only the step graph has steps")
+
+    @cached_property
+    def unordered(self) -> dict[tuple[str, ...], int]:
+        """The steps found that no order can replay, with the lowest marking at which each may fire.
+
+        Of a part of the graph there may be more.
+        """
+        found: dict[tuple[str, ...], int] = {}
+        if not races_may_cycle(self.graph.net):
+            return found
+        player = self.graph.witnesses.player
+        for index in range(self.graph.n_markings):
+            for fired, _ in self.graph.successors(index):
+                if len(fired) > 1 and not player.serialisable(fired):
+                    found.setdefault(self.graph.witnesses.names(fired), index)
+        return found
+
+    @cached_property
+    def nonserialisable(self) -> tuple[tuple[str, ...], ...]:
+        """The steps that no order can replay; raises `IncompleteGraph` where more may come."""
+        if races_may_cycle(self.graph.net):
+            self.graph.require_complete()
+        return tuple(self.unordered)
+
+
+def structural_conflict_free(analysis: ConflictAnalysis[Any]) -> Verdict:
     """No two transitions share an input or an output place."""
     question = Question(
         "structural-conflicts", "no two transitions share an input or an output place", Weight.INFORMATION
     )
     pairs = analysis.structural.all
-    return question.ask(analysis.graph, lambda: Answer(not pairs, _spelled(pairs)))
+    return question.ask(analysis.space, lambda: Answer(not pairs, _spelled(pairs)))
 
 
-def effective_conflict_free(analysis: ConflictAnalysis) -> Verdict:
+def effective_conflict_free(analysis: ConflictAnalysis[Any]) -> Verdict:
     """No two transitions that share a place are firable at one reachable marking and openable by one valuation.
 
     Warns where an effective conflict is decided by no arbiter of the file; informs where all are.
     """
-    net = analysis.graph.net
+    net = analysis.space.net
     decided = [set(arbiter.among) for arbiter in net.arbiters]
     try:
         competing = list(analysis.met)
@@ -155,31 +174,30 @@ def effective_conflict_free(analysis: ConflictAnalysis) -> Verdict:
     )
 
     def find() -> Answer:
-        graph = analysis.graph
+        space = analysis.space
         if not analysis.met:
-            graph.require_complete()
+            space.require_complete()
             return yes()
-        pairs = [pair for pair in analysis.structural.all if pair in analysis.met]
         hint = ""
         if undecided:
             hint = (
                 f"no arbiter names {' and '.join(undecided[0])}: the order of the file decides; add one to `arbiters`"
             )
-        pair = min(undecided or pairs, key=lambda pair: analysis.met[pair])
-        witness = graph.witness(analysis.met[pair], f"here {' and '.join(pair)} compete")
-        return no(_spelled(pairs), witness, hint)
+        pair = (undecided or analysis.met)[0]
+        witness = space.witness(analysis.meeting(pair), f"here {' and '.join(pair)} compete")
+        return no(_spelled(analysis.met), witness, hint)
 
-    return question.ask(analysis.graph, find)
+    return question.ask(analysis.space, find)
 
 
-def race_free(analysis: ConflictAnalysis) -> Verdict:
+def race_free(analysis: ConflictAnalysis[Any]) -> Verdict:
     """No transition closes an internal gate of another."""
     question = Question("gate-races", "no transition closes an internal gate of another one", Weight.INFORMATION)
     races = tuple(f"{t} -> {u}" for t, u in analysis.races)
-    return question.ask(analysis.graph, lambda: Answer(not races, races))
+    return question.ask(analysis.space, lambda: Answer(not races, races))
 
 
-def steps_serialisable(analysis: ConflictAnalysis) -> Verdict:
+def steps_serialisable(steps: Steps) -> Verdict:
     """Every step of the step graph can be replayed one firing after the other."""
     question = Question(
         "steps-serialisable",
@@ -189,16 +207,16 @@ def steps_serialisable(analysis: ConflictAnalysis) -> Verdict:
     )
 
     def find() -> Answer:
-        found = analysis.unordered
+        found = steps.unordered
         if found:
             step, index = min(found.items(), key=lambda item: item[1])
-            witness = analysis.graph.witness(index, f"here the step of {listed(step)} has no order")
+            witness = steps.graph.witness_at(index, f"here the step of {listed(step)} has no order")
             return no(tuple(" + ".join(step) for step in found), witness)
-        if races_may_cycle(analysis.graph.net):
-            analysis.graph.require_complete()
+        if races_may_cycle(steps.graph.net):
+            steps.graph.require_complete()
         return yes()
 
-    return question.ask(analysis.graph, find)
+    return question.ask(steps.graph, find)
 
 
 def _spelled(pairs: tuple[Pair, ...] | list[Pair]) -> tuple[str, ...]:

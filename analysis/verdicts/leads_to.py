@@ -24,20 +24,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from firable.analysis.question import Answer, no, yes
+from firable.analysis.question import Answer, no, unknown, yes
 from firable.analysis.spaces.reachability import (
     NO_COMPONENT,
     Column,
     Components,
     ReachabilityGraph,
-    WitnessError,
     first,
     indexes,
 )
+from firable.analysis.spaces.space import StateSpace, WitnessError
 from firable.nets.formula import Formula, format_formula
 from firable.nets.net import Fairness, Marking, Property
 from firable.semantics.algebra import BOOL
@@ -49,12 +50,16 @@ Matrix = npt.NDArray[np.bool_]
 """One Boolean for each component and transition."""
 
 
-def leads_to(graph: ReachabilityGraph, of: Property) -> Answer:
-    """Decide a `leads_to` property; raises `IncompleteGraph` where the graph is not whole.
+def leads_to(space: StateSpace[Any], of: Property) -> Answer:
+    """Decide a `leads_to` property; raises `IncompleteGraph` where the space is not whole.
 
     Cost: one decomposition into components for no and weak fairness; for strong fairness one for each round of pruning.
+    Unknown where the space is no reachability graph, whose components this technique needs.
     """
-    graph.require_complete()
+    space.require_complete()
+    if not isinstance(space, ReachabilityGraph):
+        return unknown(space.method, "a property of this kind needs the reachability graph: --method explicit")
+    graph = space
     if of.then is None:
         raise ValueError(f"'{of.name}' has no second formula")
     without = ~graph.satisfying(of.then)
@@ -73,7 +78,7 @@ def leads_to(graph: ReachabilityGraph, of: Property) -> Answer:
     end = f"({format_formula(of.then)}) never comes: " + (
         "the cycle is fair" if cycle else "the sequence ends in a deadlock"
     )
-    return no((), graph.named(prefix, graph.marking(entry), cycle, after + end))
+    return no((), graph.witnesses.named(prefix, graph.marking(entry), cycle, after + end))
 
 
 def _way(graph: ReachabilityGraph, source: int, targets: Column, within: Column) -> tuple[list[FiringSet], int]:
@@ -237,7 +242,7 @@ def check_lasso(
     cycle: list[FiringSet],
 ) -> None:
     """Play prefix and cycle by the reference player; raises `WitnessError` unless they refute p leads to q."""
-    player = graph.player
+    player = graph.witnesses.player
 
     def holds(formula: Formula, marking: Marking) -> bool:
         return evaluate(BOOL, graph.net, formula, holds_in(marking))
@@ -245,7 +250,7 @@ def check_lasso(
     def played(marking: Marking, firings: Iterable[FiringSet]) -> list[Marking]:
         markings = [marking]
         for fired in firings:
-            markings.append(graph.replay(markings[-1], [fired]))
+            markings.append(graph.witnesses.play(markings[-1], [fired]))
         return markings
 
     before = played(graph.net.initial_marking, prefix)

@@ -1,4 +1,4 @@
-"""The properties that a net file states of its own net, decided on the reachability graph.
+"""The properties that a net file states of its own net, decided on the state space.
 
 Each kind is one temporal pattern over state formulas, with its own method and its own counterexample: `never` and
 `always` by looking at every marking, `reachable` by finding one, `always_possible` (AG EF p) by the backward closure
@@ -8,10 +8,12 @@ that violates the property is the evidence; for `reachable` the sequence is the 
 
 from __future__ import annotations
 
+from typing import Any
+
 from firable.analysis.question import Answer, Question, no, yes
-from firable.analysis.spaces.reachability import ReachabilityGraph, first
+from firable.analysis.spaces.space import StateSpace
 from firable.analysis.verdicts.leads_to import leads_to
-from firable.nets.formula import format_formula
+from firable.nets.formula import Not, format_formula
 from firable.nets.net import Fairness, Property, PropertyKind
 from firable.nets.verdict import Verdict
 
@@ -44,49 +46,49 @@ def statement(of: Property) -> str:
             return f"({formula}) is always followed by ({then}), {_FAIRNESS[of.fairness]}"
 
 
-def decide_property(graph: ReachabilityGraph, of: Property) -> Verdict:
-    """The verdict `property.NAME` on one property of the net, under the discipline of the graph."""
+def decide_property(space: StateSpace[Any], of: Property) -> Verdict:
+    """The verdict `property.NAME` on one property of the net, under the discipline of the space."""
 
     def find() -> Answer:
         match of.kind:
             case PropertyKind.NEVER:
-                return _invariant(graph, of, violating=True)
+                return _invariant(space, of, violating=True)
             case PropertyKind.ALWAYS:
-                return _invariant(graph, of, violating=False)
+                return _invariant(space, of, violating=False)
             case PropertyKind.REACHABLE:
-                return _reachable(graph, of)
+                return _reachable(space, of)
             case PropertyKind.ALWAYS_POSSIBLE:
-                return _always_possible(graph, of)
+                return _always_possible(space, of)
             case PropertyKind.LEADS_TO:
-                return leads_to(graph, of)
+                return leads_to(space, of)
 
-    return Question(f"property.{of.name}", statement(of)).ask(graph, find)
+    return Question(f"property.{of.name}", statement(of)).ask(space, find)
 
 
-def decide_properties(graph: ReachabilityGraph) -> tuple[Verdict, ...]:
+def decide_properties(space: StateSpace[Any]) -> tuple[Verdict, ...]:
     """The verdicts on all properties of the net, in the order of the file."""
-    return tuple(decide_property(graph, of) for of in graph.net.properties)
+    return tuple(decide_property(space, of) for of in space.net.properties)
 
 
-def _invariant(graph: ReachabilityGraph, of: Property, *, violating: bool) -> Answer:
-    index = first(graph.satisfying(of.formula) == violating)
-    if index is not None:
-        note = f"here ({format_formula(of.formula)}) {'holds' if violating else 'does not hold'}"
-        return no((), graph.witness(index, note))
-    graph.require_complete()
+def _invariant(space: StateSpace[Any], of: Property, *, violating: bool) -> Answer:
+    bad = of.formula if violating else Not(of.formula)
+    note = f"here ({format_formula(of.formula)}) {'holds' if violating else 'does not hold'}"
+    witness = space.witness(space.satisfying(bad), note)
+    if witness is not None:
+        return no((), witness)
+    space.require_complete()
     return yes()
 
 
-def _reachable(graph: ReachabilityGraph, of: Property) -> Answer:
-    index = first(graph.satisfying(of.formula))
-    if index is not None:
-        return yes(graph.witness(index))
-    graph.require_complete()
-    return no(hint="no reachable marking satisfies it; the whole reachability graph was searched")
+def _reachable(space: StateSpace[Any], of: Property) -> Answer:
+    witness = space.witness(space.satisfying(of.formula))
+    if witness is not None:
+        return yes(witness)
+    space.require_complete()
+    return no(hint="no reachable marking satisfies it; the whole state space was searched")
 
 
-def _always_possible(graph: ReachabilityGraph, of: Property) -> Answer:
-    index = first(~graph.backward(graph.satisfying(of.formula)))
-    if index is None:
-        return yes()
-    return no((), graph.witness(index, f"from here ({format_formula(of.formula)}) can never be reached again"))
+def _always_possible(space: StateSpace[Any], of: Property) -> Answer:
+    lost = space.algebra.negation(space.backward(space.satisfying(of.formula)))
+    witness = space.witness(lost, f"from here ({format_formula(of.formula)}) can never be reached again")
+    return yes() if witness is None else no((), witness)

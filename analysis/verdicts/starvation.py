@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from firable.analysis.question import Answer, Question, no, unknown, yes
-from firable.analysis.spaces.reachability import ReachabilityGraph, WitnessError
+from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.analysis.verdicts.behaviour import Behaviour
 from firable.nets.net import Net
 from firable.nets.verdict import Verdict, Weight, Witness
@@ -106,7 +106,7 @@ def starved(run: EagerRun, live: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in live if name not in served)
 
 
-def starvation_free(behaviour: Behaviour) -> Verdict:
+def starvation_free(behaviour: Behaviour[Any]) -> Verdict:
     """Every live transition fires again and again under the arbiters of the file, in the eager run with all gates open.
 
     Raises `InputError` F2013 where the arbiters do not fit the conflicts.
@@ -120,9 +120,9 @@ def starvation_free(behaviour: Behaviour) -> Verdict:
     )
 
     def find() -> Answer:
-        graph = behaviour.graph
+        space = behaviour.space
         try:
-            run = eager_run(graph.net)
+            run = eager_run(space.net)
         except GatesCannotBeOpenError as error:
             return unknown(str(error), "there is no run with all gates open; starvation depends on the signals")
         if not run.complete:
@@ -131,33 +131,33 @@ def starvation_free(behaviour: Behaviour) -> Verdict:
         hungry = starved(run, behaviour.live)
         if not hungry:
             return yes()
-        return no(hungry, _witness(graph, run, f"{hungry[0]} never fires in the cycle"))
+        return no(hungry, _witness(space.net, space.discipline, run, f"{hungry[0]} never fires in the cycle"))
 
-    return question.ask(behaviour.graph, find)
+    return question.ask(behaviour.space, find)
 
 
-def _witness(graph: ReachabilityGraph, run: EagerRun, note: str) -> Witness | None:
-    """The run as a firing sequence of the graph's discipline, replayed; None where it is none of that discipline.
+def _witness(net: Net, discipline: Discipline, run: EagerRun, note: str) -> Witness | None:
+    """The run as a firing sequence of a discipline, replayed; None where it is none of that discipline.
 
     Under interleaving the transitions of a step fire one by one, in an order that its gate races allow, if there is
     one.
     """
-    index = graph.net.transition_index
+    index, witnesses = net.transition_index, Witnesses(net, discipline)
     parts: list[list[FiringSet]] = []
     for part in (run.prefix, run.cycle):
         fired: list[FiringSet] = []
         for step in part:
             together = tuple(sorted(index[name] for name in step))
-            if graph.discipline is Discipline.STEP:
+            if discipline is Discipline.STEP:
                 fired.append(together)
                 continue
-            order = graph.player.order_of(together)
+            order = witnesses.player.order_of(together)
             if order is None:
                 return None
             fired += [(t,) for t in order]
         parts.append(fired)
     prefix, cycle = parts
-    marking = graph.replay(graph.net.initial_marking, prefix)
-    if graph.replay(marking, cycle) != marking:
+    marking = witnesses.play(net.initial_marking, prefix)
+    if witnesses.play(marking, cycle) != marking:
         raise WitnessError("the cycle does not close")
-    return graph.named(prefix, marking, cycle, note)
+    return witnesses.named(prefix, marking, cycle, note)

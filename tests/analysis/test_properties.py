@@ -11,7 +11,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from support.ring_nets import ring_nets
 
-from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, WitnessError, explore
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.spaces.space import WitnessError
 from firable.analysis.verdicts.leads_to import check_lasso
 from firable.analysis.verdicts.properties import decide_property, statement
 from firable.nets.formula import Formula, parse_formula

@@ -11,7 +11,8 @@ from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
 from firable.analysis.spaces import reachability
-from firable.analysis.spaces.reachability import Budget, IncompleteGraph, WitnessError, explore, first
+from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore, first
+from firable.analysis.spaces.space import WitnessError
 from firable.nets.formula import parse_formula
 from firable.nets.net import Net, Place, Transition
 from firable.nets.verdict import Status
@@ -52,7 +53,7 @@ def test_columns_reach_over_more_than_64_places() -> None:
     assert graph.n_markings == n
     for i in (0, 63, 64, 127, 128, 149):
         assert list(graph.marked(i)) == [j == i for j in range(n)]
-    assert graph.witness(149).marking == ("p149",)
+    assert graph.witness_at(149).marking == ("p149",)
 
 
 def test_a_sequence_that_is_none_of_the_net_is_an_internal_error() -> None:
@@ -60,12 +61,12 @@ def test_a_sequence_that_is_none_of_the_net_is_an_internal_error() -> None:
     index = graph.net.transition_index
     start = graph.net.initial_marking
     with pytest.raises(WitnessError):
-        graph.replay(start, [(index["G2"],)])
+        graph.witnesses.play(start, [(index["G2"],)])
     with pytest.raises(WitnessError):
-        graph.replay(start, [(index["G1"], index["G2"])])
+        graph.witnesses.play(start, [(index["G1"], index["G2"])])
     with pytest.raises(WitnessError):
-        stepwise.replay(start, [()])
-    assert graph.replay(start, [(index["G1"],)]) == graph.marking(1)
+        stepwise.witnesses.play(start, [()])
+    assert graph.witnesses.play(start, [(index["G1"],)]) == graph.marking(1)
 
 
 @pytest.mark.parametrize("budget", [Budget(markings=10), Budget(memory_bytes=9_000), Budget(seconds=0.0)])

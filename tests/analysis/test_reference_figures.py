@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from support.reference import Case, cases, load_net, local
 
-from firable.analysis.check import CheckReport, check
+from firable.analysis.check import check, report_on
 from firable.analysis.spaces.equivalence import isomorphic
-from firable.analysis.spaces.reachability import explore
+from firable.analysis.spaces.reachability import ReachabilityGraph, explore
 from firable.analysis.verdicts.behaviour import Behaviour
 from firable.analysis.verdicts.commands import entries
 from firable.analysis.verdicts.starvation import eager_run, scan, starved
@@ -86,12 +86,11 @@ class Expectation:
 
     def __init__(self, net: Net) -> None:
         self.net = net
-        self.report: CheckReport = check(net)
-        self.step: CheckReport = check(net, "step")
+        self.graph, self.steps = explore(net), explore(net, "step")
+        self.report, self.step = report_on(self.graph), report_on(self.steps)
         self.player = Player(net)
 
-    def markings(self, report: CheckReport) -> set[frozenset[str]]:
-        graph = report.graph
+    def markings(self, graph: ReachabilityGraph) -> set[frozenset[str]]:
         return {frozenset(map(local, graph.names(i))) for i in range(graph.n_markings)}
 
     def states(self, expected: int) -> None:
@@ -141,7 +140,7 @@ class Expectation:
         assert list(self.report.figures.firable_in_initial_marking) == expected
 
     def unreachable(self, expected: list[list[str]]) -> None:
-        assert not self.markings(self.report) & set(map(frozenset, expected))
+        assert not self.markings(self.graph) & set(map(frozenset, expected))
 
     def races(self, expected: list[list[str]]) -> None:
         # The reference writes a pair in the order of replay; `gate_races` writes t -> u where t closes a gate of u.
@@ -151,7 +150,7 @@ class Expectation:
         assert [list(step) for step in self.step.figures.nonserialisable or ()] == expected
 
     def eager_fired(self, expected: list[list[str]]) -> None:
-        fired = [[self.net.transitions[t].name for t in step] for step, _ in self.step.graph.successors(0)]
+        fired = [[self.net.transitions[t].name for t in step] for step, _ in self.steps.successors(0)]
         assert sorted(fired) == sorted(expected)
 
     def eager(self, expected: Mapping[str, int]) -> None:
@@ -160,7 +159,7 @@ class Expectation:
         assert {key: found[key] for key in expected} == expected
 
     def eager_markings(self, expected: list[list[str]]) -> None:
-        assert self.markings(self.step) == set(map(frozenset, expected))
+        assert self.markings(self.steps) == set(map(frozenset, expected))
 
     def priority(self, expected: Mapping[str, Any]) -> None:
         self.arbitrated(expected, ArbitrationRule.PRIORITY)
@@ -202,7 +201,7 @@ class Expectation:
     def complement(self, expected: Mapping[str, Any]) -> None:
         place = next(place.name for place in self.net.places if local(place.name) == expected["place"])
         other = complement(self.net, place, flip_gates=expected["flip"])
-        assert isomorphic(self.report.graph, explore(other)) == expected["isomorphic"]
+        assert isomorphic(self.graph, explore(other)) == expected["isomorphic"]
 
 
 GRAPH_CASES = [case for case in cases() if set(case.expect) - ELSEWHERE]

@@ -13,7 +13,7 @@ from support.ring_nets import ring_nets
 
 from firable.analysis.check import CheckReport, check, report_on
 from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore
-from firable.analysis.verdicts.conflicts import ConflictAnalysis
+from firable.analysis.verdicts.conflicts import Steps
 from firable.nets.net import Marking, Net, Place, Transition
 from firable.nets.verdict import Status, Witness
 from firable.semantics.conflict import gate_races, jointly_openable
@@ -209,7 +209,7 @@ def test_nothing_is_concluded_on_steps_from_a_part_of_the_graph() -> None:
     part = explore(net, Discipline.STEP, Budget(markings=1))
     assert not part.complete
     with pytest.raises(IncompleteGraph):
-        _ = ConflictAnalysis(part).nonserialisable
+        _ = Steps(part).nonserialisable
     report = report_on(part)
     assert report.figures.nonserialisable is None
     assert report.verdict("steps-serialisable").status is Status.UNKNOWN

@@ -24,9 +24,11 @@ ROOMS = pytest.mark.parametrize(
 
 
 def modules_of(room: ModuleType) -> set[str]:
+    """The modules of a room and of its folders, by their names within the room, and the folders themselves."""
     folder = ROOT / room.__name__.removeprefix("firable.")
-    files = {file.stem for file in folder.glob("*.py") if file.stem[0] != "_"}
-    return files | {file.parent.name for file in folder.glob("*/__init__.py")}
+    files = (file.relative_to(folder) for file in folder.rglob("*.py") if file.stem != "__main__")
+    parts = (file.parts[:-1] if file.stem == "__init__" else file.with_suffix("").parts for file in files)
+    return {".".join(part) for part in parts if part}
 
 
 @ROOMS
@@ -38,7 +40,8 @@ def test_each_public_name_is_defined_in_one_module_of_its_room_and_explained(roo
         defined_in = {getattr(value, "__module__", "")} & {module.__name__ for module in modules}
         compiled = value.__module__ == "firable.analysis._engine"
         assert compiled or len(defined_in) == 1, name
-        same = [module.__name__ for module in modules if name in vars(module) and vars(module)[name] is not value]
+        beside = [module for module in modules if module.__name__.count(".") == room.__name__.count(".") + 1]
+        same = [module.__name__ for module in beside if name in vars(module) and vars(module)[name] is not value]
         assert not same, f"{same} mean something else by {name}"
         assert f"`{name}`" in (room.__doc__ or ""), f"the docstring says nothing of {name}"
 

@@ -14,10 +14,10 @@ from support.reference import Case, cases, local
 
 from firable.analysis.check import self_loops
 from firable.analysis.spaces.equivalence import isomorphic
-from firable.analysis.spaces.reachability import ReachabilityGraph, explore
+from firable.analysis.spaces.reachability import Column, ReachabilityGraph, explore
 from firable.analysis.verdicts.behaviour import Behaviour
 from firable.analysis.verdicts.commands import entries
-from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pair
+from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pair, Steps
 from firable.analysis.verdicts.starvation import eager_run, scan, starved
 from firable.decompose.persistence import nonpersistent
 from firable.decompose.protocol import explore_protocol
@@ -51,7 +51,7 @@ class Subject:
         return explore(self.net, Discipline.STEP)
 
     @cached_property
-    def behaviour(self) -> Behaviour:
+    def behaviour(self) -> Behaviour[Column]:
         return Behaviour(self.graph)
 
     @cached_property
@@ -209,7 +209,7 @@ CHECKS: dict[str, Callable[[Subject, Any], None]] = {
     "unreachable": lambda subject, expected: equal(subject.markings(subject.graph) & sets(expected), set()),
     "races": check_races,
     "nonserialisable": lambda subject, expected: equal(
-        set(map(frozenset, ConflictAnalysis(subject.steps).nonserialisable)), sets(expected)
+        set(map(frozenset, Steps(subject.steps).nonserialisable)), sets(expected)
     ),
     "eager_fired": lambda subject, expected: equal(
         {subject.fired(fired) for fired, _ in subject.steps.successors(0)}, sets(expected)

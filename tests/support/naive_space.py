@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from firable.analysis.spaces.space import Derived
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
@@ -23,7 +24,7 @@ Markings = frozenset[Marking]
 
 
 @dataclass(frozen=True)
-class NaiveSpace:
+class NaiveSpace(Derived):
     """All markings reachable from M0, by the reference player."""
 
     net: Net
@@ -121,6 +122,18 @@ class NaiveSpace:
         while (fewer := found & self.before(found)) != found:
             found = fewer
         return found
+
+    def bottom(self) -> Markings:
+        """The markings of the first bottom component: what can be reached from one of them, and leads back to it."""
+        for marking in self.graph:
+            reached, more = {marking}, [marking]
+            while more:
+                after = {after for _, after in self.graph[more.pop()]} - reached
+                reached |= after
+                more += after
+            if reached <= self.backward(frozenset({marking})):
+                return frozenset(reached)
+        raise AssertionError("a finite graph has a bottom component")
 
     def home(self) -> Markings:
         """The markings that every marking leads back to."""

@@ -1,0 +1,93 @@
+"""Every technique that holds a state space, against the oracle: the same sets, whatever they are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.dense_nets import dense_nets
+from support.naive_space import Markings, NaiveSpace
+from support.ring_nets import ring_nets
+
+from firable.analysis.spaces.reachability import explore
+from firable.analysis.spaces.space import StateSpace
+from firable.nets.net import Marking, Net
+from firable.semantics.algebra import BooleanAlgebra
+from firable.semantics.firing import Valuation
+from firable.semantics.trace import Discipline
+
+SPACES: dict[str, Callable[[Net], StateSpace[Any]]] = {
+    "reachability graph, interleaving": lambda net: explore(net),
+    "reachability graph, steps": lambda net: explore(net, Discipline.STEP),
+}
+
+
+class Pairing:
+    """A space beside the oracle, and how sets go from one to the other."""
+
+    def __init__(self, space: StateSpace[Any]) -> None:
+        self.space = space
+        self.oracle = NaiveSpace(space.net, space.discipline)
+
+    def same(self, found: Any, expected: Markings) -> None:
+        assert self.space.count(found) == len(expected)
+        assert {marking for marking in self.oracle.graph if self.space.contains(found, marking)} == set(expected)
+
+    def given(self, marking: Marking) -> tuple[Any, Markings]:
+        """The set of one marking in the space's own type, and as the oracle's."""
+
+        def is_it(algebra: BooleanAlgebra[Any], holds: Valuation[Any]) -> Any:
+            places = range(len(self.space.net.places))
+            return algebra.conjunction(holds(p) if marking >> p & 1 else algebra.negation(holds(p)) for p in places)
+
+        return self.space.where(is_it), frozenset({marking})
+
+
+@pytest.mark.parametrize("name", SPACES)
+@given(net=st.one_of(dense_nets(signals=True), ring_nets(signals=True)), data=st.data())
+def test_a_space_has_the_sets_of_the_oracle(name: str, net: Net, data: st.DataObject) -> None:
+    space = SPACES[name](net)
+    both = Pairing(space)
+    oracle, same = both.oracle, both.same
+    transitions, reached = range(len(net.transitions)), sorted(oracle.graph)
+    assert space.complete
+    assert (space.n_markings, space.n_edges) == (oracle.n_markings, oracle.n_edges)
+    same(space.initial, oracle.initial)
+    same(space.deadlocks, oracle.deadlocks)
+    same(space.endless(), oracle.endless())
+    same(space.home(), oracle.home())
+    for t in transitions:
+        same(space.may_fire(t), oracle.may_fire(t))
+        same(space.in_contact(t), oracle.in_contact(t))
+    assert list(space.contacts()) == list(oracle.contacts())
+    assert [n > 0 for n in space.fired()] == [n > 0 for n in oracle.fired()]
+    assert list(space.live()) == list(oracle.live())
+    assert space.reversible() == oracle.reversible()
+    pairs = [(t, u) for t in transitions for u in transitions if t < u]
+    assert list(space.firable_together(pairs)) == list(oracle.firable_together(pairs))
+    bottom = {marking for marking in reached if space.contains(space.bottom(), marking)}
+    assert bottom
+    assert all(after in bottom for marking in bottom for _, after in oracle.graph[marking])
+    assert all(bottom <= oracle.backward(frozenset({marking})) for marking in bottom)
+    chosen = data.draw(st.lists(st.sampled_from(reached), min_size=1, max_size=4, unique=True))
+    around = data.draw(st.lists(st.sampled_from(reached), max_size=len(reached), unique=True))
+    sets = [both.given(marking) for marking in chosen]
+    targets = space.algebra.disjunction(mine for mine, _ in sets), oracle.algebra.disjunction(s for _, s in sets)
+    sets = [both.given(marking) for marking in around]
+    within = space.algebra.disjunction(mine for mine, _ in sets), oracle.algebra.disjunction(s for _, s in sets)
+    same(*targets)
+    same(space.algebra.negation(targets[0]), oracle.algebra.negation(targets[1]))
+    same(space.before(targets[0]), oracle.before(targets[1]))
+    by = data.draw(st.sets(st.sampled_from(list(transitions)))) if transitions else set()
+    same(space.before(targets[0], by), oracle.before(targets[1], by))
+    same(space.backward(targets[0]), oracle.backward(targets[1]))
+    same(space.backward(targets[0], within[0]), oracle.backward(targets[1], within[1]))
+    same(space.endless(within[0]), oracle.endless(within[1]))
+    witness = space.witness(targets[0], "here")
+    assert witness is not None
+    assert witness.note == "here"
+    assert net.marking(witness.marking) in targets[1]
+    assert space.witness(space.algebra.disjunction(())) is None
