@@ -16,6 +16,7 @@ from typing import Any
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.spaces.space import StateSpace
 from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
+from firable.semantics.trace import Discipline
 
 _STATUS = {True: Status.PROVED, False: Status.VIOLATED, None: Status.UNKNOWN}
 
@@ -58,25 +59,27 @@ class Question:
         except (IncompleteGraph, BudgetExceeded) as error:
             bound = space.bound or f"{space.n_markings:,} markings: {error}"
             answer = unknown(bound, "give it a larger budget of markings, memory or time", "F3004")
+        seconds = (space.cost.seconds or 0.0) + perf_counter() - start
+        cost = Cost(space.n_markings, space.n_edges, seconds)
+        return self.settle(answer, self.method or space.method, space.discipline, cost)
+
+    def settle(self, answer: Answer, method: str, discipline: Discipline, cost: Cost) -> Verdict:
+        """The verdict that an answer is, found by a method under a discipline at a cost."""
         violated = answer.holds is False
         return Verdict(
             self.name,
             _STATUS[answer.holds],
             self.statement,
-            self.method or space.method,
+            method,
             self.weight,
             answer.code or (self.code if violated else ""),
             answer.hint or (self.hint if violated else ""),
             answer.bound,
             answer.subjects,
             answer.witness,
-            cost=self._cost(space, start),
-            discipline=space.discipline.value,
+            cost=cost,
+            discipline=discipline.value,
         )
-
-    @staticmethod
-    def _cost(space: StateSpace[Any], start: float) -> Cost:
-        return Cost(space.n_markings, space.n_edges, (space.cost.seconds or 0.0) + perf_counter() - start)
 
 
 def listed(names: Iterable[str], most: int = 8) -> str:

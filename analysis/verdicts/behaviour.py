@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Generic
+from typing import Any, Final, Generic
 
 from firable.analysis.question import Answer, Question, listed, no, yes
 from firable.analysis.spaces.space import S, StateSpace, WitnessError
@@ -31,6 +31,40 @@ from firable.nets.verdict import Verdict, Weight, Witness
 from firable.semantics.algebra import BOOL
 from firable.semantics.firing import in_contact
 from firable.semantics.player import holds_in
+
+CONTACT_FREE: Final = Question(
+    "contact-free",
+    "no transition is held back only by a full output place",
+    hint="take a place that is free when the output place is empty as an input, or check the arcs",
+)
+DEADLOCK_FREE: Final = Question(
+    "deadlock-free",
+    "in every reachable marking some transition is firable, external gates free",
+    hint="the sequence leads into the deadlock; `doomed-markings` shows where it can no longer be avoided",
+)
+QUASI_LIVE: Final = Question(
+    "quasi-live",
+    "no transition is dead: each can fire at least once",
+    hint="check its inputs and gates; a place that is only read is a permissive gate, not an input and an output",
+)
+LIVE: Final = Question(
+    "live",
+    "from every reachable marking every transition can fire again, external gates free",
+    Weight.WARNING,
+    hint="right for what happens only at start-up; otherwise this part of the cell is lost for good",
+)
+REVERSIBLE: Final = Question(
+    "reversible", "the initial marking can be reached from every reachable marking", Weight.INFORMATION
+)
+HOME_MARKINGS: Final = Question(
+    "home-markings", "some marking can be reached from every reachable marking", Weight.INFORMATION
+)
+NO_DOOMED: Final = Question(
+    "doomed-markings",
+    "no reachable marking is doomed: a deadlock can still be avoided from each",
+    Weight.WARNING,
+    hint="the last firing of the sequence is the point of no return: give it an input or gate that forbids it",
+)
 
 
 @dataclass(frozen=True)
@@ -112,11 +146,6 @@ class Behaviour(Generic[S]):
 
 def contact_free(behaviour: Behaviour[Any]) -> Verdict:
     """No reachable marking is in contact: the guard of the firing rule hides no collision."""
-    question = Question(
-        "contact-free",
-        "no transition is held back only by a full output place",
-        hint="take a place that is free when the output place is empty as an input, or check the arcs",
-    )
 
     def find() -> Answer:
         space, counts = behaviour.space, behaviour.contacts
@@ -127,7 +156,7 @@ def contact_free(behaviour: Behaviour[Any]) -> Verdict:
         space.require_complete()
         return yes()
 
-    return question.ask(behaviour.space, find)
+    return CONTACT_FREE.ask(behaviour.space, find)
 
 
 def _nearest_contact(space: StateSpace[S], blocked: Sequence[int]) -> Witness:
@@ -144,11 +173,6 @@ def _nearest_contact(space: StateSpace[S], blocked: Sequence[int]) -> Witness:
 
 def deadlock_free(behaviour: Behaviour[Any]) -> Verdict:
     """No reachable marking is a deadlock."""
-    question = Question(
-        "deadlock-free",
-        "in every reachable marking some transition is firable, external gates free",
-        hint="the sequence leads into the deadlock; `doomed-markings` shows where it can no longer be avoided",
-    )
 
     def find() -> Answer:
         space = behaviour.space
@@ -161,16 +185,11 @@ def deadlock_free(behaviour: Behaviour[Any]) -> Verdict:
         space.require_complete()
         return yes()
 
-    return question.ask(behaviour.space, find)
+    return DEADLOCK_FREE.ask(behaviour.space, find)
 
 
 def quasi_live(behaviour: Behaviour[Any]) -> Verdict:
     """Every transition can fire at least once; the ones that cannot are dead."""
-    question = Question(
-        "quasi-live",
-        "no transition is dead: each can fire at least once",
-        hint="check its inputs and gates; a place that is only read is a permissive gate, not an input and an output",
-    )
 
     def find() -> Answer:
         if behaviour.space.complete:
@@ -181,17 +200,11 @@ def quasi_live(behaviour: Behaviour[Any]) -> Verdict:
             behaviour.space.require_complete()
         return yes()
 
-    return question.ask(behaviour.space, find)
+    return QUASI_LIVE.ask(behaviour.space, find)
 
 
 def all_live(behaviour: Behaviour[Any]) -> Verdict:
     """Every transition is live."""
-    question = Question(
-        "live",
-        "from every reachable marking every transition can fire again, external gates free",
-        Weight.WARNING,
-        hint="right for what happens only at start-up; otherwise this part of the cell is lost for good",
-    )
 
     def find() -> Answer:
         space, nonlive = behaviour.space, behaviour.nonlive
@@ -205,26 +218,22 @@ def all_live(behaviour: Behaviour[Any]) -> Verdict:
             raise WitnessError(f"{name} is not live and can fire again from everywhere")
         return no(nonlive, witness)
 
-    return question.ask(behaviour.space, find)
+    return LIVE.ask(behaviour.space, find)
 
 
 def reversible(behaviour: Behaviour[Any]) -> Verdict:
     """M0 can be reached from every reachable marking."""
-    question = Question(
-        "reversible", "the initial marking can be reached from every reachable marking", Weight.INFORMATION
-    )
 
     def find() -> Answer:
         if behaviour.reversible:
             return yes()
         return no((), behaviour.space.witness(behaviour.lost, "the initial marking can never be reached again"))
 
-    return question.ask(behaviour.space, find)
+    return REVERSIBLE.ask(behaviour.space, find)
 
 
 def home_markings(behaviour: Behaviour[Any]) -> Verdict:
     """Some marking can be reached from every reachable marking."""
-    question = Question("home-markings", "some marking can be reached from every reachable marking", Weight.INFORMATION)
 
     def find() -> Answer:
         if behaviour.home:
@@ -232,17 +241,11 @@ def home_markings(behaviour: Behaviour[Any]) -> Verdict:
         note = "nothing leads back from here, and another part of the state space is such too"
         return no((), behaviour.space.witness(behaviour.space.bottom(), note))
 
-    return question.ask(behaviour.space, find)
+    return HOME_MARKINGS.ask(behaviour.space, find)
 
 
 def no_doomed(behaviour: Behaviour[Any]) -> Verdict:
     """No reachable marking is doomed: while the cell runs, every deadlock can still be avoided."""
-    question = Question(
-        "doomed-markings",
-        "no reachable marking is doomed: a deadlock can still be avoided from each",
-        Weight.WARNING,
-        hint="the last firing of the sequence is the point of no return: give it an input or gate that forbids it",
-    )
 
     def find() -> Answer:
         space, doomed = behaviour.space, behaviour.doomed
@@ -252,4 +255,4 @@ def no_doomed(behaviour: Behaviour[Any]) -> Verdict:
         note = f"{count:,} doomed markings; from here every run ends in a deadlock"
         return no((), space.witness(doomed, note))
 
-    return question.ask(behaviour.space, find)
+    return NO_DOOMED.ask(behaviour.space, find)

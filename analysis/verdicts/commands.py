@@ -26,14 +26,14 @@ sensor by itself.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import Any, Final
 
 from firable.analysis.question import Answer, Question, listed, no, yes
 from firable.analysis.spaces.space import S, StateSpace, WitnessError
-from firable.nets.net import Net, Place
+from firable.nets.net import Marking, Net
 from firable.nets.verdict import Verdict, Weight
 from firable.semantics.player import Player
 
@@ -63,81 +63,94 @@ def entries(net: Net, firings: Iterable[Iterable[str]], place: str) -> tuple[str
     return tuple(found)
 
 
-def commands_agree(space: StateSpace[Any]) -> Verdict:
-    """No two places that send different commands to one machine hold a token at one reachable marking."""
-    question = Question(
-        "conflicting-commands",
-        "no machine is under two different commands at once",
-        code="F3003",
-        hint="let the two places exclude each other, by a place that stands for the machine being free",
+@dataclass(frozen=True, slots=True)
+class Clash:
+    """Two places, by index, that must not hold a token at one reachable marking, and what happens if they do."""
+
+    p: int
+    q: int
+    note: str
+
+
+COMMANDS_AGREE: Final = Question(
+    "conflicting-commands",
+    "no machine is under two different commands at once",
+    code="F3003",
+    hint="let the two places exclude each other, by a place that stands for the machine being free",
+)
+COMPLETIONS_APART: Final = Question(
+    "shared-completions",
+    "no completion signal is awaited by two commands at once",
+    code="F3005",
+    hint="give each of the two commands a completion signal of its own",
+)
+
+
+def command_clashes(net: Net) -> tuple[Clash, ...]:
+    """The pairs of places that send different commands to one machine."""
+    found = []
+    for machine, names in machines(net).items():
+        for p, q in combinations(sorted(p for sent in names.values() for p in sent), 2):
+            one, other = net.places[p].command, net.places[q].command
+            if one != other:
+                found.append(Clash(p, q, f"{machine} is under '{one}' and '{other}'"))
+    return tuple(found)
+
+
+def completion_clashes(net: Net) -> tuple[Clash, ...]:
+    """The pairs of places that wait for the same completion signal."""
+    waiting: dict[str, list[int]] = {}
+    for p, place in enumerate(net.places):
+        if place.completion is not None:
+            waiting.setdefault(place.completion, []).append(p)
+    return tuple(
+        Clash(p, q, f"both '{net.places[p].command}' and '{net.places[q].command}' wait for {signal}")
+        for signal, places in waiting.items()
+        for p, q in combinations(places, 2)
     )
 
-    places = {
-        machine: sorted(p for sent in names.values() for p in sent) for machine, names in machines(space.net).items()
-    }
-    return _kept_apart(
-        space,
-        question,
-        places,
-        lambda p, q: p.command != q.command,
-        lambda machine, p, q: f"{machine} is under '{p.command}' and '{q.command}'",
-    )
+
+def commands_agree(space: StateSpace[Any]) -> Verdict:
+    """No two places that send different commands to one machine hold a token at one reachable marking."""
+    return _kept_apart(space, COMMANDS_AGREE, command_clashes(space.net))
 
 
 def completions_apart(space: StateSpace[Any]) -> Verdict:
     """No two places that wait for the same completion signal hold a token at one reachable marking."""
-    question = Question(
-        "shared-completions",
-        "no completion signal is awaited by two commands at once",
-        code="F3005",
-        hint="give each of the two commands a completion signal of its own",
-    )
-
-    waiting: dict[str, list[int]] = {}
-    for p, place in enumerate(space.net.places):
-        if place.completion is not None:
-            waiting.setdefault(place.completion, []).append(p)
-    return _kept_apart(
-        space,
-        question,
-        waiting,
-        lambda p, q: p.completion == q.completion,
-        lambda signal, p, q: f"both '{p.command}' and '{q.command}' wait for {signal}",
-    )
+    return _kept_apart(space, COMPLETIONS_APART, completion_clashes(space.net))
 
 
-def _kept_apart(
-    space: StateSpace[Any],
-    question: Question,
-    groups: Mapping[str, Sequence[int]],
-    clash: Callable[[Place, Place], bool],
-    note: Callable[[str, Place, Place], str],
-) -> Verdict:
-    """No two clashing places of a group hold a token at one reachable marking; violated by the nearest that do."""
+def _kept_apart(space: StateSpace[S], question: Question, clashes: Sequence[Clash]) -> Verdict:
+    """No two clashing places hold a token at one reachable marking; violated by the nearest that do."""
 
     def find() -> Answer:
-        places, algebra, clashes = space.net.places, space.algebra, []
-        together = algebra.disjunction(())
-        for name, group in groups.items():
-            pairs = [(p, q) for p, q in combinations(group, 2) if clash(places[p], places[q])]
-            marked = {p: space.marked(p) for p in dict.fromkeys(p for pair in pairs for p in pair)}
-            for p, q in pairs:
-                both = algebra.conjunction([marked[p], marked[q]])
-                if space.count(both):
-                    clashes.append((name, p, q))
-                    together = algebra.disjunction([together, both])
-        if not clashes:
+        algebra, together, found = space.algebra, space.algebra.disjunction(()), []
+        marked = {p: space.marked(p) for p in sorted({p for clash in clashes for p in (clash.p, clash.q)})}
+        for clash in clashes:
+            both = algebra.conjunction([marked[clash.p], marked[clash.q]])
+            if space.count(both):
+                found.append(clash)
+                together = algebra.disjunction([together, both])
+        if not found:
             space.require_complete()
             return yes()
-        subjects = tuple(dict.fromkeys(places[place].name for _, p, q in clashes for place in (p, q)))
         witness = space.witness(together)
         if witness is None:
             raise WitnessError("places hold a token together, and no marking shows it")
-        shown = set(witness.marking)
-        said = (note(name, places[p], places[q]) for name, p, q in clashes if {places[p].name, places[q].name} <= shown)
-        return no(subjects, replace(witness, note=next(said)))
+        note = clashing(found, space.net.marking(witness.marking))[0].note
+        return no(clash_subjects(space.net, found), replace(witness, note=note))
 
     return question.ask(space, find)
+
+
+def clashing(clashes: Iterable[Clash], marking: Marking) -> tuple[Clash, ...]:
+    """The clashes that happen in a marking."""
+    return tuple(clash for clash in clashes if marking >> clash.p & marking >> clash.q & 1)
+
+
+def clash_subjects(net: Net, clashes: Iterable[Clash]) -> tuple[str, ...]:
+    """The names of the places that clash, each once."""
+    return tuple(dict.fromkeys(net.places[p].name for clash in clashes for p in (clash.p, clash.q)))
 
 
 def machines_stopped(space: StateSpace[Any]) -> Verdict:
