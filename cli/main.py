@@ -32,6 +32,7 @@ def firable(context: click.Context, traceback: bool) -> None:  # noqa: ARG001 - 
     """Check, prove, split and run the control of robotic cells, written as extended Petri nets.
 
     A NET is a net file (*.firable.yaml), PNML, a bundle, or catalogue:NAME for an example, such as catalogue:one_robot.
+    catalogue:FAMILY-N is the net of size N of a family, such as catalogue:philosophers-5; a wrong name lists them all.
 
     Exit codes: 0 all hold, 1 a property is violated, 2 usage or input error, 3 unknown or out of budget, 4 internal
     error.

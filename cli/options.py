@@ -68,11 +68,23 @@ def budget(max_markings: int, max_memory: int, max_seconds: float | None) -> Bud
 def load_net(argument: str) -> Loaded:
     """The net that an argument names, what of its file it does not carry, and where its parts stand in the file.
 
-    The argument is a file (net file, PNML or bundle) or `catalogue:NAME`. Raises `InputError` as the readers do.
+    The argument is a file (net file, PNML or bundle), `catalogue:NAME`, or `catalogue:FAMILY-N` for a net that no file
+    holds. Raises `InputError` as the readers do.
     """
-    from firable.nets.loading import load
+    from firable.nets.catalogue import catalogue_names, family_net
+    from firable.nets.loading import Loaded, load
 
-    return load(catalogue_file(argument, "") if argument.startswith(CATALOGUE) else argument)
+    if not argument.startswith(CATALOGUE):
+        return load(argument)
+    name = argument.removeprefix(CATALOGUE)
+    if name in catalogue_names():
+        return load(catalogue_file(argument, ""))
+    try:
+        return Loaded(family_net(name))
+    except KeyError:
+        raise click.UsageError(_not_in_catalogue(name)) from None
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
 
 
 def catalogue_file(argument: str, kind: str) -> Path:
@@ -81,9 +93,17 @@ def catalogue_file(argument: str, kind: str) -> Path:
 
     name = argument.removeprefix(CATALOGUE)
     if name not in catalogue_names():
-        raise click.UsageError(f"the catalogue has no '{name}'; it has: {', '.join(catalogue_names())}")
+        raise click.UsageError(_not_in_catalogue(name))
     path = catalogue_path(name)
     return path.with_name(f"{name}.plant.yaml") if kind == "plant" else path
+
+
+def _not_in_catalogue(name: str) -> str:
+    from firable.nets.catalogue import FAMILIES, catalogue_names
+
+    families = ", ".join(f"{family}-N" for family in FAMILIES)
+    cells = ", ".join(catalogue_names())
+    return f"the catalogue has no '{name}'; it has: {cells}; and for numbers N the families {families}"
 
 
 def write_text(path: str, text: str) -> None:

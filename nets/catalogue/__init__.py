@@ -1,8 +1,9 @@
-"""The catalogue: example cells in the net format, installed with the package.
+"""The catalogue: example cells in the net format, and parametric families, installed with the package.
 
-A net of the catalogue is a file beside this module, `NAME.firable.yaml`, and nothing else: to add one, add the file.
+A cell of the catalogue is a file beside this module, `NAME.firable.yaml`, and nothing else: to add one, add the file.
 They are read by the same reader as a user's file, so that the examples cannot drift from the format; the alternative,
-nets built by Python code, shows nobody how to write one.
+nets built by Python code, shows nobody how to write one. The families are built by code all the same
+(`families.py`), because their nets have any size: they are there to measure and to test with.
 """
 
 from __future__ import annotations
@@ -10,14 +11,17 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+from firable.nets.catalogue.families import FAMILIES, family_net
 from firable.nets.net import Net
 from firable.nets.text import read_net
+
+__all__ = ["FAMILIES", "catalogue_names", "catalogue_net", "catalogue_path", "family_net"]
 
 _SUFFIX = ".firable.yaml"
 
 
 def catalogue_names() -> tuple[str, ...]:
-    """The names of the nets of the catalogue, sorted.
+    """The names of the cells of the catalogue, sorted; those of the families are in `FAMILIES`.
 
     >>> "one_robot" in catalogue_names()
     True
@@ -26,17 +30,23 @@ def catalogue_names() -> tuple[str, ...]:
 
 
 def catalogue_path(name: str) -> Path:
-    """The file of a net of the catalogue; `KeyError` where there is no such net."""
+    """The file of a cell of the catalogue; `KeyError` where there is no such cell."""
     if name not in catalogue_names():
         raise KeyError(name)
     return Path(__file__).parent / f"{name}{_SUFFIX}"
 
 
-@cache
 def catalogue_net(name: str) -> Net:
-    """The net of this name; `KeyError` where there is none.
+    """The net of this name, a cell's or such as `philosophers-5` a family's; `KeyError` where there is none.
 
-    >>> len(catalogue_net("one_robot").places)
-    28
+    Raises `ValueError` for a size of a family that is not built.
+
+    >>> len(catalogue_net("one_robot").places), len(catalogue_net("philosophers-5").places)
+    (28, 20)
     """
+    return _cell(name) if name in catalogue_names() else family_net(name)
+
+
+@cache
+def _cell(name: str) -> Net:
     return read_net(catalogue_path(name))

@@ -215,6 +215,16 @@ def test_a_net_survives_the_way_to_pnml_and_back(tmp_path: Path, capsys: pytest.
     assert (data["reports"][0]["figures"]["markings"], data["reports"][0]["figures"]["edges"]) == (14, 23)
 
 
+def test_a_net_of_a_family_is_checked_and_converted_by_name(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, data = as_json(capsys, "check", "catalogue:philosophers-5")
+    assert code == 1
+    assert data["reports"][0]["figures"]["markings"] == 82
+    copy = str(tmp_path / "copy.firable.yaml")
+    assert main(["convert", "catalogue:philosophers(5)", "-o", copy]) == 0
+    again = as_json(capsys, "check", copy)[1]
+    assert again["reports"][0]["digest"] == data["reports"][0]["digest"]
+
+
 def test_a_net_file_is_printed_as_it_means(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     copy = str(tmp_path / "copy.firable.yaml")
     assert main(["convert", "catalogue:one_robot", "-o", copy]) == 0

@@ -111,6 +111,8 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         (["check", "--max-markings", "many", "x"], "Invalid value"),
         (["check", "--format", "xml", "x"], "is not one of"),
         (["check", "catalogue:one_robt"], "the catalogue has no 'one_robt'"),
+        (["check", "catalogue:philosopher-5"], "families philosophers-N"),
+        (["check", "catalogue:philosophers-1"], "the sizes of 'philosophers' are 2 to 250,000"),
         (["prove", "a", "b"], "unexpected extra argument"),
         (["bundle", "catalogue:one_robot"], "Missing option"),
         (["bundle", "catalogue:one_robot", "-o", "-"], "cannot go to standard output"),
