@@ -13,7 +13,7 @@ the whole graph raises `IncompleteGraph`, and `BudgetExceeded` where memory ends
 `check` and `net_class` are functions that have the names of their modules, and are imported from there: `from
 firable.analysis.check import check` does both of these steps at once.
 
-The names are loaded when they are asked for: numpy, sympy and z3 take a second, and belong to the extra `prove`.
+The names are loaded when they are asked for: numpy and z3 take a second, and belong to the extra `prove`.
 """
 
 from importlib import import_module

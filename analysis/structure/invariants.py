@@ -1,44 +1,38 @@
-"""P- and T-invariants: the minimal semi-positive integer solutions of y C = 0 and of C x = 0.
+"""P- and T-invariants: the solutions of y C = 0 and of C x = 0, all of them by a basis, and the semi-positive ones.
 
-C is the incidence matrix, C[p][t] = 1 if t puts a token on p, -1 if it takes one. Under a P-invariant y the weighted
-number of tokens is the same in every reachable marking, whatever the gates do: they only forbid firings. A
+C is the incidence matrix: the entry of a place and a transition is 1 if the transition puts a token on the place, -1
+if it takes one. Under a P-invariant y the weighted number of tokens is the same in every reachable marking, whatever
+the gates and the contact rule do: they only forbid firings, and every firing changes the marking by its column of C. A
 T-invariant x counts firings that, if they can be fired at all, bring the marking back. A self-loop cancels, and reads
 are gates.
 
-Method: the algorithm of Farkas, as Colom and Silva put it (1991, "Convex geometry and semiflows in P/T nets"). The rows
-of [I | C] are combined pairwise to cancel one column of C after the other, and a row whose support contains that of
-another one is dropped, so that what remains after each column are exactly the minimal solutions so far; integers
-throughout, each row divided by its greatest common divisor. Their number can be exponential, so rows are bounded, and
-there may be a deadline: past either bound the result is `complete=False` and holds only the rows that were finished,
-which are minimal invariants all the same, because an extreme ray of a cone that lies in a smaller cone is an extreme
-ray of that one too. The dimension of the solution space is exact and cheap (rank by sympy, over the rationals). The
-rejected alternative, a basis from linear algebra, has negative entries, which no engineer reads as "these places share
-one token".
+A basis always exists and is cheap (`firable.analysis.structure.linear`), but it has negative entries, which no engineer
+reads as "these places share one token". So what is listed are the minimal semi-positive solutions, by the algorithm of
+Farkas (`firable.analysis.structure.semiflows`), as far as a budget lets it. Their number can be exponential. Where it
+ends early, the *units* that cover the places greedily (`firable.analysis.structure.cover`) are listed too: they are
+minimal, and few of them often cover everything.
 
 Every vector is multiplied out against C before it is handed out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import gcd
 from typing import Final
 
-from sympy import QQ
-from sympy.polys.matrices import DomainMatrix
-
 from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.structure.cover import cover
+from firable.analysis.structure.linear import Sparse, eliminate, solutions
+from firable.analysis.structure.semiflows import minimal_semiflows
 from firable.nets.net import Marking, Net
 
 ROWS_MAX: Final = 5_000
 
-Matrix = tuple[tuple[int, ...], ...]
-
 
 @dataclass(frozen=True, slots=True)
 class Invariant:
-    """One minimal semi-positive solution: the names in its support, with their weights, in the order of the net."""
+    """One solution without a common divisor: the names in its support, with their weights, in the order of the net."""
 
     weights: tuple[tuple[str, int], ...]
 
@@ -52,7 +46,12 @@ class Invariant:
         return sum(weight for name, weight in self.weights if marking >> net.place_index[name] & 1)
 
     def __str__(self) -> str:
-        return " + ".join(name if weight == 1 else f"{weight} {name}" for name, weight in self.weights)
+        first, *others = (_term(name, weight) for name, weight in self.weights)
+        return first + "".join(f" - {term[1:]}" if term.startswith("-") else f" + {term}" for term in others)
+
+
+def _term(name: str, weight: int) -> str:
+    return {1: name, -1: f"-{name}"}.get(weight, f"{weight} {name}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,11 +72,29 @@ class Invariants:
         return tuple(name for name in names if name not in covered)
 
 
-def incidence(net: Net) -> Matrix:
-    """The incidence matrix C, a row for each place and a column for each transition; a self-loop gives 0."""
-    return tuple(
-        tuple((place.name in t.outputs) - (place.name in t.inputs) for t in net.transitions) for place in net.places
-    )
+def columns(net: Net) -> list[dict[int, int]]:
+    """The incidence matrix C by its columns: for each transition what a firing adds to each place; a self-loop 0.
+
+    >>> from firable.nets.net import Net, Place, Transition
+    >>> columns(Net("n", (Place("p"), Place("q"), Place("r")), (Transition("t", ("p", "r"), ("q", "r")),)))
+    [{0: -1, 1: 1}]
+    """
+    index, found = net.place_index, []
+    for transition in net.transitions:
+        inputs, outputs = set(transition.inputs), set(transition.outputs)
+        column = {index[name]: -1 for name in transition.inputs if name not in outputs}
+        column |= {index[name]: 1 for name in transition.outputs if name not in inputs}
+        found.append(column)
+    return found
+
+
+def rows(net: Net) -> list[dict[int, int]]:
+    """The incidence matrix C by its rows: for each place what each transition adds to it."""
+    found: list[dict[int, int]] = [{} for _ in net.places]
+    for t, column in enumerate(columns(net)):
+        for p, change in column.items():
+            found[p][t] = change
+    return found
 
 
 def p_invariants(net: Net, *, rows_max: int = ROWS_MAX, deadline: Deadline = NEVER) -> Invariants:
@@ -88,101 +105,59 @@ def p_invariants(net: Net, *, rows_max: int = ROWS_MAX, deadline: Deadline = NEV
     >>> len(found.minimal), found.dimension, found.complete
     (68, 14, True)
     """
-    return _invariants(incidence(net), [place.name for place in net.places], rows_max, deadline)
+    return _invariants(columns(net), [place.name for place in net.places], rows_max, deadline)
 
 
 def t_invariants(net: Net, *, rows_max: int = ROWS_MAX, deadline: Deadline = NEVER) -> Invariants:
     """The minimal semi-positive T-invariants."""
-    names = [transition.name for transition in net.transitions]
-    rows = incidence(net)
-    return _invariants(tuple(tuple(row[t] for row in rows) for t in range(len(names))), names, rows_max, deadline)
+    return _invariants(rows(net), [transition.name for transition in net.transitions], rows_max, deadline)
 
 
-def _invariants(matrix: Matrix, names: list[str], rows_max: int, deadline: Deadline) -> Invariants:
-    """The minimal y >= 0 with y `matrix` = 0; `names` are those of its rows."""
-    vectors, complete = _minimal_solutions(matrix, rows_max, deadline)
-    columns = tuple(zip(*matrix, strict=True))
-    checked = []
+def p_basis(net: Net, *, deadline: Deadline = NEVER) -> tuple[Invariant, ...] | None:
+    """A basis of all P-invariants, with integer weights of either sign; None where the deadline came first.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> len(p_basis(catalogue_net("one_robot")) or ())
+    14
+    """
+    return _basis(columns(net), [place.name for place in net.places], deadline)
+
+
+def t_basis(net: Net, *, deadline: Deadline = NEVER) -> tuple[Invariant, ...] | None:
+    """A basis of all T-invariants, with integer weights of either sign; None where the deadline came first."""
+    return _basis(rows(net), [transition.name for transition in net.transitions], deadline)
+
+
+def _basis(equations: Sequence[Sparse], names: Sequence[str], deadline: Deadline) -> tuple[Invariant, ...] | None:
+    eliminated = eliminate(equations, deadline=deadline)
+    if eliminated is None:
+        return None
+    found = solutions(eliminated, range(len(names)), deadline=deadline)
+    return None if found is None else tuple(_checked(found, equations, names))
+
+
+def _invariants(equations: Sequence[Sparse], names: Sequence[str], rows_max: int, deadline: Deadline) -> Invariants:
+    """The minimal y >= 0 that solve the equations, whose variables are the indexes of the names."""
+    eliminated = eliminate(equations, deadline=deadline)
+    listed = minimal_semiflows(equations, len(names), rows_max=rows_max, deadline=deadline)
+    vectors = {tuple(sorted(vector.items())) for vector in listed.vectors}
+    if not listed.complete:
+        vectors |= {tuple((v, 1) for v in unit) for unit in cover(equations, len(names), deadline=deadline).units}
+    ordered = sorted(vectors, key=lambda vector: [(v, -weight) for v, weight in vector])
+    found = tuple(_checked(map(dict, ordered), equations, names))
+    return Invariants(found, None if eliminated is None else len(names) - eliminated.rank, listed.complete)
+
+
+def _checked(vectors: Iterable[Sparse], equations: Sequence[Sparse], names: Sequence[str]) -> Iterable[Invariant]:
+    standing: list[list[tuple[int, int]]] = [[] for _ in names]
+    for number, equation in enumerate(equations):
+        for variable, coefficient in equation.items():
+            standing[variable].append((number, coefficient))
     for vector in vectors:
-        if deadline.over:
-            complete = False
-            break
-        if any(sum(y * entry for y, entry in zip(vector, column, strict=True)) for column in columns):
+        sums: dict[int, int] = {}
+        for variable, weight in vector.items():
+            for number, coefficient in standing[variable]:
+                sums[number] = sums.get(number, 0) + weight * coefficient
+        if any(sums.values()):
             raise AssertionError("a vector that is no invariant came out of the elimination")
-        checked.append(vector)
-    found = tuple(Invariant(tuple((name, y) for name, y in zip(names, v, strict=True) if y)) for v in checked)
-    return Invariants(found, None if deadline.over else len(names) - rank(matrix), complete)
-
-
-def rank(matrix: Matrix) -> int:
-    """The rank over the rationals, exact."""
-    if not matrix or not matrix[0]:
-        return 0
-    return int(DomainMatrix([[QQ(x) for x in row] for row in matrix], (len(matrix), len(matrix[0])), QQ).rank())
-
-
-@dataclass(frozen=True, slots=True)
-class _Row:
-    """A row of [Y | Y C] in the elimination; `support` is that of the Y part, as a bit mask."""
-
-    support: int
-    solution: tuple[int, ...]
-    rest: tuple[int, ...]
-
-
-def _minimal_solutions(matrix: Matrix, rows_max: int, deadline: Deadline) -> tuple[list[tuple[int, ...]], bool]:
-    n = len(matrix)
-    rows = [_Row(1 << i, tuple(int(i == j) for j in range(n)), tuple(row)) for i, row in enumerate(matrix)]
-    columns = set(range(len(matrix[0]))) if matrix else set()
-    while columns:
-        column = min(columns, key=lambda c: _growth(rows, c))
-        columns.remove(column)
-        kept = [row for row in rows if not row.rest[column]]
-        above = [row for row in rows if row.rest[column] > 0]
-        below = [row for row in rows if row.rest[column] < 0]
-        # Of rows with one support at most one is minimal: they are multiples, or a smaller support is there too.
-        combined: dict[int, _Row] = {row.support: row for row in kept}
-        for up in above:
-            for down in below:
-                if up.support | down.support not in combined:
-                    row = _combined(up, down, column)
-                    combined[row.support] = row
-                if len(combined) > rows_max:
-                    return _finished(rows), False
-            if deadline.over:
-                return _finished(rows), False
-        minimal = _minimal(combined, deadline)
-        if minimal is None:
-            return _finished(rows), False
-        rows = minimal
-    return sorted((row.solution for row in rows), reverse=True), True
-
-
-def _finished(rows: list[_Row]) -> list[tuple[int, ...]]:
-    return sorted((row.solution for row in rows if not any(row.rest)), reverse=True)
-
-
-def _growth(rows: list[_Row], column: int) -> int:
-    """By how many rows cancelling a column makes the table grow: the next column is the one where that is least."""
-    above = sum(row.rest[column] > 0 for row in rows)
-    below = sum(row.rest[column] < 0 for row in rows)
-    return above * below - above - below
-
-
-def _combined(up: _Row, down: _Row, column: int) -> _Row:
-    a, b = -down.rest[column], up.rest[column]
-    solution = [a * x + b * y for x, y in zip(up.solution, down.solution, strict=True)]
-    rest = [a * x + b * y for x, y in zip(up.rest, down.rest, strict=True)]
-    divisor = gcd(*solution)  # divides the rest too, which is the solution times C
-    return _Row(up.support | down.support, tuple(x // divisor for x in solution), tuple(x // divisor for x in rest))
-
-
-def _minimal(rows: dict[int, _Row], deadline: Deadline) -> list[_Row] | None:
-    """The rows whose support contains the support of no other one; None where the deadline comes first."""
-    found: list[_Row] = []
-    for row in sorted(rows.values(), key=lambda row: row.support.bit_count()):
-        if deadline.over:
-            return None
-        if not any(other.support & row.support == other.support for other in found):
-            found.append(row)
-    return found
+        yield Invariant(tuple((names[v], vector[v]) for v in sorted(vector)))

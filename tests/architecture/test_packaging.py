@@ -53,7 +53,7 @@ def test_the_wheel_holds_every_module_and_every_data_file(wheel: Path) -> None:
 
 def test_the_executor_and_the_help_need_no_solver(thin: Path, tmp_path: Path) -> None:
     installed = run(thin / "python", "-m", "pip", "list", "--disable-pip-version-check").lower()
-    assert not any(solver in installed for solver in ("z3", "networkx", "sympy", "numpy"))
+    assert not any(solver in installed for solver in ("z3", "networkx", "numpy"))
     assert "Usage: firable" in run(thin / "firable", "--help", cwd=tmp_path)
     modules = [f"firable.executor.{path.stem}" for path in (ROOT / "executor").glob("*.py") if path.stem != "__init__"]
     run(thin / "python", "-c", f"import firable.executor, {', '.join(modules)}", cwd=tmp_path)
