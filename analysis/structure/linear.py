@@ -72,7 +72,7 @@ def solutions(
 
     >>> found = eliminate([{0: 1, 1: -2}, {1: 1, 2: -1}])
     >>> solutions(found, range(4)) if found else None
-    ({2: 1, 1: 1, 0: 2}, {3: 1})
+    ({0: 2, 1: 1, 2: 1}, {3: 1})
     """
     pivots = {pivot for pivot, _ in eliminated.steps}
     vectors: dict[int, dict[int, Fraction]] = {v: {v: Fraction(1)} for v in variables if v not in pivots}
@@ -95,7 +95,7 @@ def solutions(
 
 def _integer(vector: Mapping[int, Fraction]) -> dict[int, int]:
     scale = lcm(*(x.denominator for x in vector.values()))
-    whole = {v: int(x * scale) for v, x in vector.items()}
+    whole = {v: int(vector[v] * scale) for v in sorted(vector)}
     divisor = gcd(*whole.values())
     return {v: x // divisor for v, x in whole.items()}
 

@@ -170,8 +170,8 @@ def _sum(left: Sparse, a: int, right: Sparse, b: int) -> dict[int, int]:
 
 
 def _finished(table: _Table, *, complete: bool) -> Semiflows:
-    found = (row.solution for row in table.rows.values() if not row.rest)
-    return Semiflows(tuple(dict(sorted(solution.items())) for solution in found), complete)
+    found = sorted(sorted(row.solution.items()) for row in table.rows.values() if not row.rest)
+    return Semiflows(tuple(map(dict, found)), complete)
 
 
 def _lowest(support: int) -> int:
