@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from firable.analysis.deadline import Deadline
     from firable.analysis.spaces.equivalence import isomorphic, weakly_bisimilar
     from firable.analysis.spaces.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
+    from firable.analysis.structure.commoner import deadlock_trap
     from firable.analysis.structure.invariants import p_invariants, t_invariants
-    from firable.analysis.structure.siphons import deadlock_trap, minimal_siphons, minimal_traps
+    from firable.analysis.structure.siphons import minimal_siphons, minimal_traps
     from firable.analysis.verdicts.starvation import eager_run
 
 __all__ = [
@@ -52,9 +53,10 @@ _MODULES: Final = {
     "check": ("CheckReport", "Figures", "report_on"),
     "deadline": ("Deadline",),
     "spaces.equivalence": ("isomorphic", "weakly_bisimilar"),
+    "structure.commoner": ("deadlock_trap",),
     "structure.invariants": ("p_invariants", "t_invariants"),
     "spaces.reachability": ("Budget", "BudgetExceeded", "IncompleteGraph", "ReachabilityGraph", "explore"),
-    "structure.siphons": ("deadlock_trap", "minimal_siphons", "minimal_traps"),
+    "structure.siphons": ("minimal_siphons", "minimal_traps"),
     "verdicts.starvation": ("eager_run",),
 }
 _MODULE_OF: Final = {name: module for module, names in _MODULES.items() for name in names}

@@ -27,9 +27,10 @@ def structure_json(net: Net, *, contact_free: bool | None, seconds: float | None
     those not finished are not `complete`.
     """
     from firable.analysis.deadline import Deadline
+    from firable.analysis.structure.commoner import DeadlockTrap, deadlock_trap
     from firable.analysis.structure.invariants import Invariants, p_invariants, t_invariants
     from firable.analysis.structure.net_class import net_class
-    from firable.analysis.structure.siphons import DeadlockTrap, PlaceSets, deadlock_trap, minimal_traps
+    from firable.analysis.structure.siphons import PlaceSets, minimal_traps
 
     deadline, ended_early = Deadline.after(SECONDS_DEFAULT if seconds is None else seconds), ""
 
@@ -50,7 +51,7 @@ def structure_json(net: Net, *, contact_free: bool | None, seconds: float | None
     of_places = found(lambda until: p_invariants(net, deadline=until), no_vectors)
     of_transitions = found(lambda until: t_invariants(net, deadline=until), no_vectors)
     siphons = found(
-        lambda until: deadlock_trap(net, contact_free=contact_free, deadline=until), DeadlockTrap(no_sets, (), ())
+        lambda until: deadlock_trap(net, contact_free=contact_free, deadline=until), DeadlockTrap(None, no_sets, (), ())
     )
     traps = found(lambda until: minimal_traps(net, deadline=until), no_sets)
     return {

@@ -1,33 +1,33 @@
-"""Siphons and traps, and what they say about deadlock.
+"""Siphons and traps: sets of places that stay empty once empty, or marked once marked.
 
-A *siphon* is a set of places into which no transition puts a token without taking one from it: once empty, it stays
-empty. A *trap* is its mirror: no transition takes a token from it without putting one back: once marked, it stays
-marked. In a deadlock of an ordinary net the empty places are a siphon, so if every minimal siphon contains a trap
-that is marked in M0 no deadlock is reachable (Commoner 1972; Hack 1972). This proves deadlock-freeness without
-exploring anything.
+A *siphon* is a set of places into which no transition puts a token without taking one from it or reading one in it:
+once empty, it stays empty. A *trap* is its mirror: no transition takes a token from it without putting one back or
+leaving one that it reads: once marked, it stays marked. Both are about the ordinary net under the extended one
+(`firable.analysis.structure.ordinary`), and as gates and contact only forbid firings, they hold of the extended net.
+
+The largest siphon or trap within a set of places is unique, because unions of them are again such; it is found by
+taking out what cannot be in it, in time linear in the arcs at the set.
 
 The minimal siphons are found by z3: a formula says "these places are a non-empty siphon and contain none found before";
 each model is shrunk, place by place, to a minimal one, and excluded with all that contain it. When the formula is
 unsatisfiable, all are found. Their number can be exponential, so it is bounded, and there may be a deadline for all
 questions together; short of the end the list is said to be incomplete. The rejected alternative is the branching search
-of Cordone and others (2005), faster on large nets and three times the code.
-
-For the net of this toolkit the argument has premises. The firing rule also forbids firings: internal gates, contact,
-a signal wanted both 1 and 0, self-loops. In the markings where one of these holds a transition back, the empty places
-need not be a siphon. So the claim is made only for a net without internal gates and self-loops, whose transitions are
-all openable, and which is contact-free; external gates are free, as everywhere.
+of Cordone and others (2005), faster on large nets and three times the code; what needs all siphons on large nets is
+better asked without a list (`firable.analysis.structure.commoner`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import z3
 
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.induction.smt import SEED
+from firable.analysis.structure.asking import answer, solver_of
+from firable.analysis.structure.ordinary import Ordinary, ordinary
 from firable.nets.net import Marking, Net
 
 SIPHONS_MAX: Final = 2_000
@@ -41,28 +41,82 @@ class PlaceSets:
     complete: bool
 
 
-@dataclass(frozen=True, slots=True)
-class DeadlockTrap:
-    """The deadlock-trap property: does every minimal siphon contain a trap that is marked in M0?
+@dataclass(frozen=True)
+class Rules:
+    """What a siphon or a trap must satisfy: if a place of `conditions[k]` is in it, then one of `needed[k]` is too."""
 
-    `siphons` are the minimal siphons, not `complete` where not all were found or looked into; `without_marked_trap` are
-    those that refute the property. `premises` says
-    what is missing for a conclusion on deadlock; the property alone concludes nothing about it.
-    """
+    n_places: int
+    conditions: tuple[tuple[int, ...], ...]
+    needed: tuple[tuple[int, ...], ...]
 
-    siphons: PlaceSets
-    without_marked_trap: tuple[tuple[str, ...], ...]
-    premises: tuple[str, ...]
+    @cached_property
+    def by_condition(self) -> list[list[int]]:
+        """For each place, the rules that it calls upon."""
+        return self._at(self.conditions)
 
-    @property
-    def holds(self) -> bool:
-        """Whether every siphon is known and contains a marked trap."""
-        return self.siphons.complete and not self.without_marked_trap
+    @cached_property
+    def by_needed(self) -> list[list[int]]:
+        """For each place, the rules that it satisfies."""
+        return self._at(self.needed)
 
-    @property
-    def excludes_deadlock(self) -> bool:
-        """Whether the net is thereby proved free of deadlock."""
-        return self.holds and not self.premises
+    def _at(self, sides: tuple[tuple[int, ...], ...]) -> list[list[int]]:
+        found: list[list[int]] = [[] for _ in range(self.n_places)]
+        for k, places in enumerate(sides):
+            for place in places:
+                found[place].append(k)
+        return found
+
+    def largest(self, within: Iterable[int]) -> set[int]:
+        """The largest set within the places that satisfies the rules. Cost: linear in the arcs at these places."""
+        found = set(within)
+        left: dict[int, int] = {}  # of each rule, how many places that satisfy it
+        for place in found:
+            for k in self.by_needed[place]:
+                left[k] = left.get(k, 0) + 1
+        todo = [place for place in found if any(k not in left for k in self.by_condition[place])]
+        found.difference_update(todo)
+        while todo:
+            for k in self.by_needed[todo.pop()]:
+                left[k] -= 1
+                if not left[k]:
+                    fallen = [place for place in self.conditions[k] if place in found]
+                    found.difference_update(fallen)
+                    todo += fallen
+        return found
+
+    def smallest(self, within: set[int], keep: frozenset[int] | None, deadline: Deadline) -> set[int] | None:
+        """A minimal non-empty solution within a solution, or one minimal with a place of `keep`; None: out of time.
+
+        Drop a place, keep what is left of it, until nothing is left.
+        """
+        for place in sorted(within):
+            if deadline.over:
+                return None
+            if place in within:
+                smaller = self.largest(within - {place})
+                if smaller and (keep is None or smaller & keep):
+                    within = smaller
+        return within
+
+
+def siphon_rules(of: Ordinary) -> Rules:
+    """What a siphon of the net must satisfy."""
+    return _rules(of.n_places, of.outputs, of.inputs)
+
+
+def trap_rules(of: Ordinary) -> Rules:
+    """What a trap of the net must satisfy."""
+    return _rules(of.n_places, of.inputs, of.outputs)
+
+
+def _rules(n_places: int, conditions: Iterable[tuple[int, ...]], needed: Iterable[tuple[int, ...]]) -> Rules:
+    # A place that is on both sides, a read, satisfies the rule that it calls upon.
+    pairs = {
+        (tuple(place for place in condition if place not in satisfied), satisfied)
+        for condition, satisfied in zip(conditions, needed, strict=True)
+    }
+    kept = sorted(pair for pair in pairs if pair[0])
+    return Rules(n_places, tuple(pair[0] for pair in kept), tuple(pair[1] for pair in kept))
 
 
 def minimal_siphons(net: Net, *, most: int = SIPHONS_MAX, deadline: Deadline = NEVER) -> PlaceSets:
@@ -74,17 +128,17 @@ def minimal_siphons(net: Net, *, most: int = SIPHONS_MAX, deadline: Deadline = N
     >>> minimal_siphons(net).minimal
     (('p', 'q'),)
     """
-    return _minimal_sets(net, _siphon_rules(net), most, deadline)
+    return _minimal_sets(net, siphon_rules(ordinary(net)), most, deadline)
 
 
 def minimal_traps(net: Net, *, most: int = SIPHONS_MAX, deadline: Deadline = NEVER) -> PlaceSets:
     """The minimal non-empty traps."""
-    return _minimal_sets(net, _trap_rules(net), most, deadline)
+    return _minimal_sets(net, trap_rules(ordinary(net)), most, deadline)
 
 
 def largest_trap(net: Net, places: Marking) -> Marking:
     """The largest trap within a set of places, given and returned as bit masks."""
-    return _largest(places, _trap_rules(net))
+    return _mask(trap_rules(ordinary(net)).largest(_bits(places)))
 
 
 def largest_siphon(net: Net, places: Marking) -> Marking:
@@ -92,102 +146,58 @@ def largest_siphon(net: Net, places: Marking) -> Marking:
 
     Within the empty places of a deadlock it is what ran empty.
     """
-    return _largest(places, _siphon_rules(net))
+    return _mask(siphon_rules(ordinary(net)).largest(_bits(places)))
 
 
-def deadlock_trap(
-    net: Net, *, contact_free: bool | None = None, most: int = SIPHONS_MAX, deadline: Deadline = NEVER
-) -> DeadlockTrap:
-    """Decide the deadlock-trap property; `contact_free` is what is known of that verdict (None: nothing)."""
-    siphons = minimal_siphons(net, most=most, deadline=deadline)
-    bare = []
-    for siphon in siphons.minimal:
-        if deadline.over:
-            siphons = PlaceSets(siphons.minimal, complete=False)
-            break
-        if not largest_trap(net, net.marking(siphon)) & net.initial_marking:
-            bare.append(siphon)
-    return DeadlockTrap(siphons, tuple(bare), tuple(_missing_premises(net, contact_free)))
+class Question:
+    """The formula "these places are a non-empty solution of the rules", to which more can be added."""
+
+    def __init__(self, rules: Rules) -> None:
+        self.context = z3.Context()
+        self.solver = solver_of(self.context)
+        self.chosen = [z3.Bool(f"p{i}", self.context) for i in range(rules.n_places)]
+        # As text, which z3 reads ten times as fast as it is told terms.
+        lines = [f"(declare-const p{i} Bool)" for i in range(rules.n_places)]
+        for condition, needed in zip(rules.conditions, rules.needed, strict=True):
+            alternatives = " ".join(f"p{i}" for i in needed)
+            lines += [f"(assert (or (not p{i}) {alternatives}))" for i in condition]
+        self.solver.from_string("\n".join(lines))
+        self.solver.add(z3.Or([z3.Or([], self.context), *self.chosen]))
+
+    def exclude(self, places: Iterable[int]) -> None:
+        """Ask for no set that contains all these places."""
+        self.solver.add(z3.Or([z3.Not(self.chosen[i]) for i in places]))
+
+    def next(self, deadline: Deadline) -> tuple[z3.CheckSatResult, set[int]]:
+        """What z3 says, and the set that it found."""
+        found = answer(self.solver, deadline)
+        if found != z3.sat:
+            return found, set()
+        model = self.solver.model()
+        return found, {i for i, variable in enumerate(self.chosen) if z3.is_true(model[variable])}
 
 
-def _missing_premises(net: Net, contact_free: bool | None) -> Iterator[str]:
-    if not net.transitions:
-        yield "it has no transitions, so that every marking is a deadlock"
-    if any(t.permissive or t.inhibitive for t in net.transitions):
-        yield "internal gates may hold transitions back while their inputs are marked"
-    if any(t.self_loops for t in net.transitions):
-        yield "a transition with a self-loop never fires"
-    if not all(t.openable for t in net.transitions):
-        yield "a transition wants a signal both 1 and 0 and never fires"
-    if not contact_free:
-        yield "full output places may hold transitions back: the net is not known to be contact-free"
-
-
-Rule = tuple[Marking, Marking]
-"""(If one of these places is in the set, one of those must be)."""
-
-
-def _siphon_rules(net: Net) -> tuple[Rule, ...]:
-    return tuple((masks.outputs, masks.inputs) for masks in net.masks if masks.outputs)
-
-
-def _trap_rules(net: Net) -> tuple[Rule, ...]:
-    return tuple((masks.inputs, masks.outputs) for masks in net.masks if masks.inputs)
-
-
-def _largest(places: Marking, rules: tuple[Rule, ...]) -> Marking:
-    """The largest subset that satisfies the rules: their solutions are closed under union, so it is unique."""
-    changed = True
-    while changed:
-        changed = False
-        for condition, needed in rules:
-            if places & condition and not places & needed:
-                places &= ~condition
-                changed = True
-    return places
-
-
-def _minimal_sets(net: Net, rules: tuple[Rule, ...], most: int, deadline: Deadline) -> PlaceSets:
+def _minimal_sets(net: Net, rules: Rules, most: int, deadline: Deadline) -> PlaceSets:
     """Raises `KeyboardInterrupt` where the user ends the solver."""
-    chosen = [z3.Bool(f"p{i}") for i in range(len(net.places))]
-    solver = z3.Solver()
-    solver.set("random_seed", SEED)
-    solver.add(z3.Or(*chosen))
-    for condition, needed in rules:
-        alternatives = z3.Or(*(chosen[i] for i in _bits(needed)))
-        for i in _bits(condition):
-            solver.add(z3.Implies(chosen[i], alternatives))
-    found: list[Marking] = []
-    answer = z3.unknown
-    while not deadline.over:
-        answer = _answer(solver, deadline)
-        if answer != z3.sat or len(found) == most:
-            break
-        model = solver.model()
-        places = sum(1 << i for i, variable in enumerate(chosen) if z3.is_true(model[variable]))
-        smallest = _shrunk(places, lambda inner: _largest(inner, rules))
-        found.append(smallest)
-        solver.add(z3.Or(*(z3.Not(chosen[i]) for i in _bits(smallest))))
-    names = sorted((tuple(_bits(places)) for places in found), key=lambda bits: (len(bits), bits))
-    return PlaceSets(tuple(tuple(net.places[i].name for i in bits) for bits in names), answer == z3.unsat)
+    found: list[tuple[int, ...]] = []
+    complete = False
+    if not deadline.over:
+        question = Question(rules)
+        while True:
+            said, places = question.next(deadline)
+            complete = said == z3.unsat
+            smallest = rules.smallest(places, None, deadline) if said == z3.sat and len(found) < most else None
+            if smallest is None:
+                break
+            found.append(tuple(sorted(smallest)))
+            question.exclude(smallest)
+    found.sort(key=lambda places: (len(places), places))
+    return PlaceSets(tuple(tuple(net.places[i].name for i in places) for places in found), complete)
 
 
-def _answer(solver: z3.Solver, deadline: Deadline) -> z3.CheckSatResult:
-    solver.set("timeout", deadline.left_milliseconds)
-    answer = solver.check()
-    # z3 takes the signal of Ctrl-C for itself and calls it an answer.
-    if answer == z3.unknown and "interrupted" in solver.reason_unknown():
-        raise KeyboardInterrupt
-    return answer
-
-
-def _shrunk(places: Marking, largest_within: Callable[[Marking], Marking]) -> Marking:
-    """A minimal non-empty solution within a solution: drop a place, keep what is left of it, until nothing is left."""
-    for i in _bits(places):
-        if places >> i & 1 and (smaller := largest_within(places & ~(1 << i))):
-            places = smaller
-    return places
-
-
-def _bits(mask: int) -> Iterator[int]:
+def _bits(mask: Marking) -> Iterator[int]:
     return (i for i in range(mask.bit_length()) if mask >> i & 1)
+
+
+def _mask(places: Iterable[int]) -> Marking:
+    return sum(1 << i for i in places)

@@ -14,14 +14,15 @@ from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
 from firable.analysis.deadline import Deadline
+from firable.analysis.structure.commoner import commoner, deadlock_trap
+from firable.analysis.structure.ordinary import markable, ordinary
 from firable.analysis.structure.siphons import (
-    deadlock_trap,
     largest_siphon,
     largest_trap,
     minimal_siphons,
     minimal_traps,
 )
-from firable.nets.net import Net, Place, Transition
+from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
 from firable.nets.verdict import Status
 from firable.semantics.player import Player
 
@@ -33,12 +34,24 @@ def subsets(net: Net) -> list[frozenset[str]]:
     return [frozenset(s) for s in chain.from_iterable(combinations(names, n) for n in range(len(names) + 1))]
 
 
+def may_ever_fire(t: Transition) -> bool:
+    return t.openable and not {*t.inputs, *t.permissive} & {*t.outputs, *t.inhibitive}
+
+
 def is_siphon(net: Net, places: frozenset[str]) -> bool:
-    return all(places & set(t.inputs) for t in net.transitions if places & set(t.outputs))
+    """Who puts a token into it takes or reads one in it."""
+    return all(
+        places & {*t.inputs, *t.permissive} for t in net.transitions if places & set(t.outputs) and may_ever_fire(t)
+    )
 
 
 def is_trap(net: Net, places: frozenset[str]) -> bool:
-    return all(places & set(t.outputs) for t in net.transitions if places & set(t.inputs))
+    """Who takes a token from it puts one into it or leaves one there that it reads."""
+    return all(
+        places & {*t.outputs, *(set(t.permissive) - set(t.inputs))}
+        for t in net.transitions
+        if places & set(t.inputs) and may_ever_fire(t)
+    )
 
 
 def minimal(sets: list[frozenset[str]]) -> set[frozenset[str]]:
@@ -99,16 +112,16 @@ def test_the_cell_is_proved_free_of_deadlock_and_the_late_one_shows_the_siphon_t
     assert any(not net.marking(siphon) & deadlock for siphon in late.without_marked_trap)
 
 
-def test_gates_contact_and_self_loops_are_missing_premises() -> None:
+def test_inhibitive_gates_and_contact_are_missing_premises() -> None:
     ring = (Transition("t", ("p",), ("q",)), Transition("u", ("q",), ("p",)))
     places = (Place("p", marked=True), Place("q"))
     assert deadlock_trap(Net("n", places, ring), contact_free=True).excludes_deadlock
     assert not deadlock_trap(Net("n", places, ring)).excludes_deadlock
-    gated = (Transition("t", ("p",), ("q",), inhibitive=("p",)), ring[1])
-    found = deadlock_trap(Net("n", places, gated), contact_free=True)
+    gated = Net("n", (*places, Place("r", marked=True)), (Transition("t", ("p",), ("q",), inhibitive=("r",)), ring[1]))
+    found = deadlock_trap(gated, contact_free=True)
     assert found.holds
     assert not found.excludes_deadlock
-    assert check(Net("n", places, gated)).figures.deadlocks == 1
+    assert check(gated).figures.deadlocks == 1
     assert not deadlock_trap(Net("n", places), contact_free=True).excludes_deadlock
 
 
@@ -119,7 +132,7 @@ def test_past_the_bound_on_their_number_the_list_is_said_to_be_incomplete() -> N
     assert not part.complete
     assert len(part.minimal) == 5
     assert set(part.minimal) < set(whole.minimal)
-    assert not deadlock_trap(net, contact_free=True, most=5).holds
+    assert deadlock_trap(net, contact_free=True, most=5).holds  # which needs no list
     assert minimal_siphons(net, most=len(whole.minimal)).complete
 
 
@@ -157,3 +170,71 @@ def test_ctrl_c_that_the_solver_took_for_itself_interrupts(monkeypatch: pytest.M
     monkeypatch.setattr(z3.Solver, "reason_unknown", lambda _: "interrupted from keyboard")
     with pytest.raises(KeyboardInterrupt):
         minimal_siphons(load_net("fig2a"))
+
+
+def test_a_permissive_gate_is_a_read_of_which_the_argument_holds() -> None:
+    places = (Place("p", marked=True), Place("q"), Place("r", marked=True))
+    ring = (Transition("t", ("p",), ("q",), permissive=("r",)), Transition("u", ("q",), ("p",)))
+    net = Net("n", places, ring)
+    assert deadlock_trap(net, contact_free=True).excludes_deadlock
+    assert check(net).figures.deadlocks == 0
+    taken = Net("n", places, (*ring, Transition("v", ("r",), ())))
+    assert not deadlock_trap(taken, contact_free=True).holds
+    assert check(taken).figures.deadlocks == 1
+
+
+def test_transitions_that_contradict_themselves_take_no_part() -> None:
+    places = (Place("p", marked=True), Place("q", marked=True))
+    for dead in (
+        Transition("t", ("p",), ("p",)),
+        Transition("t", ("p",), (), permissive=("q",), inhibitive=("q",)),
+        Transition("t", ("p",), (), external=(ExternalGate("s", True), ExternalGate("s", False))),
+    ):
+        assert deadlock_trap(Net("n", places, (dead,), (Signal("s"),)), contact_free=True).premises
+        going = Transition("u", ("p",), ("q",)), Transition("v", ("q",), ("p",))
+        net = Net("n", (Place("p", marked=True), Place("q")), (dead, *going), (Signal("s"),))
+        assert deadlock_trap(net, contact_free=True).excludes_deadlock
+        assert check(net).figures.deadlocks == 0
+
+
+@settings(max_examples=100)
+@given(NETS)
+def test_exclusion_and_ranks_decide_the_property_as_all_sets_of_places_do(net: Net) -> None:
+    of = ordinary(net)
+    siphons = [s for s in subsets(net) if s and is_siphon(net, s)]
+    marked = [s for s in subsets(net) if is_trap(net, s) and net.marking(s) & net.initial_marking]
+    expected = all(any(trap <= s for trap in marked) for s in siphons)
+    found = commoner(of)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("firable.analysis.structure.commoner.EXCLUDED_MAX", 0)
+        by_ranks = commoner(of)
+    assert found.holds is by_ranks.holds is expected
+    for answer in (found, by_ranks):
+        bare = frozenset(net.places[p].name for p in answer.bare)
+        assert bool(bare) is not expected
+        assert not bare or (bare in siphons and not any(trap <= bare for trap in marked))
+    traps = [frozenset(net.places[p].name for p in trap) for trap in found.traps]
+    assert all(trap in marked for trap in traps)
+    assert not expected or all(any(trap <= s for trap in traps) for s in siphons)
+
+
+@settings(max_examples=60)
+@given(NETS)
+def test_places_that_cannot_be_marked_are_the_largest_siphon_that_is_empty_and_stay_so(net: Net) -> None:
+    never = set(range(len(net.places))) - markable(ordinary(net))
+    empty = [s for s in subsets(net) if is_siphon(net, s) and not net.marking(s) & net.initial_marking]
+    assert {net.places[p].name for p in never} == set().union(*empty)
+    assert not any(marking >> p & 1 for marking in Player(net).reachable() for p in never)
+
+
+def test_parallel_sections_with_exponentially_many_siphons_are_decided() -> None:
+    n = 10
+    places = [Place("d0", marked=True), *(Place(f"{side}{i}") for i in range(n) for side in "bc")]
+    places += [Place(f"d{i}") for i in range(1, n)]
+    moves = []
+    for i in range(n):
+        moves.append(Transition(f"fork{i}", (f"d{i}",), (f"b{i}", f"c{i}")))
+        moves.append(Transition(f"join{i}", (f"b{i}", f"c{i}"), (f"d{(i + 1) % n}",)))
+    net = Net("n", tuple(places), tuple(moves))
+    assert len(minimal_siphons(net, most=200).minimal) == 200
+    assert deadlock_trap(net, contact_free=True, most=10).excludes_deadlock

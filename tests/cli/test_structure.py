@@ -41,7 +41,7 @@ def test_ctrl_c_in_a_list_ends_all_of_them_and_keeps_the_verdicts(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("firable.analysis.structure.siphons.deadlock_trap", interrupted)
+    monkeypatch.setattr("firable.analysis.structure.commoner.deadlock_trap", interrupted)
     part = report_of(capsys)
     assert part["verdicts"] == whole["verdicts"]
     structure = part["figures"]["structure"]
