@@ -20,8 +20,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from firable.analysis.check import CheckReport, Figures, report_on
     from firable.analysis.deadline import Deadline
+    from firable.analysis.report import CheckReport, Figures, report_on
     from firable.analysis.spaces.equivalence import isomorphic, weakly_bisimilar
     from firable.analysis.spaces.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
     from firable.analysis.structure.commoner import deadlock_trap
@@ -50,7 +50,7 @@ __all__ = [
 ]
 
 _MODULES: Final = {
-    "check": ("CheckReport", "Figures", "report_on"),
+    "report": ("CheckReport", "Figures", "report_on"),
     "deadline": ("Deadline",),
     "spaces.equivalence": ("isomorphic", "weakly_bisimilar"),
     "structure.commoner": ("deadlock_trap",),

@@ -1,215 +1,228 @@
-"""`check`: everything that the state space of a net decides, as verdicts and figures.
+"""`check`: decide what holds of a net, by the technique that fits it.
 
-One exploration, then one question after the other to the same space. The verdicts say what holds, with their
-evidence; the figures are the numbers and sets behind them, for tables, tests and comparisons. A figure that needs the
-whole space is None where the budget ended first: an unknown number is not zero.
+`auto`, the default, goes in three stages, and stops as soon as every verdict is decided:
 
-The tables below hold the verdicts in the order of the report. To add one: its technique in a file of its own, one row
-here.
+1. *Explore.* Most cells have few markings: the explicit engine looks at up to 200,000 of them first, alone, which takes
+   a moment and gives the shortest witnesses. What it finds whole is reported the same way every time.
+2. *Hold all markings* by whichever of the explicit engine and the decision diagram is first, side by side.
+3. *Decide the questions one by one*, where no technique could hold all markings: the verdicts that come down to goals,
+   by a race of the techniques that decide those.
+
+Under synchronous steps only the explicit engine knows the rule; there `auto` is `explicit`.
+
+What a race decides first may name another technique, and another witness, on another day; what is decided is the same.
+The report's `course` tells what was tried. A technique that is asked for by name is the only one to answer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from threading import Event
 from typing import Any, Final, TypeVar
 
-from firable.analysis.question import Answer, Question
-from firable.analysis.spaces.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
-from firable.analysis.spaces.space import StateSpace
-from firable.analysis.verdicts import behaviour as behaviour_of
-from firable.analysis.verdicts import conflicts as conflict
-from firable.analysis.verdicts.behaviour import Behaviour
-from firable.analysis.verdicts.commands import (
-    commands_agree,
-    completions_apart,
-    machines_stopped,
-    no_command_in_initial_marking,
-)
-from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pairs, Steps
-from firable.analysis.verdicts.properties import decide_properties
-from firable.analysis.verdicts.starvation import starvation_free
+from firable.analysis._engine import IncompleteGraph
+from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.methods import GOAL_LANES, GOALS, SPACES, Method, SpaceMethod
+from firable.analysis.question import Answer, Question, no, yes
+from firable.analysis.race import Contestant, Outcome, race
+from firable.analysis.report import CheckReport, report_on
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.spaces.space import StateSpace, WitnessError
+from firable.analysis.verdicts.goals import Goal, goals_of
+from firable.nets.formula import Formula
 from firable.nets.net import Net
-from firable.nets.verdict import Status, Verdict, Weight, overall
-from firable.semantics.player import Player
+from firable.nets.verdict import Status, Verdict
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import holds_in
 from firable.semantics.trace import Discipline
 
 T = TypeVar("T")
 
-
-@dataclass(frozen=True, slots=True)
-class Figures:
-    """The numbers and sets behind the verdicts, by the names of the net; None is unknown, as the budget ended.
-
-    `deadlocks`, `doomed`, `home` and the values of `contacts` count markings. `nonserialisable` holds the steps of a
-    step graph that no order replays; it is None for an interleaving graph, which has no steps.
-    """
-
-    markings: int
-    edges: int
-    complete: bool
-    bytes_per_marking: float | None
-    deadlocks: int | None
-    doomed: int | None
-    home: int | None
-    reversible: bool | None
-    live: bool | None
-    dead: tuple[str, ...] | None
-    nonlive: tuple[str, ...] | None
-    contacts: Mapping[str, int] | None
-    self_loops: tuple[str, ...]
-    firable_in_initial_marking: tuple[str, ...]
-    structural_conflicts: Pairs
-    effective_conflicts: Pairs | None
-    gate_races: tuple[tuple[str, str], ...]
-    nonserialisable: tuple[tuple[str, ...], ...] | None
-
-    def to_json(self) -> dict[str, Any]:
-        """The figures as JSON data; unknown ones are null."""
-        data: dict[str, Any] = {}
-        for name in (field.name for field in fields(self)):
-            value = getattr(self, name)
-            if isinstance(value, Pairs):
-                value = {
-                    "by_input": [list(pair) for pair in value.by_input],
-                    "by_output": [list(pair) for pair in value.by_output],
-                }
-            elif isinstance(value, Mapping):
-                value = dict(value)
-            elif isinstance(value, tuple):
-                value = [list(item) if isinstance(item, tuple) else item for item in value]
-            data[name] = value
-        return data
-
-
-@dataclass(frozen=True)
-class CheckReport:
-    """What `check` found of a net under one discipline; `space` is there for further questions."""
-
-    net: Net
-    discipline: Discipline
-    figures: Figures
-    verdicts: tuple[Verdict, ...]
-    space: StateSpace[Any]
-
-    @property
-    def status(self) -> Status:
-        """The status of all required verdicts together."""
-        return overall(self.verdicts)
-
-    def verdict(self, name: str) -> Verdict:
-        """The verdict of this name; `KeyError` where there is none."""
-        for verdict in self.verdicts:
-            if verdict.name == name:
-                return verdict
-        raise KeyError(name)
+FIRST_MARKINGS: Final = 200_000
+"""How many markings `auto` explores before it lets techniques race."""
+_SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
+_GOALS_MAX: Final = 64  # a verdict of more goals than this takes longer than anybody waits
 
 
 def check(
-    net: Net, discipline: Discipline | str = Discipline.INTERLEAVING, budget: Budget | None = None
+    net: Net,
+    discipline: Discipline | str = Discipline.INTERLEAVING,
+    budget: Budget | None = None,
+    *,
+    method: Method | str = Method.AUTO,
+    progress: Callable[[int, int], object] | None = None,
 ) -> CheckReport:
-    """Explore the net under a discipline, external gates free, and decide every verdict of this room.
+    """Decide every verdict on a net under a discipline, external gates free, by the method named.
 
-    Raises `InputError` F2013 where the arbiters do not fit the conflicts of the net.
+    Raises `InputError` F2013 where the arbiters do not fit the conflicts of the net, F3004 where the budget does not
+    hold the net itself.
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> report = check(catalogue_net("conceptual_one_robot"))
     >>> report.figures.markings, report.figures.edges, str(report.verdict("live").status)
     (14, 23, 'proved')
     """
-    return report_on(explore(net, discipline, budget))
+    discipline, budget, method = Discipline(discipline), budget or Budget(), Method(method)
+    interrupted = Event()
+    deadline = Deadline(cancelled=interrupted)
+    if budget.seconds is not None:
+        deadline = Deadline.after(budget.seconds, interrupted)
+    one = _Check(net, discipline, budget, deadline, interrupted, progress)
+    if method is Method.EXPLICIT or (method is Method.AUTO and discipline is Discipline.STEP):
+        return one.explicitly()
+    return one.automatically() if method is Method.AUTO else one.by(method)
 
 
-def report_on(space: StateSpace[Any]) -> CheckReport:
-    """Decide every verdict of this room on a state space that was explored before."""
-    behaviour, conflicts = Behaviour(space), ConflictAnalysis(space)
-    steps = _steps(space)
-    verdicts = [
-        *(decide(behaviour) for decide in _ON_BEHAVIOUR),
-        self_loop_free(space),
-        *(decide(conflicts) for decide in _ON_CONFLICTS),
-        *([] if steps is None else [conflict.steps_serialisable(steps)]),
-        *(decide(space) for decide in _ON_SPACE),
-        starvation_free(behaviour),
-        *decide_properties(space),
-    ]
-    return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), tuple(verdicts), space)
+@dataclass(frozen=True)
+class _Check:
+    """One net, and what may be spent on it."""
+
+    net: Net
+    discipline: Discipline
+    budget: Budget
+    deadline: Deadline
+    interrupted: Event
+    progress: Callable[[int, int], object] | None
+
+    def explicitly(self) -> CheckReport:
+        """The report of the explicit engine alone, within the whole budget."""
+        graph = self._explore(self.budget)
+        return _told(report_on(graph), [f"explored: {_size(graph)}"])
+
+    def automatically(self) -> CheckReport:
+        """The report of the three stages, as far as they are needed."""
+        first = self._explore(replace(self.budget, markings=min(FIRST_MARKINGS, self.budget.markings)))
+        if first.complete or first.engine.reason == "interrupted":
+            return _told(report_on(first), [f"explored: {_size(first)}"])
+        course = [f"the first {first.n_markings:,} markings are not all"]
+        return self._settled(report_on(self._whole(course) or first), GOAL_LANES, course)
+
+    def by(self, method: Method) -> CheckReport:
+        """The report of one technique: what it does not decide stays unknown."""
+        if method in SPACES:
+            space = SPACES[method].load()(self.net, Limits(self.deadline, self.budget.memory_bytes))
+            return _told(report_on(space), [f"{SPACES[method].words}: {_size(space)}"])
+        nothing = self._explore(replace(self.budget, markings=1))
+        return self._settled(report_on(nothing), ((method,),), [f"{GOALS[method].words}, and nothing else"])
+
+    def _explore(self, budget: Budget) -> ReachabilityGraph:
+        return explore(self.net, self.discipline, budget, deadline=self.deadline, progress=self.progress)
+
+    def _whole(self, course: list[str]) -> StateSpace[Any] | None:
+        """All markings, by whichever technique is first; None where none of them could hold them all."""
+        limits = Limits(_share(self.deadline, _SPACES_SHARE), self.budget.memory_bytes)
+        contestants = [Contestant("explicit engine", self._held_explicitly)]
+        contestants += [Contestant(of.words, partial(_held, of, self.net)) for of in SPACES.values()]
+        outcome = self._noted(race([[one] for one in contestants], limits, slices_seconds=None), course)
+        course += outcome.told
+        if outcome.answer is None:
+            return None
+        course.append(f"{outcome.winner} was the first to hold all markings: {_size(outcome.answer)}")
+        return outcome.answer.until(self.deadline)
+
+    def _noted(self, outcome: Outcome[T], course: list[str]) -> Outcome[T]:
+        """The outcome; where Ctrl-C ended the race nothing else is begun, and what is known is reported."""
+        if outcome.interrupted:
+            self.interrupted.set()
+            course.append("interrupted")
+        return outcome
+
+    def _held_explicitly(self, limits: Limits) -> StateSpace[Any]:
+        budget = replace(self.budget, memory_bytes=limits.memory_bytes, seconds=None)
+        graph = explore(self.net, self.discipline, budget, deadline=limits.deadline)
+        graph.require_complete()
+        return graph
+
+    def _settled(self, report: CheckReport, lanes: Sequence[Sequence[Method]], course: list[str]) -> CheckReport:
+        """The report with those of its unknown verdicts decided that come down to goals."""
+        fired = {self.net.transitions[t].name for t, count in enumerate(report.space.fired()) if count}
+        verdicts = [
+            verdict if verdict.status is not Status.UNKNOWN else self._by_goals(verdict, fired, lanes, course)
+            for verdict in report.verdicts
+        ]
+        return _told(replace(report, verdicts=tuple(verdicts)), course)
+
+    def _by_goals(
+        self, verdict: Verdict, fired: set[str], lanes: Sequence[Sequence[Method]], course: list[str]
+    ) -> Verdict:
+        """The verdict after a race for each of its goals; as it was where one stays undecided or there are too many."""
+        asked = goals_of(self.net, verdict.name, fired)
+        if asked is None or not lanes or len(asked[1]) > _GOALS_MAX:
+            return verdict
+        question, goals = asked
+        found = None
+        for goal in goals:
+            if (found := self._race(verdict.name, goal, lanes, course)) is None:
+                return verdict
+            if found.reachable is not goal.wanted:
+                return _settle(question, self._failed(goal, found), found)
+        return verdict if found is None else _settle(question, yes(found.witness), found)
+
+    def _race(self, name: str, goal: Goal, lanes: Sequence[Sequence[Method]], course: list[str]) -> Finding | None:
+        """What the first technique finds that decides a goal; None where none does in time."""
+        if self.deadline.over:
+            return None
+        contestants = [
+            [Contestant(GOALS[of].words, partial(_decided, of, self.net, goal.formula)) for of in lane]
+            for lane in lanes
+        ]
+        outcome = self._noted(race(contestants, Limits(self.deadline, self.budget.memory_bytes)), course)
+        if outcome.answer is None:
+            course.append(f"{name}: {'; '.join(outcome.told)}")
+        else:
+            course.append(f"{name}: {outcome.winner} was first")
+        return outcome.answer
+
+    def _failed(self, goal: Goal, found: Finding) -> Answer:
+        if found.witness is None:
+            return no(goal.subjects)
+        subjects, note = goal.told(_marking_of(self.net, goal.formula, found))
+        return no(subjects, replace(found.witness, note=note))
 
 
-_ON_BEHAVIOUR: Final[tuple[Callable[[Behaviour[Any]], Verdict], ...]] = (
-    behaviour_of.contact_free,
-    behaviour_of.deadlock_free,
-    behaviour_of.no_doomed,
-    behaviour_of.quasi_live,
-    behaviour_of.all_live,
-    behaviour_of.reversible,
-    behaviour_of.home_markings,
-)
-_ON_CONFLICTS: Final[tuple[Callable[[ConflictAnalysis[Any]], Verdict], ...]] = (
-    conflict.structural_conflict_free,
-    conflict.effective_conflict_free,
-    conflict.race_free,
-)
-_ON_SPACE: Final[tuple[Callable[[StateSpace[Any]], Verdict], ...]] = (
-    commands_agree,
-    completions_apart,
-    machines_stopped,
-    no_command_in_initial_marking,
-)
+def _marking_of(net: Net, formula: Formula, found: Finding) -> int:
+    """The marking that a witness ends in, which must satisfy the goal."""
+    if found.witness is None:
+        raise WitnessError(f"{found.method} says that a goal is reachable and does not show how")
+    marking = net.marking(found.witness.marking)
+    if not evaluate(BOOL, net, formula, holds_in(marking)):
+        raise WitnessError(f"{found.method} shows a marking that does not satisfy the goal")
+    return marking
 
 
-def self_loops(net: Net) -> tuple[str, ...]:
-    """The transitions with a place that is both input and output: it would have to hold a token and hold none."""
-    return tuple(t.name for t in net.transitions if t.self_loops)
+def _decided(of: Method, net: Net, formula: Formula, limits: Limits) -> Finding | None:
+    """What a technique found, or None where it did not decide."""
+    found = GOALS[of].load()(net, formula, limits)
+    if found.reachable is None:
+        raise IncompleteGraph(found.bound or "not decided")
+    if found.reachable:
+        _marking_of(net, formula, found)
+    return found
 
 
-def _steps(space: StateSpace[Any]) -> Steps | None:
-    return Steps(space) if isinstance(space, ReachabilityGraph) and space.discipline is Discipline.STEP else None
+def _held(of: SpaceMethod, net: Net, limits: Limits) -> StateSpace[Any]:
+    space = of.load()(net, limits)
+    space.require_complete()
+    return space
 
 
-def self_loop_free(space: StateSpace[Any]) -> Verdict:
-    """No place is both input and output of a transition."""
-    question = Question(
-        "self-loops",
-        "no place is both input and output of one transition",
-        Weight.WARNING,
-        hint="the transition is dead; if it only reads the place, write a permissive gate",
-    )
-    found = self_loops(space.net)
-    return question.ask(space, lambda: Answer(not found, found))
+def _settle(question: Question, answer: Answer, found: Finding) -> Verdict:
+    return question.settle(answer, found.method, Discipline.INTERLEAVING, found.cost)
 
 
-def figures(behaviour: Behaviour[Any], conflicts: ConflictAnalysis[Any], steps: Steps | None) -> Figures:
-    """The figures of a state space, each None where the budget ended before it was known."""
-    space, net = behaviour.space, behaviour.space.net
-    whole = space.complete
-    nonlive = _known(lambda: behaviour.nonlive)
-    firable = Player(net).firable(net.initial_marking)
-    return Figures(
-        markings=space.n_markings,
-        edges=space.n_edges,
-        complete=whole,
-        bytes_per_marking=space.engine.bytes_per_marking if isinstance(space, ReachabilityGraph) else None,
-        deadlocks=space.count(space.deadlocks) if whole else None,
-        doomed=_known(lambda: space.count(behaviour.doomed)),
-        home=_known(lambda: behaviour.home),
-        reversible=_known(lambda: behaviour.reversible),
-        live=None if nonlive is None else not nonlive,
-        dead=behaviour.dead if whole else None,
-        nonlive=nonlive,
-        contacts=MappingProxyType(behaviour.contacts) if whole else None,
-        self_loops=self_loops(net),
-        firable_in_initial_marking=tuple(net.transitions[t].name for t in firable),
-        structural_conflicts=conflicts.structural,
-        effective_conflicts=conflicts.effective if whole else None,
-        gate_races=conflicts.races,
-        nonserialisable=None if steps is None else _known(lambda: steps.nonserialisable),
-    )
+def _share(deadline: Deadline, share: float) -> Deadline:
+    left = deadline.left_seconds
+    return deadline if left is None else Deadline.after(left * share, deadline.cancelled)
 
 
-def _known(figure: Callable[[], T]) -> T | None:
-    try:
-        return figure()
-    except (IncompleteGraph, BudgetExceeded):
-        return None
+def _size(space: StateSpace[Any]) -> str:
+    size = f"{space.n_markings:,} markings, {space.n_edges:,} edges"
+    return size if space.complete else f"{size}, which are not all ({space.bound})"
+
+
+def _told(report: CheckReport, course: Sequence[str]) -> CheckReport:
+    return replace(report, course=(*report.course, *course))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -13,8 +15,35 @@ from firable.cli.report import Report
 from firable.cli.structure import structure_json, structure_lines
 
 if TYPE_CHECKING:
-    from firable.analysis.check import CheckReport
     from firable.analysis.spaces.reachability import Budget
+    from firable.cli.cache import Kept
+    from firable.nets.net import Net
+    from firable.nets.verdict import Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What the options ask for."""
+
+    discipline: str
+    method: str
+    budget: Budget
+    trace_dir: str | None
+    structure: bool
+    cached: bool
+
+    def of_the_net(self) -> dict[str, Any]:
+        """What the answer depends on besides the net, as JSON values."""
+        allowed = (self.budget.markings, self.budget.memory_bytes, self.budget.seconds)
+        return {
+            "discipline": self.discipline,
+            "method": self.method,
+            "structure": self.structure,
+            "budget": allowed,
+        }
+
+
+METHODS: Final = ("auto", "explicit")
 
 
 @click.command(short_help="Check nets: deadlock, contact, liveness, conflicts, their own properties.")
@@ -26,82 +55,109 @@ if TYPE_CHECKING:
     show_default=True,
     help="One transition at a time, or all enabled ones of a scan together.",
 )
+@click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default="auto",
+    show_default=True,
+    metavar="METHOD",
+    help=f"Let one technique answer: {', '.join(METHODS)}.",
+)
 @analysis_options
 @click.option("--trace-dir", metavar="DIR", help="Write the firing sequence of each violation, for `firable replay`.")
 @click.option(
     "--structure", is_flag=True, help="Also net class, invariants, siphons, traps; in --max-seconds more, or 30."
+)
+@click.option(
+    "--no-cache", is_flag=True, help="Decide anew what was decided before of the same net; see FIRABLE_CACHE."
 )
 @click.option("-v", "--verbose", is_flag=True, help="Tell methods, costs and the sequences of warnings too.")
 @format_option
 def check(
     nets: tuple[str, ...],
     discipline: str,
+    method: str,
     trace_dir: str | None,
     structure: bool,
+    no_cache: bool,
     verbose: bool,
     format_: str,
     **limits: Any,
 ) -> int:
-    """Check nets by exploring all their reachable markings, external gates free.
+    """Check nets, external gates free, by exploring their markings or by whichever other technique is first.
 
     Deadlock, contact, dead and live transitions, conflicts, gate races, commands, and the properties that the file
     itself states. Each verdict is proved, violated (with a shortest firing sequence) or unknown (with the bound
     reached); Ctrl-C ends the exploration and shows what is known so far.
     """
-    allowed = budget(**limits)
-    makers = [
-        partial(_report, net, discipline, allowed, trace_dir, structure=structure, many=len(nets) > 1) for net in nets
-    ]
+    asked = _Asked(discipline, method, budget(**limits), trace_dir, structure, cached=not no_cache)
+    makers = [partial(_report, net, asked, many=len(nets) > 1) for net in nets]
     return answer_all("check", format_, makers, partial(_show, verbose=verbose))
 
 
-def _report(
-    argument: str, discipline: str, allowed: Budget, trace_dir: str | None, *, structure: bool, many: bool
-) -> Report:
-    from firable.analysis.check import check as check_net
+def _report(argument: str, asked: _Asked, *, many: bool) -> Report:
+    from firable.cli.cache import key_of, opened_cache
 
     loaded = load_net(argument)
     net = loaded.net
-    with loaded.placing():
-        found = check_net(net, discipline, allowed)
-    figures = found.figures.to_json()
-    if structure:
-        contacts = found.figures.contacts
-        contact_free = None if contacts is None else not contacts
-        # Anew, since the structure is wanted most where the exploration has used up its own time.
-        figures["structure"] = structure_json(net, contact_free=contact_free, seconds=allowed.seconds)
+    cache = opened_cache() if asked.cached else None
+    key = key_of(net, asked.of_the_net()) if cache is not None else ""
+    kept = cache.read(key) if cache is not None else None
+    again = kept is not None
+    if kept is None:
+        with loaded.placing():
+            kept = _found(net, asked)
+        if cache is not None:
+            cache.write(key, kept)
     files: tuple[str, ...] = ()
-    if trace_dir is not None:
+    if asked.trace_dir is not None:
         from pathlib import Path
 
         from firable.nets.bundle import file_stem
 
-        folder = str(Path(trace_dir) / file_stem(argument)) if many else trace_dir
-        files = write_folder(folder, _traces(found))
+        folder = str(Path(asked.trace_dir) / file_stem(argument)) if many else asked.trace_dir
+        files = write_folder(folder, _traces(net, kept.verdicts, asked.discipline))
     return Report(
         "check",
         argument,
         net,
-        found.verdicts,
-        discipline=discipline,
-        figures=figures,
+        kept.verdicts,
+        discipline=asked.discipline,
+        figures=kept.figures,
+        course=kept.course,
         notes=loaded.notes,
         files=files,
+        again=again,
     )
 
 
-def _traces(found: CheckReport) -> dict[str, str]:
+def _found(net: Net, asked: _Asked) -> Kept:
+    """What the techniques find of a net."""
+    from firable.analysis.check import check as check_net
+    from firable.cli.cache import Kept
+
+    found = check_net(net, asked.discipline, asked.budget, method=asked.method)
+    figures = found.figures.to_json()
+    if asked.structure:
+        contacts = found.figures.contacts
+        contact_free = None if contacts is None else not contacts
+        # Anew, since the structure is wanted most where the exploration has used up its own time.
+        figures["structure"] = structure_json(net, contact_free=contact_free, seconds=asked.budget.seconds)
+    return Kept(found.verdicts, figures, found.course)
+
+
+def _traces(net: Net, verdicts: Iterable[Verdict], discipline: str) -> dict[str, str]:
     """The trace of each violation that matters and has one; of a cycle, its first turn."""
     from firable.nets.bundle import file_stem
     from firable.nets.verdict import Status, Weight
-    from firable.semantics.trace import Trace
+    from firable.semantics.trace import Discipline, Trace
 
     traces = {}
-    for verdict in found.verdicts:
+    for verdict in verdicts:
         if verdict.status is not Status.VIOLATED or verdict.weight is Weight.INFORMATION or verdict.witness is None:
             continue
         if firings := (*verdict.witness.firings, *verdict.witness.cycle):
-            trace = Trace.of_firings(found.net, firings, found.discipline)
+            trace = Trace.of_firings(net, firings, Discipline(discipline))
             traces[f"{file_stem(verdict.name)}.trace.jsonl"] = "".join(f"{line}\n" for line in trace.lines())
     return traces
 
@@ -117,6 +173,9 @@ def _show(report: Report, *, verbose: bool) -> None:
         f"  {text.counted(figures['markings'], 'marking')}, {text.counted(figures['edges'], 'edge')}{whole}; "
         f"{words}, external gates free"
     )
+    if verbose or len(report.course) > 1:
+        for line in (*report.course, *(["taken from the cache: this net was checked before"] if report.again else [])):
+            click.echo(f"  {line}")
     text.show_verdicts(report.net, report.verdicts, verbose=verbose)
     if "structure" in figures:
         click.echo(f"\n{click.style('structure', bold=True)}")

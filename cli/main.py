@@ -21,7 +21,7 @@ from firable.cli import bundle, check, convert, draw, prove, replay, run, schema
 from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
-_EXTRA = frozenset({"z3", "networkx", "numpy"})
+_EXTRA = frozenset({"z3", "networkx", "numpy", "platformdirs"})
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})

@@ -33,7 +33,10 @@ class ExitCode(IntEnum):
 
 @dataclass(frozen=True)
 class Report:
-    """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON."""
+    """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON.
+
+    `again` says that the same was decided before, which a program need not know.
+    """
 
     command: str
     input: str
@@ -41,11 +44,13 @@ class Report:
     verdicts: Sequence[Verdict]
     discipline: str = ""
     figures: Mapping[str, Any] = field(default_factory=dict)
+    course: Sequence[str] = ()
     notes: Sequence[Diagnostic] = ()
     table: Sequence[Coordinated] = ()
     assumptions: Sequence[str] = ()
     files: Sequence[str] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
+    again: bool = False
 
     @property
     def exit_code(self) -> ExitCode:
@@ -72,7 +77,7 @@ class Report:
         }
         if self.table:
             data["table"] = [_row_to_json(row) for row in self.table]
-        for key in ("discipline", "figures", "assumptions", "files", "run"):
+        for key in ("discipline", "course", "figures", "assumptions", "files", "run"):
             if value := getattr(self, key):
                 data[key] = list(value) if isinstance(value, tuple) else value
         if self.notes:

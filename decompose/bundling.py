@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from firable.analysis.check import CheckReport
+from firable.analysis.report import CheckReport
 from firable.decompose.proving import TIMEOUT_MS, prove
 from firable.decompose.splitting import split
 from firable.nets.bundle import Bundle

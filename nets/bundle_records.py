@@ -107,7 +107,7 @@ class _WitnessRecord(_Record):
     note: str
 
 
-class _VerdictRecord(_Record):
+class VerdictRecord(_Record):
     """What `Verdict.to_json` writes."""
 
     name: str
@@ -126,6 +126,7 @@ class _VerdictRecord(_Record):
     discipline: str = ""
 
     def verdict(self) -> Verdict:
+        """The verdict."""
         seen = self.witness
         return Verdict(
             self.name,
@@ -148,7 +149,7 @@ class JudgedRecord(_Record):
     """`verdicts.json`: the verdicts, and the SHA-256 of each file that they are about."""
 
     of: dict[str, str]
-    verdicts: tuple[_VerdictRecord, ...]
+    verdicts: tuple[VerdictRecord, ...]
 
     def read(self) -> tuple[Verdict, ...]:
         """The verdicts."""

@@ -14,7 +14,7 @@ graph. The rejected alternative, evaluating formulas in Rust, would be a second 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.spaces.space import Derived, WitnessError, Witnesses
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
@@ -74,6 +75,7 @@ _REASONS: Final = {
     "memory": "the budget of memory is used up",
     "time": "the budget of time is used up",
     "interrupted": "interrupted",
+    "cancelled": "the answer is no longer needed",
 }
 
 
@@ -91,13 +93,15 @@ class ReachabilityGraph(Derived):
     """The markings reachable from M0 under one discipline, numbered breadth first; M0 is 0.
 
     A marking with a lower number is never farther from M0, so the lowest number of a set is its shortest witness. What
-    needs the whole graph raises `IncompleteGraph` where it is not `complete`.
+    needs the whole graph raises `IncompleteGraph` where it is not `complete`, and what is not done when the `deadline`
+    comes raises `BudgetExceeded`.
     """
 
     net: Net
     discipline: Discipline
     budget: Budget
     engine: _engine.Graph
+    deadline: Deadline = NEVER
 
     @cached_property
     def algebra(self) -> Bitwise[Column]:
@@ -137,10 +141,19 @@ class ReachabilityGraph(Derived):
         reason = _REASONS.get(self.engine.reason or "", str(self.engine.reason))
         return f"{self.n_markings:,} markings found, {self.n_edges:,} edges followed: {reason}"
 
+    @property
+    def _limits(self) -> dict[str, Any]:
+        """What ends the engine's long work."""
+        return engine_limits(self.deadline)
+
     @cached_property
     def witnesses(self) -> Witnesses:
         """What replays every witness."""
         return Witnesses(self.net, self.discipline)
+
+    def until(self, deadline: Deadline) -> ReachabilityGraph:
+        """The same graph, for questions that end with another deadline."""
+        return replace(self, deadline=deadline)
 
     def require_complete(self) -> None:
         """Raise `IncompleteGraph` unless the whole graph is known."""
@@ -200,7 +213,7 @@ class ReachabilityGraph(Derived):
 
     def successors(self, index: int) -> list[tuple[FiringSet, int]]:
         """What may fire in a marking, and the number of the marking after it."""
-        return [(tuple(fired), target) for fired, target in self.engine.successors(index)]
+        return [(tuple(fired), target) for fired, target in self.engine.successors(index, **self._limits)]
 
     def before(self, targets: Column, by: Iterable[int] | None = None) -> Column:
         """The markings with an edge into the targets (EX); with `by`, an edge that fires one of these transitions."""
@@ -215,7 +228,7 @@ class ReachabilityGraph(Derived):
 
     def backward(self, targets: Column, within: Column | None = None) -> Column:
         """The markings from which a target can be reached (EF), going only through `within` (E[within U targets])."""
-        bitmap = self.engine.backward(targets.tobytes(), None if within is None else within.tobytes())
+        bitmap = self.engine.backward(targets.tobytes(), None if within is None else within.tobytes(), **self._limits)
         return _column(bitmap)
 
     def endless(self, within: Column | None = None) -> Column:
@@ -241,25 +254,25 @@ class ReachabilityGraph(Derived):
 
     def live(self) -> Sequence[bool]:
         """For each transition, whether from every marking one can be reached in which it may fire."""
-        return self.engine.live()
+        return self.engine.live(**self._limits)
 
     def reversible(self) -> bool:
         """Whether M0 can be reached from every marking."""
-        return self.engine.reversible()
+        return self.engine.reversible(**self._limits)
 
     def home(self) -> Column:
         """The home markings: those that can be reached from every reachable marking."""
-        return _column(self.engine.home_markings())
+        return _column(self.engine.home_markings(**self._limits))
 
     def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""
         if not self.complete:
             return super().firable_together(pairs)
-        return tuple(lowest is not None for lowest in self.engine.effective_conflicts(list(pairs)))
+        return tuple(lowest is not None for lowest in self.engine.effective_conflicts(list(pairs), **self._limits))
 
     def components(self, within: Column | None = None) -> Components:
         """The strongly connected components of the graph, or of its part within a set of markings."""
-        found = self.engine.components(None if within is None else within.tobytes())
+        found = self.engine.components(None if within is None else within.tobytes(), **self._limits)
         return Components(
             np.frombuffer(found.of(), "<u4"),
             np.frombuffer(found.sizes(), "<u4"),
@@ -269,7 +282,7 @@ class ReachabilityGraph(Derived):
 
     def edges(self) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint32]]:
         """The edges as compressed rows: the offset of each marking's row, and the targets."""
-        offsets, targets = self.engine.edges()
+        offsets, targets = self.engine.edges(**self._limits)
         return np.frombuffer(offsets, "<u8"), np.frombuffer(targets, "<u4")
 
     def witness(self, targets: Column, note: str = "") -> Witness | None:
@@ -282,7 +295,7 @@ class ReachabilityGraph(Derived):
 
         Raises `WitnessError` where it does not replay.
         """
-        firings = [tuple(fired) for fired in self.engine.path_to(index)]
+        firings = [tuple(fired) for fired in self.engine.path_to(index)]  # what was found is shown, however late it is
         return self.witnesses.replayed(firings, self.marking(index), note)
 
 
@@ -309,9 +322,17 @@ class Components:
 
 
 def explore(
-    net: Net, discipline: Discipline | str = Discipline.INTERLEAVING, budget: Budget | None = None
+    net: Net,
+    discipline: Discipline | str = Discipline.INTERLEAVING,
+    budget: Budget | None = None,
+    *,
+    deadline: Deadline = NEVER,
+    progress: Callable[[int, int], object] | None = None,
 ) -> ReachabilityGraph:
     """The reachability graph of a net, external gates free, or as much of it as the budget allows.
+
+    The `deadline` ends the exploration and, later, the questions to the graph; the seconds of the budget end the
+    exploration alone. `progress` is told the markings and edges found so far, some twenty times a second.
 
     Raises `InputError` F3004 where the budget of memory does not even hold the net.
 
@@ -323,14 +344,28 @@ def explore(
     """
     discipline, budget = Discipline(discipline), budget or Budget()
     try:
-        graph = _explored(net, discipline, budget)
+        graph = _explored(net, discipline, budget, deadline, progress)
     except BudgetExceeded:
         message = f"the budget of {budget.memory_bytes:,} bytes does not hold the net itself, let alone its markings"
         raise InputError([Diagnostic("F3004", message, "give it a larger budget of memory")]) from None
-    return ReachabilityGraph(net, discipline, budget, graph)
+    return ReachabilityGraph(net, discipline, budget, graph, deadline)
 
 
-def _explored(net: Net, discipline: Discipline, budget: Budget) -> _engine.Graph:
+def engine_limits(deadline: Deadline) -> dict[str, Any]:
+    """A deadline as the engine's functions take it."""
+    flag = deadline.cancelled
+    return {"max_seconds": deadline.left_seconds, "cancelled": None if flag is None else flag.is_set}
+
+
+def _explored(
+    net: Net,
+    discipline: Discipline,
+    budget: Budget,
+    deadline: Deadline,
+    progress: Callable[[int, int], object] | None,
+) -> _engine.Graph:
+    limits = engine_limits(deadline)
+    limits["max_seconds"] = min((t for t in (limits["max_seconds"], budget.seconds) if t is not None), default=None)
     place, signal = net.place_index, net.signal_index
     return _engine.explore(
         len(net.places),
@@ -348,7 +383,8 @@ def _explored(net: Net, discipline: Discipline, budget: Budget) -> _engine.Graph
         step=discipline is Discipline.STEP,
         max_markings=budget.markings,
         max_memory_bytes=budget.memory_bytes,
-        max_seconds=budget.seconds,
+        progress=progress,
+        **limits,
     )
 
 

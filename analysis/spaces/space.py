@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
+from firable.analysis.deadline import Deadline
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
@@ -94,6 +95,10 @@ class StateSpace(Protocol[S]):
     @property
     def deadlocks(self) -> S:
         """The markings where no transition is firable and openable, among those that were expanded."""
+        ...
+
+    def until(self, deadline: Deadline) -> StateSpace[S]:
+        """The same space, for questions that end with another deadline."""
         ...
 
     def require_complete(self) -> None:

@@ -35,6 +35,7 @@ from firable.analysis.spaces.reachability import (
     Column,
     Components,
     ReachabilityGraph,
+    engine_limits,
     first,
     indexes,
 )
@@ -68,7 +69,7 @@ def leads_to(space: StateSpace[Any], of: Property) -> Answer:
     start = first(graph.satisfying(of.formula) & graph.backward(fair.markings | stuck, without) & without)
     if start is None:
         return yes()
-    prefix = [tuple(fired) for fired in graph.engine.path_to(start)]
+    prefix = [tuple(fired) for fired in graph.engine.path_to(start, **engine_limits(graph.deadline))]
     prefix_length = len(prefix)
     tail, entry = _way(graph, start, fair.markings | stuck, without)
     prefix += tail
@@ -83,7 +84,7 @@ def leads_to(space: StateSpace[Any], of: Property) -> Answer:
 
 def _way(graph: ReachabilityGraph, source: int, targets: Column, within: Column) -> tuple[list[FiringSet], int]:
     """A shortest firing sequence through `within` that is known to exist, and the target it reaches."""
-    found = graph.engine.path_between(source, targets.tobytes(), within.tobytes())
+    found = graph.engine.path_between(source, targets.tobytes(), within.tobytes(), **engine_limits(graph.deadline))
     if found is None:
         raise WitnessError("there is no way to a marking from which it was found by going back")
     firings, target = found

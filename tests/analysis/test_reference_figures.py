@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from support.reference import Case, cases, load_net, local
 
-from firable.analysis.check import check, report_on
+from firable.analysis.check import check
+from firable.analysis.report import report_on
 from firable.analysis.spaces.equivalence import isomorphic
 from firable.analysis.spaces.reachability import ReachabilityGraph, explore
 from firable.analysis.verdicts.behaviour import Behaviour

@@ -11,7 +11,8 @@ from support.dense_nets import dense_nets
 from support.reference import cases
 from support.ring_nets import ring_nets
 
-from firable.analysis.check import CheckReport, check, report_on
+from firable.analysis.check import check
+from firable.analysis.report import CheckReport, report_on
 from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore
 from firable.analysis.verdicts.conflicts import Steps
 from firable.nets.net import Marking, Net, Place, Transition

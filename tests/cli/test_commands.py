@@ -111,6 +111,7 @@ def test_an_interrupted_check_shows_what_is_known(tmp_path: Path) -> None:
         "engine = r._engine.explore\n"
         "def explore(*arguments, **options):\n"
         "    threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        "    r._engine.explore = engine\n"
         "    return engine(*arguments, **options)\n"
         "r._engine.explore = explore\n"
         f"sys.exit(main(['check', {str(net)!r}]))\n"

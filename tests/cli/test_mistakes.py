@@ -162,7 +162,7 @@ def test_a_plant_that_does_not_fit_is_refused(tmp_path: Path, capsys: pytest.Cap
 def test_an_internal_error_is_one_line_and_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def broken(*arguments: object) -> None:
+    def broken(*arguments: object, **options: object) -> None:
         raise RuntimeError("planted")
 
     monkeypatch.setattr(firable.analysis.check, "check", broken)
@@ -175,7 +175,7 @@ def test_an_internal_error_is_one_line_and_says_what_to_do(
 
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    def missing(*arguments: object) -> None:
+    def missing(*arguments: object, **options: object) -> None:
         raise ModuleNotFoundError("No module named 'numpy'", name="numpy")
 
     monkeypatch.setattr(firable.analysis.check, "check", missing)

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from support.reference import Case, cases, local
 
-from firable.analysis.check import self_loops
+from firable.analysis.report import self_loops
 from firable.analysis.spaces.equivalence import isomorphic
 from firable.analysis.spaces.reachability import Column, ReachabilityGraph, explore
 from firable.analysis.verdicts.behaviour import Behaviour

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.reference import load_net
 
-from firable.analysis.check import CheckReport, check
+from firable.analysis.check import check
 from firable.analysis.induction.smt import Terms, value
+from firable.analysis.report import CheckReport
 from firable.decompose.bundling import make_bundle
 from firable.decompose.obligations import greedy
 from firable.decompose.proving import ProofReport, prove

@@ -6,10 +6,11 @@ Each operation is the textbook's sentence about it. Slow and obvious on purpose:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.spaces.space import Derived
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
@@ -32,6 +33,7 @@ class NaiveSpace(Derived):
     method: str = "the reference player"
     complete: bool = True
     bound: str = ""
+    deadline: Deadline = NEVER
 
     @cached_property
     def graph(self) -> dict[Marking, list[tuple[FiringSet, Marking]]]:
@@ -67,6 +69,10 @@ class NaiveSpace(Derived):
     def deadlocks(self) -> Markings:
         """The markings without an edge."""
         return frozenset(marking for marking, edges in self.graph.items() if not edges)
+
+    def until(self, deadline: Deadline) -> NaiveSpace:
+        """The same markings; it answers whatever it is asked, however long that takes."""
+        return replace(self, deadline=deadline)
 
     def require_complete(self) -> None:
         """It always is."""

@@ -1,0 +1,68 @@
+"""The table of techniques that `check` may use, and what each of them can decide.
+
+To add one: its file, which opens with the idea and its source, and one row here. A technique either *holds* all
+markings, so that every verdict may be asked of it, or decides *goals*, or *knows* some verdicts at once from the
+structure of the net. They are loaded when they are used, because solvers take a second to load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib import import_module
+from typing import Any, Final
+
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.spaces.space import StateSpace
+from firable.nets.formula import Formula
+from firable.nets.net import Net
+
+GoalDecider = Callable[[Net, Formula, Limits], Finding]
+SpaceMaker = Callable[[Net, Limits], StateSpace[Any]]
+
+
+class Method(StrEnum):
+    """What `--method` names."""
+
+    AUTO = "auto"
+    EXPLICIT = "explicit"
+
+
+@dataclass(frozen=True, slots=True)
+class GoalMethod:
+    """A technique that decides goals: what it is in words, and where it is (`module:function`)."""
+
+    words: str
+    at: str
+
+    def load(self) -> GoalDecider:
+        """The function itself."""
+        decide: GoalDecider = _loaded(self.at)
+        return decide
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceMethod:
+    """A technique that holds all markings: what it is in words, and where it is (`module:function`)."""
+
+    words: str
+    at: str
+
+    def load(self) -> SpaceMaker:
+        """The function itself."""
+        make: SpaceMaker = _loaded(self.at)
+        return make
+
+
+def _loaded(at: str) -> Any:
+    module, _, name = at.partition(":")
+    return getattr(import_module(module), name)
+
+
+SPACES: Final[dict[Method, SpaceMethod]] = {}
+
+GOALS: Final[dict[Method, GoalMethod]] = {}
+
+GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = ()
+"""How `auto` races them: what finds violations beside what proves; each lane from the quick to the thorough."""

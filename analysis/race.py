@@ -1,0 +1,136 @@
+"""A race of techniques: several look for one answer at the same time, and the first sound one ends the others.
+
+No technique is best for all nets: a decision diagram holds 10^50 markings of one net and chokes on a thousand of
+another, induction proves at once what exploration never ends, and a random walk finds what no proof can. So they run
+side by side, in lanes: each lane is a thread that tries its techniques one after the other, each for a slice of time,
+then all of them again for longer slices. The long work of each releases the interpreter, so lanes use the cores.
+
+The rejected alternative, choosing a technique by the looks of the net, needs no cores and is wrong on every tenth net.
+
+An answer of which nobody can tell how it was found is worth nothing: an outcome tells how each technique ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from threading import Event, Lock, Thread
+from time import monotonic
+from typing import Final, Generic, TypeVar
+
+from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Limits
+
+T = TypeVar("T")
+
+SLICES_SECONDS: Final = (2.0, 10.0, 60.0)
+"""How long each technique may try in each round of its lane."""
+_TURN_SECONDS: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Contestant(Generic[T]):
+    """A technique in a race: its name, and the work within limits, which gives None or an answer."""
+
+    name: str
+    run: Callable[[Limits], T | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome(Generic[T]):
+    """The first answer (None: nobody found one), who found it, and in words how the others ended.
+
+    `interrupted` says that Ctrl-C ended the race.
+    """
+
+    answer: T | None
+    winner: str
+    told: tuple[str, ...]
+    interrupted: bool = False
+
+
+def race(
+    lanes: Sequence[Sequence[Contestant[T]]], limits: Limits, slices_seconds: Sequence[float] | None = SLICES_SECONDS
+) -> Outcome[T]:
+    """Run the lanes side by side until one technique has an answer, all have given up, or the limits are reached.
+
+    With `slices_seconds` None each technique runs once, for as long as the limits allow. The memory is shared out
+    evenly among the lanes. Ctrl-C ends the race, and so does what a technique raises that is no exhausted budget, which
+    comes out.
+    """
+    course = _Course[T](Event(), Lock())
+    share = replace(limits, memory_bytes=max(1, limits.memory_bytes // max(1, len(lanes))))
+    threads = [Thread(target=course.go, args=(lane, share, slices_seconds), daemon=True) for lane in lanes if lane]
+    interrupted = False
+    try:
+        for thread in threads:
+            thread.start()
+        while any(thread.is_alive() for thread in threads):
+            if limits.deadline.over:
+                course.over.set()
+            for thread in threads:
+                thread.join(_TURN_SECONDS)  # in turns, so that Ctrl-C is heard
+    except KeyboardInterrupt:
+        interrupted = True
+    finally:
+        course.over.set()
+        for thread in threads:
+            thread.join()
+    if course.failure is not None:
+        raise course.failure
+    return Outcome(course.answer, course.winner, tuple(course.told), interrupted)
+
+
+class _Course(Generic[T]):
+    """What the lanes of one race share."""
+
+    def __init__(self, over: Event, lock: Lock) -> None:
+        self.over = over
+        self.lock = lock
+        self.answer: T | None = None
+        self.winner = ""
+        self.failure: BaseException | None = None
+        self.told: list[str] = []
+
+    def go(self, lane: Sequence[Contestant[T]], limits: Limits, slices_seconds: Sequence[float] | None) -> None:
+        """One lane: its techniques in turn, in slices that grow; one that gives up early is not asked again."""
+        waiting = list(lane)
+        for seconds in slices_seconds or (None,):
+            for contestant in list(waiting):
+                if self.over.is_set() or limits.deadline.over:
+                    return
+                until = self._until(limits.deadline, seconds)
+                gave_up = self._try(contestant, replace(limits, deadline=until))
+                if gave_up and not until.over:
+                    waiting.remove(contestant)
+
+    def _until(self, deadline: Deadline, seconds: float | None) -> Deadline:
+        end = deadline.at_seconds if seconds is None else min(deadline.at_seconds, monotonic() + seconds)
+        return Deadline(end, self.over)
+
+    def _try(self, contestant: Contestant[T], limits: Limits) -> bool:
+        """Let one technique try; whether it gave up."""
+        began = monotonic()
+        try:
+            answer = contestant.run(limits)
+        except (BudgetExceeded, IncompleteGraph) as error:
+            self._tell(f"{contestant.name} gave up: {error}")
+            return True
+        except BaseException as error:
+            with self.lock:
+                self.failure = self.failure or error
+            self.over.set()
+            return True
+        with self.lock:
+            if answer is not None and self.answer is None and self.failure is None:
+                self.answer, self.winner = answer, contestant.name
+                self.over.set()
+                return False
+        lost = "was too late" if answer is not None else "was ended" if self.over.is_set() else "found no answer"
+        self._tell(f"{contestant.name} {lost} after {monotonic() - began:.1f} s")
+        return True
+
+    def _tell(self, line: str) -> None:
+        with self.lock:
+            self.told.append(line)

@@ -1,0 +1,204 @@
+"""The report of `check`: everything that the state space of a net decides, as verdicts and figures.
+
+One question after the other to the same space. The verdicts say what holds, with their
+evidence; the figures are the numbers and sets behind them, for tables, tests and comparisons. A figure that needs the
+whole space is None where the budget ended first: an unknown number is not zero.
+
+The tables below hold the verdicts in the order of the report. To add one: its technique in a file of its own, one row
+here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+from typing import Any, Final, TypeVar
+
+from firable.analysis.question import Answer, Question
+from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
+from firable.analysis.spaces.space import StateSpace
+from firable.analysis.verdicts import behaviour as behaviour_of
+from firable.analysis.verdicts import conflicts as conflict
+from firable.analysis.verdicts.behaviour import Behaviour
+from firable.analysis.verdicts.commands import (
+    commands_agree,
+    completions_apart,
+    machines_stopped,
+    no_command_in_initial_marking,
+)
+from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pairs, Steps
+from firable.analysis.verdicts.properties import decide_properties
+from firable.analysis.verdicts.starvation import starvation_free
+from firable.nets.net import Net
+from firable.nets.verdict import Status, Verdict, Weight, overall
+from firable.semantics.player import Player
+from firable.semantics.trace import Discipline
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """The numbers and sets behind the verdicts, by the names of the net; None is unknown, as the budget ended.
+
+    `deadlocks`, `doomed`, `home` and the values of `contacts` count markings. `nonserialisable` holds the steps of a
+    step graph that no order replays; it is None for an interleaving graph, which has no steps.
+    """
+
+    markings: int
+    edges: int
+    complete: bool
+    bytes_per_marking: float | None
+    deadlocks: int | None
+    doomed: int | None
+    home: int | None
+    reversible: bool | None
+    live: bool | None
+    dead: tuple[str, ...] | None
+    nonlive: tuple[str, ...] | None
+    contacts: Mapping[str, int] | None
+    self_loops: tuple[str, ...]
+    firable_in_initial_marking: tuple[str, ...]
+    structural_conflicts: Pairs
+    effective_conflicts: Pairs | None
+    gate_races: tuple[tuple[str, str], ...]
+    nonserialisable: tuple[tuple[str, ...], ...] | None
+
+    def to_json(self) -> dict[str, Any]:
+        """The figures as JSON data; unknown ones are null."""
+        data: dict[str, Any] = {}
+        for name in (field.name for field in fields(self)):
+            value = getattr(self, name)
+            if isinstance(value, Pairs):
+                value = {
+                    "by_input": [list(pair) for pair in value.by_input],
+                    "by_output": [list(pair) for pair in value.by_output],
+                }
+            elif isinstance(value, Mapping):
+                value = dict(value)
+            elif isinstance(value, tuple):
+                value = [list(item) if isinstance(item, tuple) else item for item in value]
+            data[name] = value
+        return data
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """What `check` found of a net under one discipline; `space` is there for further questions.
+
+    `course` tells, in words, which techniques were tried and why the verdicts name the ones they name.
+    """
+
+    net: Net
+    discipline: Discipline
+    figures: Figures
+    verdicts: tuple[Verdict, ...]
+    space: StateSpace[Any]
+    course: tuple[str, ...] = ()
+
+    @property
+    def status(self) -> Status:
+        """The status of all required verdicts together."""
+        return overall(self.verdicts)
+
+    def verdict(self, name: str) -> Verdict:
+        """The verdict of this name; `KeyError` where there is none."""
+        for verdict in self.verdicts:
+            if verdict.name == name:
+                return verdict
+        raise KeyError(name)
+
+
+def report_on(space: StateSpace[Any]) -> CheckReport:
+    """Decide every verdict of this room on a state space that was explored before."""
+    behaviour, conflicts = Behaviour(space), ConflictAnalysis(space)
+    steps = _steps(space)
+    verdicts = [
+        *(decide(behaviour) for decide in _ON_BEHAVIOUR),
+        self_loop_free(space),
+        *(decide(conflicts) for decide in _ON_CONFLICTS),
+        *([] if steps is None else [conflict.steps_serialisable(steps)]),
+        *(decide(space) for decide in _ON_SPACE),
+        starvation_free(behaviour),
+        *decide_properties(space),
+    ]
+    return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), tuple(verdicts), space)
+
+
+_ON_BEHAVIOUR: Final[tuple[Callable[[Behaviour[Any]], Verdict], ...]] = (
+    behaviour_of.contact_free,
+    behaviour_of.deadlock_free,
+    behaviour_of.no_doomed,
+    behaviour_of.quasi_live,
+    behaviour_of.all_live,
+    behaviour_of.reversible,
+    behaviour_of.home_markings,
+)
+_ON_CONFLICTS: Final[tuple[Callable[[ConflictAnalysis[Any]], Verdict], ...]] = (
+    conflict.structural_conflict_free,
+    conflict.effective_conflict_free,
+    conflict.race_free,
+)
+_ON_SPACE: Final[tuple[Callable[[StateSpace[Any]], Verdict], ...]] = (
+    commands_agree,
+    completions_apart,
+    machines_stopped,
+    no_command_in_initial_marking,
+)
+
+
+def self_loops(net: Net) -> tuple[str, ...]:
+    """The transitions with a place that is both input and output: it would have to hold a token and hold none."""
+    return tuple(t.name for t in net.transitions if t.self_loops)
+
+
+def _steps(space: StateSpace[Any]) -> Steps | None:
+    return Steps(space) if isinstance(space, ReachabilityGraph) and space.discipline is Discipline.STEP else None
+
+
+def self_loop_free(space: StateSpace[Any]) -> Verdict:
+    """No place is both input and output of a transition."""
+    question = Question(
+        "self-loops",
+        "no place is both input and output of one transition",
+        Weight.WARNING,
+        hint="the transition is dead; if it only reads the place, write a permissive gate",
+    )
+    found = self_loops(space.net)
+    return question.ask(space, lambda: Answer(not found, found))
+
+
+def figures(behaviour: Behaviour[Any], conflicts: ConflictAnalysis[Any], steps: Steps | None) -> Figures:
+    """The figures of a state space, each None where the budget ended before it was known."""
+    space, net = behaviour.space, behaviour.space.net
+    whole = space.complete
+    nonlive = _known(lambda: behaviour.nonlive)
+    firable = Player(net).firable(net.initial_marking)
+    return Figures(
+        markings=space.n_markings,
+        edges=space.n_edges,
+        complete=whole,
+        bytes_per_marking=space.engine.bytes_per_marking if isinstance(space, ReachabilityGraph) else None,
+        deadlocks=space.count(space.deadlocks) if whole else None,
+        doomed=_known(lambda: space.count(behaviour.doomed)),
+        home=_known(lambda: behaviour.home),
+        reversible=_known(lambda: behaviour.reversible),
+        live=None if nonlive is None else not nonlive,
+        dead=behaviour.dead if whole else None,
+        nonlive=nonlive,
+        contacts=MappingProxyType(behaviour.contacts) if whole else None,
+        self_loops=self_loops(net),
+        firable_in_initial_marking=tuple(net.transitions[t].name for t in firable),
+        structural_conflicts=conflicts.structural,
+        effective_conflicts=conflicts.effective if whole else None,
+        gate_races=conflicts.races,
+        nonserialisable=None if steps is None else _known(lambda: steps.nonserialisable),
+    )
+
+
+def _known(figure: Callable[[], T]) -> T | None:
+    try:
+        return figure()
+    except (IncompleteGraph, BudgetExceeded):
+        return None

@@ -1,0 +1,120 @@
+"""The verdicts that come down to goals: is a marking reachable that shows the opposite, or the thing itself?
+
+Where no state space could be held whole, these verdicts need not stay unknown: each names the state formulas whose
+reachability decides it, and any technique that decides goals (`firable.analysis.goal`) may answer. A verdict of several
+goals (quasi-live: one for each transition) holds where all of them come out as wanted, and fails with the first that
+does not.
+
+Liveness, reversibility and response are no such questions: they speak of what remains possible, not of one marking.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+
+from firable.analysis.question import Question, listed
+from firable.analysis.verdicts.behaviour import CONTACT_FREE, DEADLOCK_FREE, QUASI_LIVE
+from firable.analysis.verdicts.commands import (
+    COMMANDS_AGREE,
+    COMPLETIONS_APART,
+    Clash,
+    clash_subjects,
+    clashing,
+    command_clashes,
+    completion_clashes,
+)
+from firable.analysis.verdicts.properties import statement
+from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Or, format_formula
+from firable.nets.net import Marking, Net, Property, PropertyKind, Transition
+from firable.semantics.algebra import BOOL
+from firable.semantics.firing import in_contact
+from firable.semantics.player import holds_in
+
+Told = tuple[tuple[str, ...], str]
+"""The subjects of a verdict, and the note on its witness."""
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """A formula whose reachability decides a question, or one part of it.
+
+    The part holds iff the formula is reachable, where `wanted`, or iff it is not. `told` says of a marking that
+    satisfies the formula what it concerns and what is to be seen there; `subjects` are named where no such marking is.
+    """
+
+    formula: Formula
+    told: Callable[[Marking], Told]
+    wanted: bool
+    subjects: tuple[str, ...] = ()
+
+
+def goals_of(net: Net, name: str, fired: Collection[str] = ()) -> tuple[Question, tuple[Goal, ...]] | None:
+    """The question of a verdict and its goals; None where the verdict does not come down to goals.
+
+    `fired` are transitions that are known to fire, so that nothing needs to be asked of them.
+    """
+    match name:
+        case "contact-free":
+            return CONTACT_FREE, _never(_contact(net), lambda marking: _told_of_contact(net, marking))
+        case "deadlock-free":
+            return DEADLOCK_FREE, _never(Deadlock(), lambda _: ((), "a marking of the net is a deadlock"))
+        case "quasi-live":
+            missing = (t.name for t in net.transitions if t.name not in fired)
+            return QUASI_LIVE, tuple(Goal(Firable(t), lambda _: ((), ""), wanted=True, subjects=(t,)) for t in missing)
+        case "conflicting-commands":
+            return COMMANDS_AGREE, _apart(net, command_clashes(net))
+        case "shared-completions":
+            return COMPLETIONS_APART, _apart(net, completion_clashes(net))
+        case _ if name.startswith("property."):
+            of = next(of for of in net.properties if f"property.{of.name}" == name)
+            goals = _property(of)
+            return None if goals is None else (Question(name, statement(of)), goals)
+        case _:
+            return None
+
+
+def _never(bad: Formula, told: Callable[[Marking], Told]) -> tuple[Goal, ...]:
+    return (Goal(bad, told, wanted=False),)
+
+
+def _property(of: Property) -> tuple[Goal, ...] | None:
+    text = format_formula(of.formula)
+    match of.kind:
+        case PropertyKind.NEVER:
+            return _never(of.formula, lambda _: ((), f"here ({text}) holds"))
+        case PropertyKind.ALWAYS:
+            return _never(Not(of.formula), lambda _: ((), f"here ({text}) does not hold"))
+        case PropertyKind.REACHABLE:
+            return (Goal(of.formula, lambda _: ((), ""), wanted=True),)
+        case _:
+            return None
+
+
+def _contact(net: Net) -> Formula:
+    """Some transition is in contact: its inputs and internal gates are satisfied, an output place outside is full."""
+    return Or(tuple(in_contact_formula(t) for t in net.transitions if set(t.outputs) - set(t.inputs)))
+
+
+def in_contact_formula(t: Transition) -> Formula:
+    """The state formula "this transition is in contact" (`firable.semantics.firing.in_contact`)."""
+    satisfied: Iterator[Formula] = (Holds(place) for place in (*t.inputs, *t.permissive))
+    open_: Iterator[Formula] = (Not(Holds(place)) for place in t.inhibitive)
+    full = Or(tuple(Holds(place) for place in t.outputs if place not in t.inputs))
+    return And((*satisfied, *open_, full))
+
+
+def _told_of_contact(net: Net, marking: Marking) -> Told:
+    blocked = [t for t in range(len(net.transitions)) if in_contact(BOOL, net, t, holds_in(marking))]
+    full = net.names(net.masks[blocked[0]].outputs & ~net.masks[blocked[0]].inputs & marking)
+    names = tuple(net.transitions[t].name for t in blocked)
+    return names, f"the inputs of {names[0]} are there and {listed(full)} is full"
+
+
+def _apart(net: Net, clashes: tuple[Clash, ...]) -> tuple[Goal, ...]:
+    def told(marking: Marking) -> Told:
+        found = clashing(clashes, marking)
+        return clash_subjects(net, found), found[0].note
+
+    both = (And((Holds(net.places[clash.p].name), Holds(net.places[clash.q].name))) for clash in clashes)
+    return _never(Or(tuple(both)), told)

@@ -1,0 +1,129 @@
+"""What `check` found before: reports kept by the content of the net, so that a net that has not changed is not checked.
+
+The key is a hash over the net without its descriptions, over all that the caller asked for, and over the program
+itself (the size and time of each of its files), so that an answer never outlives the code that gave it. Comments,
+layout and the bindings to hardware are in none of these: changing them keeps the answer. Only decided reports are
+kept: an unknown may be known with another budget, or on a faster day.
+
+What is read back carries a checksum, and what does not fit it is no answer: it is computed anew. The cache is for the
+one who runs `check` again and again; a bundle is never made from it.
+
+Rejected: keeping the state space itself. It is a thousand times larger, and quicker to compute than to read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from firable.nets.net import Net
+    from firable.nets.verdict import Verdict
+
+VARIABLE: Final = "FIRABLE_CACHE"
+"""Names the folder of the cache; empty switches it off."""
+_ENTRIES_MAX: Final = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What a report is made from."""
+
+    verdicts: tuple[Verdict, ...]
+    figures: Mapping[str, Any]
+    course: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Cache:
+    """A folder of reports; every failure to read or write it is as if there were none."""
+
+    folder: Path
+
+    def read(self, key: str) -> Kept | None:
+        """What is kept under a key; None where there is nothing, or nothing whole."""
+        from pydantic import ValidationError
+
+        from firable.nets.bundle_records import VerdictRecord
+
+        try:
+            checksum, _, text = (self.folder / key).read_text(encoding="utf-8").partition("\n")
+            if checksum != _sha256(text):
+                return None
+            data = json.loads(text)
+            # As JSON, where an enumeration is a string and a tuple an array.
+            records = [VerdictRecord.model_validate_json(json.dumps(verdict)) for verdict in data["verdicts"]]
+        except (OSError, ValueError, KeyError, ValidationError):
+            return None
+        return Kept(tuple(record.verdict() for record in records), data["figures"], tuple(data["course"]))
+
+    def write(self, key: str, found: Kept) -> None:
+        """Keep what was found, unless a verdict is unknown; the oldest of a thousand makes room."""
+        from firable.nets.diagnostics import InputError
+        from firable.nets.verdict import Status
+        from firable.nets.writing import make_folder, write_whole
+
+        if any(verdict.status is Status.UNKNOWN for verdict in found.verdicts):
+            return
+        data = {
+            "verdicts": [verdict.to_json() for verdict in found.verdicts],
+            "figures": found.figures,
+            "course": list(found.course),
+        }
+        text = json.dumps(data, ensure_ascii=False)
+        try:
+            make_folder(self.folder)
+            write_whole(self.folder / key, f"{_sha256(text)}\n{text}")
+            entries = sorted(self.folder.iterdir(), key=lambda entry: entry.stat().st_mtime)
+            for entry in entries[:-_ENTRIES_MAX]:
+                entry.unlink(missing_ok=True)
+        except (InputError, OSError):  # a full disk or a folder of somebody else's is no reason to fail a check
+            return
+
+
+def opened_cache() -> Cache | None:
+    """The cache of this user, or the one that `FIRABLE_CACHE` names; None where that is empty."""
+    named = os.environ.get(VARIABLE)
+    if named is not None:
+        return Cache(Path(named)) if named else None
+    from platformdirs import user_cache_path
+
+    return Cache(user_cache_path("firable"))
+
+
+def key_of(net: Net, asked: Mapping[str, Any]) -> str:
+    """The key of a net and of what is asked about it (JSON values).
+
+    >>> from firable.nets.net import Net, Place
+    >>> key_of(Net("n", (Place("p", description="a place"),)), {}) == key_of(Net("n", (Place("p"),)), {})
+    True
+    """
+    from firable.nets.interchange import net_to_json
+
+    content = [_without_descriptions(net_to_json(net)), dict(asked), _program()]
+    return _sha256(json.dumps(content, sort_keys=True))
+
+
+def _without_descriptions(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _without_descriptions(value) for key, value in data.items() if key != "description"}
+    return [_without_descriptions(item) for item in data] if isinstance(data, list) else data
+
+
+def _program() -> list[list[Any]]:
+    """The files of the program, each with its size and time of change."""
+    import firable
+
+    root = Path(firable.__file__).parent
+    rooms = [room for name in ("nets", "semantics", "analysis") if (room := root / name).is_dir()]
+    files = sorted(file for room in rooms for pattern in ("**/*.py", "*.so", "*.pyd") for file in room.glob(pattern))
+    return [[str(file.relative_to(root)), file.stat().st_size, file.stat().st_mtime_ns] for file in files]
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

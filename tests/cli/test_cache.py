@@ -1,0 +1,113 @@
+"""The cache of `firable check`: the same net is not checked twice, and nothing but the same net is taken for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from firable.analysis.spaces import reachability
+from firable.cli.main import main
+
+NET = """firable: 1
+cell: two places
+controllers:
+  a: {start: p, places: {p: , q: }}
+transitions:
+  t: {from: a.p, to: a.q}
+  u: {from: a.q, to: a.p}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("FIRABLE_CACHE", str(tmp_path / "cache"))
+    return tmp_path
+
+
+@pytest.fixture
+def explored(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The nets that were explored."""
+    nets: list[str] = []
+    explore = reachability.explore
+
+    def note(*args: object, **kwargs: object) -> object:
+        nets.append(str(args[0]))
+        return explore(*args, **kwargs)  # type: ignore[arg-type] # whatever it is called with
+
+    monkeypatch.setattr("firable.analysis.check.explore", note)
+    return nets
+
+
+def checked(folder: Path, text: str, capsys: pytest.CaptureFixture[str], *options: str) -> str:
+    (folder / "net.firable.yaml").write_text(text, encoding="utf-8")
+    assert main(["check", str(folder / "net.firable.yaml"), "--format", "json", *options]) == 0
+    return capsys.readouterr().out
+
+
+def test_the_same_net_is_checked_once_and_reported_byte_by_byte(
+    folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = checked(folder, NET, capsys)
+    assert checked(folder, NET, capsys) == first
+    assert len(explored) == 1
+
+
+def test_comments_layout_and_descriptions_keep_the_answer(
+    folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    checked(folder, NET, capsys)
+    told = NET.replace("t: {from: a.p, to: a.q}", "t: {from: a.p, to: a.q, description: there}  # and back")
+    assert told != NET
+    checked(folder, told, capsys)
+    assert len(explored) == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "options"),
+    [
+        (("u: {from: a.q, to: a.p}", "u: {from: a.q, to: a.p}\n  v: {from: a.q, to: a.p}"), ()),
+        (("", ""), ("--discipline", "step")),
+        (("", ""), ("--max-markings", "77")),
+        (("", ""), ("--no-cache",)),
+    ],
+)
+def test_another_net_or_question_is_another_answer(
+    folder: Path,
+    explored: list[str],
+    capsys: pytest.CaptureFixture[str],
+    change: tuple[str, str],
+    options: tuple[str, ...],
+) -> None:
+    checked(folder, NET, capsys)
+    checked(folder, NET.replace(*change), capsys, *options)
+    assert len(explored) == 2
+
+
+def test_a_damaged_entry_is_no_answer(folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    first = checked(folder, NET, capsys)
+    (entry,) = (folder / "cache").iterdir()
+    whole = entry.read_text(encoding="utf-8")
+    for damaged in ("", whole[:-1], whole.replace("proved", "violated", 1), "{}", whole.split("\n", 1)[0] + "\n{}"):
+        entry.write_text(damaged, encoding="utf-8")
+        before = len(explored)
+        assert checked(folder, NET, capsys) == first
+        assert len(explored) == before + 1
+
+
+def test_what_is_unknown_is_asked_again(folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    path = folder / "net.firable.yaml"
+    path.write_text(NET, encoding="utf-8")
+    arguments = ["check", str(path), "--max-markings", "1", "--method", "explicit"]
+    assert main(arguments) == main(arguments) == 3
+    assert len(explored) == 2
+    assert not (folder / "cache").exists()
+
+
+def test_a_cache_that_cannot_be_written_is_no_reason_to_fail(
+    folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "cache").write_text("a file", encoding="utf-8")
+    first = checked(folder, NET, capsys)
+    assert checked(folder, NET, capsys) == first
+    assert len(explored) == 2
