@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import Certificate
 from firable.nets.verdict import Cost, Witness
 
 
@@ -30,8 +31,8 @@ class Limits:
 class Finding:
     """Whether the goal is reachable (None: not decided), by which method, with its evidence.
 
-    `witness` is a firing sequence into the goal, replayed by the reference player; `bound` says how far an undecided
-    search went.
+    `witness` is a firing sequence into the goal, replayed by the reference player; `certificate` shows that there is
+    none, to `firable.analysis.evidence.checker`; `bound` says how far an undecided search went.
     """
 
     reachable: bool | None
@@ -39,3 +40,4 @@ class Finding:
     witness: Witness | None = None
     bound: str = ""
     cost: Cost = field(default_factory=Cost)
+    certificate: Certificate | None = None
