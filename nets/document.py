@@ -44,6 +44,10 @@ Integer = Annotated[int, BeforeValidator(_as_integer, json_schema_input_type=int
 FormulaText = Annotated[str, BeforeValidator(_as_formula, json_schema_input_type=str | bool)]
 
 
+# A tuple, because a default that is a list would be copied anew for each transition, and slowly.
+_NO_NAMES: Final[Any] = ()
+
+
 class _Document(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, populate_by_name=False)
 
@@ -85,10 +89,10 @@ class TransitionDocument(_Document):
     """A transition; `if` and `unless` name places (internal gates) or signals (external gates)."""
 
     number: Integer | None = Field(default=None, ge=0, description="The number in the coordinator table.")
-    inputs: Names = Field(default=[], alias="from")
-    outputs: Names = Field(default=[], alias="to")
-    permissive: Names = Field(default=[], alias="if")
-    inhibitive: Names = Field(default=[], alias="unless")
+    inputs: Names = Field(default=_NO_NAMES, alias="from")
+    outputs: Names = Field(default=_NO_NAMES, alias="to")
+    permissive: Names = Field(default=_NO_NAMES, alias="if")
+    inhibitive: Names = Field(default=_NO_NAMES, alias="unless")
     description: Text = ""
 
 

@@ -18,11 +18,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError, Severity, did_you_mean
 from firable.nets.net import Net, Place, Transition
+from firable.nets.pausing import without_cycle_search
 from firable.nets.pnml_writer import write_pnml
 from firable.nets.pnml_xml import PnmlRecords, Record, described, parse_xml
 from firable.nets.source import Source, quoted, read_bytes
@@ -66,10 +68,9 @@ def parse_pnml(data: bytes | str, file: str = "<pnml>") -> PnmlImport:
     if isinstance(data, str):
         data, encoding = data.encode("utf-8", "surrogatepass"), "utf-8"
     source = Source(file, data.decode("utf-8-sig", "replace"))
-    records = parse_xml(source, data, encoding)
-    importing = _Import(source, records)
-    net = importing.net()
-    return PnmlImport(net, tuple(importing.notes()))
+    with without_cycle_search():
+        importing = _Import(source, parse_xml(source, data, encoding))
+        return PnmlImport(importing.net(), tuple(importing.notes()))
 
 
 @dataclass(slots=True)
@@ -166,7 +167,10 @@ class _Import:
     def references(self, nodes: dict[str, Record]) -> dict[str, str]:
         """For each identifier that an arc may name, the identifier of the place or transition that is meant."""
         resolved: dict[str, str] = {}
-        for start in nodes:
+        for start, node in nodes.items():
+            if not node.tag.startswith("reference"):
+                resolved.setdefault(start, start)
+                continue
             way: dict[str, None] = {}  # ordered, and quick to ask on a long chain
             one = start
             while one not in resolved and one in nodes and nodes[one].tag.startswith("reference") and one not in way:
@@ -188,14 +192,15 @@ class _Import:
         for record in self.records.nodes:
             if record.tag != "arc":
                 continue
-            ends = [record.attributes.get("source", ""), record.attributes.get("target", "")]
-            if unknown := [end for end in ends if end not in nodes]:
+            ends = record.attributes.get("source", ""), record.attributes.get("target", "")
+            if ends[0] not in nodes or ends[1] not in nodes:
+                unknown = [end for end in ends if end not in nodes]
                 known = list(nodes) if len(self.problems) < PROBLEMS_MAX else []
                 hint = did_you_mean(unknown[0], known) + "an arc names two identifiers of the file"
                 message = f"{described(record)}: there is no place or transition {quoted(unknown[0])}"
                 self.refuse(record, "F2002", message, hint)
                 continue
-            source, target = (nodes[resolve[end]] for end in ends)
+            source, target = nodes[resolve[ends[0]]], nodes[resolve[ends[1]]]
             if source.tag == target.tag:
                 self.refuse(
                     record, "F2017", f"{described(record)} joins two {source.tag}s",
@@ -208,9 +213,10 @@ class _Import:
     def arc(self, record: Record, source: Record, target: Record, arcs: dict[str, _Arcs]) -> None:
         to_transition = target.tag == "transition"
         place, transition = (source, target) if to_transition else (target, source)
-        of = arcs.setdefault(transition.id, _Arcs())
+        if (of := arcs.get(transition.id)) is None:
+            of = arcs[transition.id] = _Arcs()
         kind = _kind(record)
-        weight = self.weight(record)
+        weight = self.weight(record, kind)
         if kind in _READ:
             of.reads[place.id] = None
         elif kind in _INHIBITOR:
@@ -237,10 +243,13 @@ class _Import:
                 )  # fmt: skip
             ordinary[place.id] = None
 
-    def weight(self, record: Record) -> int:
+    def weight(self, record: Record, kind: str) -> int:
         text = record.labels.get("inscription") or record.attributes.get("weight", "1")
-        interval = record.attributes.get("inscription", "[0,inf)")
-        if _kind(record) in {"timed", "tapninhibitor"} and not _UNBOUNDED_INTERVAL.fullmatch(interval):
+        if text == "1" and kind in _NORMAL and kind != "timed":
+            return 1
+        if kind in {"timed", "tapninhibitor"} and not _UNBOUNDED_INTERVAL.fullmatch(
+            record.attributes.get("inscription", "[0,inf)")
+        ):
             self.refuse(record, "F1014", f"{described(record)} has a time window", "time is not part of a net here")
         weight = _integer(text)
         if weight is None or weight == 0:
@@ -248,7 +257,7 @@ class _Import:
                 record, "F1013", f"{described(record)} has the weight {quoted(text)}", "a weight is a number from 1"
             )
             return 1
-        if weight > 1 and _kind(record) not in _NORMAL:
+        if weight > 1 and kind not in _NORMAL:
             self.refuse(
                 record, "F2007", f"{described(record)} has the weight {weight}",
                 "a place holds one token at most, so a gate asks for one",
@@ -272,15 +281,20 @@ class _Import:
         return Place(name, marked=bool(tokens), description=_description(record))
 
     def transition(self, record: Record, names: dict[str, str], arcs: _Arcs) -> Transition:
-        loops = [place for place in arcs.inputs if place in arcs.outputs]
-        if loops:
+        inputs: Iterable[str] = arcs.inputs
+        outputs: Iterable[str] = arcs.outputs
+        reads: Iterable[str] = arcs.reads
+        if not arcs.inputs.keys().isdisjoint(arcs.outputs):
             self.self_loops.append(quoted(names[record.id]))
+            inputs = [place for place in arcs.inputs if place not in arcs.outputs]
+            outputs = [place for place in arcs.outputs if place not in arcs.inputs]
+            reads = dict.fromkeys((*(place for place in arcs.inputs if place in arcs.outputs), *arcs.reads))
         return Transition(
             names[record.id],
-            tuple(names[place] for place in arcs.inputs if place not in arcs.outputs),
-            tuple(names[place] for place in arcs.outputs if place not in arcs.inputs),
-            tuple(names[place] for place in dict.fromkeys((*loops, *arcs.reads))),
-            tuple(names[place] for place in arcs.inhibitors),
+            tuple([names[place] for place in inputs]),
+            tuple([names[place] for place in outputs]),
+            tuple([names[place] for place in reads]) if reads else (),
+            tuple([names[place] for place in arcs.inhibitors]) if arcs.inhibitors else (),
             description=_description(record),
         )
 
@@ -337,12 +351,19 @@ def _few(items: list[str]) -> str:
 
 def _kind(record: Record) -> str:
     """The kind of an arc in lower case, from whichever label or attribute holds it."""
-    spellings = ("type", "arctype", "arcType", "kind")
-    found = (record.labels.get(key) or record.attributes.get(key) for key in spellings)
-    kind = next((text for text in found if text), "")
-    return re.split(r"[/#:]", kind.strip())[-1].lower().replace("-", "").replace("_", "").replace(" ", "")
+    labels, attributes = record.labels, record.attributes
+    for spelling in ("type", "arctype", "arcType", "kind"):
+        if text := (labels and labels.get(spelling)) or attributes.get(spelling):
+            return _kind_spelled(text)
+    return ""
 
 
+@lru_cache(maxsize=256)
+def _kind_spelled(text: str) -> str:
+    return re.split(r"[/#:]", text.strip())[-1].lower().replace("-", "").replace("_", "").replace(" ", "")
+
+
+@lru_cache(maxsize=256)
 def _integer(text: str) -> int | None:
     """The number of a marking or weight; PIPE writes pairs of a class and a number, `Default,1`."""
     parts = [part.strip() for part in text.split(",")]
@@ -356,6 +377,8 @@ def _integer(text: str) -> int | None:
 
 def _legal(text: str) -> str:
     """The text with an underscore for each character that may not stand in a name; itself where it is a name."""
+    if FORBIDDEN_IN_NAMES.isdisjoint(text) and text.isprintable() and text not in {"", "and", "or", "not", "->"}:
+        return text
     legal = "".join("_" if c in FORBIDDEN_IN_NAMES or not c.isprintable() else c for c in text)
     return f"_{legal}" if not legal or legal in {"and", "or", "not", "->"} else legal
 

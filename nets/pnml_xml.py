@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Final
 from xml.parsers import expat
 
@@ -122,15 +123,16 @@ class _Reader:
         )
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
-        tag = name.rpartition(" ")[2]
         if self.skipped:
             self.skipped += 1
+            return
+        tag = _tag(name)
+        if self.record is not None and self.record.tag in NODES:
+            self.start_inside(tag, attributes)
         elif not self.frames and tag != "pnml":
             raise self.source.refuse(
                 "F1013", f"the root is <{tag}>, not <pnml>", "is this a PNML file?", *self.position
             )
-        elif self.record is not None and self.record.tag in NODES:
-            self.start_inside(tag, attributes)
         elif tag in _FRAMES and (tag != "pnml") == bool(self.frames) and not self.inside:
             self.start_frame(tag, attributes)
         elif tag in NODES and self.records is not None and not self.inside:
@@ -183,7 +185,6 @@ class _Reader:
             self.records.foreign = _FOREIGN[tag], Record(tag, *self.position, {})
 
     def end(self, name: str) -> None:
-        tag = name.rpartition(" ")[2]
         if self.skipped:
             self.skipped -= 1
             return
@@ -194,6 +195,7 @@ class _Reader:
             self.text = None
             self.inside.pop()
             return
+        tag = _tag(name)
         if tag in NODES:
             self.record = self.records.net if self.records is not None else None
         elif self.frames:
@@ -204,6 +206,12 @@ class _Reader:
     def characters(self, text: str) -> None:
         if self.text is not None and not self.skipped:
             self.text.append(text)
+
+
+@lru_cache(maxsize=256)
+def _tag(name: str) -> str:
+    """The name of an element without its namespace."""
+    return name.rpartition(" ")[2]
 
 
 def described(record: Record) -> str:

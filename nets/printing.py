@@ -81,26 +81,27 @@ def in_file_order(net: Net) -> Net:
     Only the order of the indexes changes.
     """
     owners = [*(controller.name for controller in net.controllers), None]
+    rank = {owner: number for number, owner in enumerate(owners)}
+    first: dict[str, int] = {}
+    for place in net.places:
+        if place.completion:
+            first.setdefault(place.completion, len(first))
+
+    def signal_rank(signal: Signal) -> tuple[int, bool, int]:
+        waited_for = first.get(signal.name, len(first)) if signal.kind is SignalKind.COMPLETION else 0
+        return rank[signal.owner], signal.kind is SignalKind.COMPLETION, waited_for
+
     return replace(
         net,
-        places=tuple(place for owner in owners for place in net.places if place.owner == owner),
-        signals=tuple(signal for owner in owners for signal in _signals_in_order(net, owner)),
+        places=tuple(sorted(net.places, key=lambda place: rank[place.owner])),
+        signals=tuple(sorted(net.signals, key=signal_rank)),
         transitions=tuple(_gates_in_order(net, transition) for transition in net.transitions),
     )
 
 
-def _signals_in_order(net: Net, owner: str | None) -> Iterator[Signal]:
-    own = [signal for signal in net.signals if signal.owner == owner]
-    yield from (signal for signal in own if signal.kind is SignalKind.SENSOR)
-    first: dict[str, int] = {}
-    for place in net.places:
-        if place.owner == owner and place.completion:
-            first.setdefault(place.completion, len(first))
-    completions = (signal for signal in own if signal.kind is SignalKind.COMPLETION)
-    yield from sorted(completions, key=lambda signal: first.get(signal.name, len(first)))
-
-
 def _gates_in_order(net: Net, transition: Transition) -> Transition:
+    if not transition.external:
+        return transition
     implied = _implied(net, transition)
     rest = [gate for gate in transition.external if gate not in implied]
     return replace(
@@ -176,7 +177,7 @@ def _command(command: Command) -> str:
 
 
 def _transition(net: Net, transition: Transition) -> list[tuple[str, str]]:
-    implied = _implied(net, transition)
+    implied = _implied(net, transition) if transition.external else {}
     gates = [gate for gate in transition.external if gate not in implied]
     opening = [*transition.permissive, *(gate.signal for gate in gates if gate.wanted)]
     closing = [*transition.inhibitive, *(gate.signal for gate in gates if not gate.wanted)]

@@ -41,6 +41,7 @@ from firable.nets.net import (
     SignalKind,
     Transition,
 )
+from firable.nets.pausing import without_cycle_search
 from firable.nets.source import Source, read_source
 from firable.nets.text_positions import Positions
 from firable.nets.yaml_tree import Node, data, parse_tree
@@ -81,6 +82,11 @@ def parse_net(text: str, file: str = "<text>") -> Net:
 
 
 def _parse(source: Source) -> tuple[Net, Positions]:
+    with without_cycle_search():
+        return _parsed(source)
+
+
+def _parsed(source: Source) -> tuple[Net, Positions]:
     tree = parse_tree(source)
     if problem := version_problem(source, tree):
         raise InputError([problem])
@@ -183,10 +189,11 @@ class _Reading:
 
     def transitions(self, places: tuple[Place, ...], signals: tuple[Signal, ...]) -> Iterator[Transition]:
         external = {signal.name for signal in signals}
-        completion = {place.name: place.completion for place in places}
+        completion = {place.name: place.completion for place in places if place.completion is not None}
         for name, body in (self.document.transitions or {}).items():
             transition = body or doc.TransitionDocument()
-            for both in sorted(set(transition.inputs) & set(transition.outputs)):
+            inputs, outputs = transition.inputs, transition.outputs
+            for both in () if (twice := set(inputs)).isdisjoint(outputs) else sorted(twice.intersection(outputs)):
                 self.problem(
                     Diagnostic(
                         "F2009",
@@ -195,19 +202,17 @@ class _Reading:
                         ("transitions", name, "to", both),
                     )
                 )
-            implied = dict.fromkeys(
-                gate for source in transition.inputs if (gate := completion.get(source)) is not None
-            )
-            opening = [*implied, *(gate for gate in transition.permissive if gate in external and gate not in implied)]
+            implied = dict.fromkeys([completion[source] for source in inputs if source in completion])
+            opening = [*implied, *[gate for gate in transition.permissive if gate in external and gate not in implied]]
             yield Transition(
                 name,
-                tuple(transition.inputs),
-                tuple(transition.outputs),
-                tuple(gate for gate in transition.permissive if gate not in external),
-                tuple(gate for gate in transition.inhibitive if gate not in external),
+                tuple(inputs),
+                tuple(outputs),
+                tuple([gate for gate in transition.permissive if gate not in external]),
+                tuple([gate for gate in transition.inhibitive if gate not in external]),
                 (
-                    *(ExternalGate(gate) for gate in opening),
-                    *(ExternalGate(gate, wanted=False) for gate in transition.inhibitive if gate in external),
+                    *[ExternalGate(gate) for gate in opening],
+                    *[ExternalGate(gate, wanted=False) for gate in transition.inhibitive if gate in external],
                 ),
                 transition.number,
                 transition.description,

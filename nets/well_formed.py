@@ -7,7 +7,7 @@ express, such as a completion signal that gates nothing, is a `ValueError`: the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -37,7 +37,8 @@ def problems(net: Net) -> Iterator[Diagnostic]:
         {signal.name for signal in net.signals},
     )
     for transition in net.transitions:
-        yield from _transition_problems(transition, known)
+        if not _is_sound(transition, known):
+            yield from _transition_problems(transition, known)
     yield from _numbers(net)
     yield from _arbiters(net)
     yield from _properties(net)
@@ -56,13 +57,13 @@ def _duplicate_names(net: Net) -> Iterator[Diagnostic]:
     for kind, names in kinds:
         seen: set[str] = set()
         for name in names:
-            singular = {"properties": "property"}.get(kind, kind[:-1])
             if (
                 not name
-                or FORBIDDEN_IN_NAMES & set(name)
+                or not FORBIDDEN_IN_NAMES.isdisjoint(name)
                 or not name.isprintable()
                 or name in {"and", "or", "not", "->"}
             ):
+                singular = {"properties": "property"}.get(kind, kind[:-1])
                 yield Diagnostic(
                     "F2012",
                     f"{name!r} is not a name for a {singular}",
@@ -110,17 +111,18 @@ def _ownership(net: Net, controllers: set[str]) -> Iterator[Diagnostic]:
 
 def _completions(net: Net) -> Iterator[Diagnostic]:
     signals = {signal.name: signal for signal in net.signals}
-    consumers: dict[str, list[Transition]] = {place.name: [] for place in net.places}
-    for transition in net.transitions:
+    consumers: dict[str, list[Transition]] = {place.name: [] for place in net.places if place.completion is not None}
+    for transition in net.transitions if consumers else ():
         for name in transition.inputs:
-            consumers.get(name, []).append(transition)
+            if name in consumers:
+                consumers[name].append(transition)
     for place in net.places:
         if place.completion is None:
             continue
         subject: Subject = ("places", place.name, "until")
         signal = signals.get(place.completion)
         if signal is None:
-            yield _unknown("F2003", "signal", place.completion, sorted(signals), subject)
+            yield _unknown("F2003", "signal", place.completion, signals, subject)
         elif signal.kind is not SignalKind.COMPLETION:
             yield Diagnostic(
                 "F2018",
@@ -150,6 +152,17 @@ class _Known:
     places: set[str]
     transitions: set[str]
     signals: set[str]
+
+
+def _is_sound(transition: Transition, known: _Known) -> bool:
+    """Whether the transition keeps all rules: the quick way of asking, for the many that do."""
+    for names in (transition.inputs, transition.outputs, transition.permissive, transition.inhibitive):
+        if not known.places.issuperset(names) or (len(names) > 1 and len(set(names)) < len(names)):
+            return False
+    external = transition.external
+    return not external or (
+        known.signals.issuperset([gate.signal for gate in external]) and len(set(external)) == len(external)
+    )
 
 
 def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diagnostic]:
@@ -189,14 +202,14 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
                     subject,
                 )
             elif not is_gate:
-                yield _unknown("F2002", "place", name, sorted(places), subject)
+                yield _unknown("F2002", "place", name, places, subject)
             elif name not in signals:
-                yield _unknown("F2021", "place or signal", name, sorted(places | signals), subject)
+                yield _unknown("F2021", "place or signal", name, places | signals, subject)
     seen_gates: set[ExternalGate] = set()
     for gate in transition.external:
         subject = ("transitions", transition.name, "if" if gate.wanted else "unless", gate.signal)
         if gate.signal not in signals:
-            yield _unknown("F2003", "signal", gate.signal, sorted(signals), subject)
+            yield _unknown("F2003", "signal", gate.signal, signals, subject)
         if gate in seen_gates:
             yield Diagnostic(
                 "F2022", f"the gate '{gate.signal}' of '{transition.name}' stands twice", "write it once", subject
@@ -204,9 +217,11 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
         seen_gates.add(gate)
 
 
-def _unknown(code: str, kind: str, name: str, known: list[str], subject: Subject) -> Diagnostic:
-    local = [full for full in known if full.rpartition(".")[2] == name]
-    suggestion = f"did you mean '{local[0]}'? " if local else did_you_mean(name, known)
+def _unknown(code: str, kind: str, name: str, known: Collection[str], subject: Subject) -> Diagnostic:
+    local = min((full for full in known if full.rpartition(".")[2] == name), default=None)
+    # Names much longer or shorter are no slips of the pen, and would be sorted for nothing.
+    similar = sorted(full for full in known if abs(len(full) - len(name)) <= 4)
+    suggestion = f"did you mean '{local}'? " if local else did_you_mean(name, similar)
     return Diagnostic(
         code, f"there is no {kind} '{name}'", f"{suggestion}Declare it first, or correct the name.".strip(), subject
     )
@@ -245,7 +260,7 @@ def _arbiters(net: Net) -> Iterator[Diagnostic]:
             )
         for name in dict.fromkeys(arbiter.among):
             if name not in names:
-                yield _unknown("F2004", "transition", name, sorted(names), (*subject, name))
+                yield _unknown("F2004", "transition", name, names, (*subject, name))
             elif (other := taken.setdefault(name, arbiter.name)) != arbiter.name:
                 yield Diagnostic(
                     "F2013",
@@ -273,7 +288,7 @@ def _properties(net: Net) -> Iterator[Diagnostic]:
                 if isinstance(atom, Holds):
                     if atom.place not in places:
                         subject: Subject = ("properties", prop.name, atom.place)
-                        yield _unknown("F2002", "place", atom.place, sorted(places), subject)
+                        yield _unknown("F2002", "place", atom.place, places, subject)
                 elif atom.transition not in transitions:
                     subject = ("properties", prop.name, atom.transition)
-                    yield _unknown("F2004", "transition", atom.transition, sorted(transitions), subject)
+                    yield _unknown("F2004", "transition", atom.transition, transitions, subject)

@@ -42,6 +42,9 @@ _WORDS_REFUSED: Final = frozenset(
     if spelling not in {"true", "false"}
 ) | {"~"}
 
+_WORDS_DOUBTFUL: Final = _WORDS_REFUSED | {"true", "false", "<<", ""}
+"""The plain words that `_Builder.word` has something to say about, at least as keys."""
+
 _FORBIDDEN: Final = re.compile("[^\t\n\r -~\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]|\ufeff")
 """What YAML does not print, and the line ends on which its versions disagree (U+0085, U+2028, U+2029)."""
 
@@ -106,11 +109,14 @@ def parse_tree(source: Source) -> Node:
             found.start() - (before.rfind("\n") + 1) + 1,
         )
     builder = _Builder(source)
+    parser = _LOADER(source.text)
     try:
-        for event in yaml.parse(source.text, Loader=_LOADER):
+        while (event := parser.get_event()) is not None:
             builder.take(event)
     except yaml.MarkedYAMLError as error:
         raise _syntax_error(source, error) from None
+    finally:
+        parser.dispose()
     if builder.problems:
         raise InputError(builder.problems)
     root = builder.root
@@ -157,14 +163,15 @@ class _Builder:
             self.problems.append(Diagnostic(code, message, hint, span=self.source.span(line, column, length)))
 
     def take(self, event: yaml.Event) -> None:
-        if event.start_mark is None or event.end_mark is None:
+        start, end = event.start_mark, event.end_mark
+        if start is None or end is None:
             raise AssertionError("the parser gives every event its marks")
-        line, column = event.start_mark.line + 1, event.start_mark.column + 1
+        line, column = start.line + 1, start.column + 1
         match event:
             case yaml.ScalarEvent():
-                self.refuse_properties(event, line, column)
-                single = event.end_mark.line == event.start_mark.line
-                length = event.end_mark.column - event.start_mark.column if single else 1
+                if event.anchor is not None or event.tag is not None:
+                    self.refuse_properties(event, line, column)
+                length = end.column - start.column if end.line == start.line else 1
                 self.add(Scalar(event.value, not event.style, line, column, length))
             case yaml.MappingStartEvent():
                 self.refuse_properties(event, line, column)
@@ -217,23 +224,28 @@ class _Builder:
             raise self.source.refuse(
                 "F1003", f"more than {NODES_MAX:,} values", "use PNML for a net of this size", node.line, node.column
             )
+        doubtful = isinstance(node, Scalar) and node.plain and node.text in _WORDS_DOUBTFUL
         if not self.stack:
             self.root = node
-            self.word(node, is_key=False)
+            if doubtful:
+                self.word(node, is_key=False)
             return
         parent = self.stack[-1]
         if isinstance(parent, Sequence):
-            self.word(node, is_key=False)
+            if doubtful:
+                self.word(node, is_key=False)
             parent.items.append(node)
             return
         key = self.keys[-1]
         if key is None:
             if not isinstance(node, Scalar):
                 raise self.source.refuse("F1010", "a key must be a name", "write `name: value`", node.line, node.column)
-            self.word(node, is_key=True)
+            if doubtful:
+                self.word(node, is_key=True)
             self.keys[-1] = node
             return
-        self.word(node, is_key=False)
+        if doubtful:
+            self.word(node, is_key=False)
         self.keys[-1] = None
         if (earlier := parent.entries.get(key.text)) is not None:
             self.problem(
