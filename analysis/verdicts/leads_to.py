@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from firable.analysis.question import Answer, no, unknown, yes
+from firable.analysis.question import Answer, no, yes
 from firable.analysis.spaces.reachability import (
     NO_COMPONENT,
     Column,
@@ -39,7 +39,8 @@ from firable.analysis.spaces.reachability import (
     first,
     indexes,
 )
-from firable.analysis.spaces.space import StateSpace, WitnessError
+from firable.analysis.spaces.space import S, StateSpace, WitnessError
+from firable.analysis.verdicts.fair_runs import fair_runs
 from firable.nets.formula import Formula, format_formula
 from firable.nets.net import Fairness, Marking, Property
 from firable.semantics.algebra import BOOL
@@ -55,15 +56,33 @@ def leads_to(space: StateSpace[Any], of: Property) -> Answer:
     """Decide a `leads_to` property; raises `IncompleteGraph` where the space is not whole.
 
     Cost: one decomposition into components for no and weak fairness; for strong fairness one for each round of pruning.
-    Unknown where the space is no reachability graph, whose components this technique needs.
+    A space that is no reachability graph has no components: there the answer comes from sets (`fair_runs`), and a
+    violation shows the way to where the property fails, but not the run that goes on from there.
     """
     space.require_complete()
-    if not isinstance(space, ReachabilityGraph):
-        return unknown(space.method, "a property of this kind needs the reachability graph: --method explicit")
-    graph = space
+    return _by_components(space, of) if isinstance(space, ReachabilityGraph) else _by_sets(space, of)
+
+
+def _by_sets(space: StateSpace[S], of: Property) -> Answer:
+    algebra = space.algebra
+    without = algebra.negation(space.satisfying(_then(of)))
+    for_ever = fair_runs(space, without, of.fairness)
+    stuck = space.backward(algebra.conjunction([space.deadlocks, without]), without)
+    failing = algebra.disjunction([for_ever, stuck])
+    end = f"here ({format_formula(of.formula)}) holds, and ({format_formula(_then(of))}) need never come"
+    witness = space.witness(algebra.conjunction([space.satisfying(of.formula), without, failing]), end)
+    return yes() if witness is None else no((), witness)
+
+
+def _then(of: Property) -> Formula:
     if of.then is None:
         raise ValueError(f"'{of.name}' has no second formula")
-    without = ~graph.satisfying(of.then)
+    return of.then
+
+
+def _by_components(graph: ReachabilityGraph, of: Property) -> Answer:
+    then = _then(of)
+    without = ~graph.satisfying(then)
     fair = _Fair(graph, of.fairness, without)
     stuck = graph.deadlocks & without
     start = first(graph.satisfying(of.formula) & graph.backward(fair.markings | stuck, without) & without)
@@ -74,9 +93,9 @@ def leads_to(space: StateSpace[Any], of: Property) -> Answer:
     tail, entry = _way(graph, start, fair.markings | stuck, without)
     prefix += tail
     cycle = fair.cycle(entry) if not stuck[entry] else []
-    check_lasso(graph, of.formula, of.then, of.fairness, prefix, prefix_length, cycle)
+    check_lasso(graph, of.formula, then, of.fairness, prefix, prefix_length, cycle)
     after = f"after firing {prefix_length} of the sequence ({format_formula(of.formula)}) holds, and then "
-    end = f"({format_formula(of.then)}) never comes: " + (
+    end = f"({format_formula(then)}) never comes: " + (
         "the cycle is fair" if cycle else "the sequence ends in a deadlock"
     )
     return no((), graph.witnesses.named(prefix, graph.marking(entry), cycle, after + end))

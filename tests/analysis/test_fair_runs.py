@@ -1,0 +1,41 @@
+"""Response under fairness by sets of markings, against the components of the reachability graph."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.naive_space import NaiveSpace
+from support.ring_nets import ring_nets
+
+from firable.analysis.spaces.reachability import explore
+from firable.analysis.verdicts.properties import decide_property
+from firable.nets.formula import parse_formula
+from firable.nets.net import Fairness, Net, Property, PropertyKind
+from firable.nets.verdict import Status
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import holds_in
+from firable.semantics.trace import Discipline
+
+TEXTS = ("a", "b", "not a", "a and not b", "a or b", "deadlock", "firable(t0)", "not firable(t1)", "true")
+FORMULAS = st.sampled_from(TEXTS).map(parse_formula)
+
+
+@pytest.mark.parametrize("fairness", Fairness)
+@pytest.mark.parametrize("discipline", Discipline)
+@settings(max_examples=60)
+@given(net=ring_nets(signals=True).filter(lambda net: len(net.transitions) > 1), data=st.data())
+def test_sets_decide_response_as_components_do(
+    discipline: Discipline, fairness: Fairness, net: Net, data: st.DataObject
+) -> None:
+    p, q = data.draw(FORMULAS), data.draw(FORMULAS)
+    of = Property("x", PropertyKind.LEADS_TO, p, q, fairness)
+    by_components = decide_property(explore(net, discipline), of)
+    by_sets = decide_property(NaiveSpace(net, discipline), of)
+    assert by_sets.status is by_components.status
+    if by_sets.status is Status.VIOLATED:
+        assert by_sets.witness is not None
+        marking = net.marking(by_sets.witness.marking)
+        assert evaluate(BOOL, net, p, holds_in(marking))
+        assert not evaluate(BOOL, net, q, holds_in(marking))

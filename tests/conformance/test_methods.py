@@ -1,0 +1,84 @@
+"""Every technique of the table that decides goals, against the oracle; a technique that is added is held to it at once.
+
+Not to decide is allowed here; what a technique must decide is said by the tests of its own.
+"""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.dense_nets import dense_nets
+from support.naive_space import NaiveSpace
+from support.ring_nets import ring_nets
+from support.whole_nets import formulas
+
+from firable.analysis.check import check
+from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Limits
+from firable.analysis.methods import GOALS, SPACES, Method
+from firable.analysis.report import report_on
+from firable.analysis.spaces.reachability import explore
+from firable.analysis.spaces.space import Witnesses
+from firable.nets.formula import Deadlock, Formula
+from firable.nets.net import Net
+from firable.nets.verdict import Status
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import holds_in
+
+SMALL_NETS = st.one_of(dense_nets(signals=True), ring_nets(signals=True))
+SECONDS = 20.0  # far more than it takes: what hangs fails as undecided, and is seen
+
+
+def limits() -> Limits:
+    return Limits(Deadline.after(SECONDS), 2**28)
+
+
+def decides_as_the_oracle(method: Method, net: Net, goal: Formula) -> None:
+    found = GOALS[method].load()(net, goal, limits())
+    if found.reachable is None:
+        assert found.bound, "what is not decided says how far was looked"
+        return
+    oracle = NaiveSpace(net)
+    assert found.reachable == bool(oracle.satisfying(goal))
+    if found.reachable:
+        assert found.witness is not None
+        end = Witnesses(net, oracle.discipline).play(
+            net.initial_marking, [tuple(net.transition_index[t] for t in fired) for fired in found.witness.firings]
+        )
+        assert net.names(end) == found.witness.marking
+        assert evaluate(BOOL, net, goal, holds_in(end))
+
+
+@pytest.mark.parametrize("method", GOALS)
+@settings(max_examples=40)
+@given(net=SMALL_NETS, data=st.data())
+def test_a_technique_decides_goals_as_the_oracle_does(method: Method, net: Net, data: st.DataObject) -> None:
+    goal = data.draw(formulas([place.name for place in net.places], [t.name for t in net.transitions]))
+    decides_as_the_oracle(method, net, goal)
+    decides_as_the_oracle(method, net, Deadlock())
+
+
+@pytest.mark.parametrize("method", [method for method in Method if method not in (Method.AUTO, Method.EXPLICIT)])
+@settings(max_examples=25)
+@given(net=SMALL_NETS)
+def test_check_by_one_technique_never_contradicts_exploration(method: Method, net: Net) -> None:
+    known = {verdict.name: verdict for verdict in report_on(explore(net)).verdicts}
+    for verdict in check(net, method=method).verdicts:
+        if verdict.status is not Status.UNKNOWN:
+            assert verdict.status is known[verdict.name].status, verdict
+            assert (verdict.witness is None) <= (known[verdict.name].witness is None or verdict.holds), verdict
+        else:
+            assert method in GOALS, verdict
+
+
+@pytest.mark.parametrize("method", SPACES)
+def test_a_technique_that_holds_all_markings_gives_the_figures_of_exploration(method: Method) -> None:
+    from firable.nets.catalogue import catalogue_names, catalogue_net
+
+    for name in catalogue_names():
+        net = catalogue_net(name)
+        mine, other = check(net, method=method).figures.to_json(), check(net, method="explicit").figures.to_json()
+        del mine["bytes_per_marking"], other["bytes_per_marking"]
+        assert mine == other, name
