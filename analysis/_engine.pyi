@@ -146,6 +146,29 @@ class Graph:
 
         With `within`, every marking before the target is in it (E[within U targets]). Needs the whole graph.
         """
+    def before(
+        self,
+        targets: list[int] | bytes,
+        by: list[int] | None = None,
+        *,
+        max_seconds: float | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> bytes:
+        """The bitmap of the markings with an edge into the targets (EX); with `by`, an edge that fires one of these.
+
+        Needs the whole graph. Cost: that of the exploration at most.
+        """
+    def endless(
+        self,
+        within: list[int] | bytes | None = None,
+        *,
+        max_seconds: float | None = None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> bytes:
+        """The bitmap of the markings from which a run can go on for ever within a set (EG over infinite runs).
+
+        Needs the whole graph. Cost: twice that of the exploration at most.
+        """
     def components(
         self,
         within: list[int] | bytes | None = None,

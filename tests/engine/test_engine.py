@@ -258,6 +258,35 @@ def test_paths_within_a_set_are_those_of_networkx(net: Drawn, step: bool, data: 
 
 @settings(max_examples=250)
 @given(net=nets(), step=st.booleans(), data=st.data())
+def test_one_edge_back_is_that_of_the_definition(net: Drawn, step: bool, data: st.DataObject) -> None:
+    naive, graph = Naive(net, step=step), explored(net, step=step)
+    targets = data.draw(st.sets(st.integers(0, graph.n_markings - 1)))
+    by = data.draw(st.sets(st.sampled_from(range(len(net.rows))))) if net.rows else set()
+    into = {graph.marking(i) for i in targets}
+    fired_into = [
+        [fired for fired, after in naive.graph[graph.marking(i)] if after in into] for i in range(graph.n_markings)
+    ]
+    assert graph.before(bitmap(graph, targets)) == bytes(bool(edges) for edges in fired_into)
+    assert graph.before(sorted(targets), sorted(by)) == bytes(any(f & by for f in edges) for edges in fired_into)
+
+
+@settings(max_examples=250)
+@given(net=nets(), step=st.booleans(), data=st.data())
+def test_endless_runs_are_those_into_cycles_within_the_set(net: Drawn, step: bool, data: st.DataObject) -> None:
+    graph = explored(net, step=step)
+    everything = digraph(graph)
+    within = data.draw(st.one_of(st.none(), st.sets(st.integers(0, graph.n_markings - 1))))
+    inside = everything.subgraph(everything if within is None else within)
+    endless = {
+        i for part in nx.strongly_connected_components(inside) for i in part if inside.subgraph(part).number_of_edges()
+    }
+    for i in list(endless):
+        endless |= nx.ancestors(inside, i)
+    assert graph.endless(None if within is None else bitmap(graph, within)) == bitmap(graph, endless)
+
+
+@settings(max_examples=250)
+@given(net=nets(), step=st.booleans(), data=st.data())
 def test_components_are_those_of_networkx(net: Drawn, step: bool, data: st.DataObject) -> None:
     graph = explored(net, step=step)
     everything = digraph(graph)
@@ -495,6 +524,9 @@ def test_every_long_question_ends_by_the_clock_and_when_cancelled(step: bool) ->
         lambda **limits: lasting().home_markings(**limits),
         lambda **limits: graph.edges(**limits),
         lambda **limits: graph.path_between(0, never, **limits),
+        lambda **limits: graph.before(bytes(len(far) * [1]), **limits),
+        lambda **limits: graph.endless(**limits),
+        lambda **limits: graph.endless(bytes(len(far) * [1]), **limits),
     ]
     for ask in questions:
         with pytest.raises(_engine.BudgetExceeded, match="max_seconds"):

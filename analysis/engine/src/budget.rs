@@ -99,6 +99,15 @@ impl Memory {
         Ok(())
     }
 
+    /// Appends so many times a value to a vector that `push` has filled.
+    pub fn extend<T: Clone>(&self, all: &mut Vec<T>, value: T, count: usize) -> Result<(), Stop> {
+        while all.capacity() - all.len() < count {
+            self.grow(all)?;
+        }
+        all.resize(all.len() + count, value);
+        Ok(())
+    }
+
     #[cold]
     fn grow<T>(&self, all: &mut Vec<T>) -> Result<(), Stop> {
         let old = all.capacity();

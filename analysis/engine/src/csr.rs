@@ -6,6 +6,9 @@
 use crate::budget::{Memory, Stop, Watch};
 use crate::edges::Edges;
 use crate::explore::Space;
+use crate::fan::Fan;
+use crate::marking::Width;
+use crate::with_width;
 
 /// Successors as compressed rows.
 #[derive(Debug)]
@@ -29,22 +32,28 @@ impl Csr {
             memory.claim(edges.checked_mul(4).ok_or(Stop::Memory)?)?;
             targets.try_reserve_exact(edges).map_err(|_| Stop::Memory)?;
         }
-        let mut edges = Edges::new(space);
-        let mut sources = Vec::with_capacity(64);
-        for first in (0..count).step_by(64) {
-            sources.clear();
-            sources.extend((first as u32..count.min(first + 64) as u32).filter(|&source| inside(source)));
-            edges.visit(&sources, memory, watch, &mut |source, _, target| {
-                if inside(target) {
-                    offsets[source as usize + 1] += 1;
-                    memory.push(&mut targets, target)?;
-                }
-                Ok(())
+        if space.step {
+            let mut edges = Edges::new(space);
+            let mut sources = Vec::with_capacity(64);
+            for first in (0..count).step_by(64) {
+                sources.clear();
+                sources.extend((first as u32..count.min(first + 64) as u32).filter(|&source| inside(source)));
+                edges.visit(&sources, memory, watch, &mut |source, _, target| {
+                    if inside(target) {
+                        offsets[source as usize + 1] += 1;
+                        memory.push(&mut targets, target)?;
+                    }
+                    Ok(())
+                })?;
+            }
+            edges.finish(memory);
+            for index in 0..count {
+                offsets[index + 1] += offsets[index];
+            }
+        } else {
+            with_width!(space.net.words, width => {
+                fill(width, space, within, &mut offsets, &mut targets, memory, watch)
             })?;
-        }
-        edges.finish(memory);
-        for index in 0..count {
-            offsets[index + 1] += offsets[index];
         }
         Ok(Csr { offsets, targets })
     }
@@ -77,4 +86,54 @@ impl Csr {
         offsets.pop();
         Ok(Csr { offsets, targets: sources })
     }
+}
+
+/// The rows under interleaving. Edges come one transition after the other for 64 markings; each is put where the row of its
+/// marking stands, so that rows keep the order of the transitions.
+fn fill<W: Width>(
+    width: W,
+    space: &Space,
+    within: Option<&[u8]>,
+    offsets: &mut [u64],
+    targets: &mut Vec<u32>,
+    memory: &Memory,
+    watch: &mut Watch<'_>,
+) -> Result<(), Stop> {
+    let count = space.len();
+    let transitions = space.net.transitions.len();
+    let mut fan = Fan::forward(space);
+    let mut kept: Vec<(u8, u32)> = Vec::new();
+    for first in (0..count).step_by(64) {
+        let end = count.min(first + 64);
+        let mut at = [0usize; 65];
+        let mut sources = !0;
+        if let Some(within) = within {
+            sources = within[first..end].iter().rev().fold(0, |bits, &byte| bits << 1 | u64::from(byte != 0));
+        }
+        kept.clear();
+        fan.load_range(width, first, end);
+        fan.each(width, sources, 0..transitions, &mut |j, _, target| {
+            if within.is_none_or(|within| within[target as usize] != 0) {
+                at[j + 1] += 1;
+                kept.push((j as u8, target));
+            }
+            false
+        });
+        let start = targets.len();
+        for j in 0..64 {
+            at[j + 1] += at[j];
+        }
+        for (index, end) in (first..end).zip(&at[1..]) {
+            offsets[index + 1] = (start + end) as u64;
+        }
+        memory.extend(targets, 0, kept.len())?;
+        let row = &mut targets[start..];
+        for &(j, target) in &kept {
+            let at = &mut at[usize::from(j)];
+            row[*at] = target;
+            *at += 1;
+        }
+        watch.tick(64 + kept.len() + transitions)?;
+    }
+    Ok(())
 }

@@ -2,8 +2,9 @@
 //!
 //! Storing them was rejected: they are recomputed faster than they are read back, and cost more than the markings.
 
+use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
-use crate::explore::{Batch, Space};
+use crate::explore::Space;
 use crate::marking::Width;
 use crate::step::{Choice, Steps};
 use crate::with_width;
@@ -18,6 +19,14 @@ pub enum Fired<'a> {
 }
 
 impl Fired<'_> {
+    /// Whether one of the transitions is such.
+    pub fn any(self, such: impl Fn(u32) -> bool) -> bool {
+        match self {
+            Fired::One(t) => such(t),
+            Fired::Step(choices) => choices.iter().any(|choice| choice.fired.iter().any(|&t| such(t))),
+        }
+    }
+
     /// The transitions, ascending.
     pub fn transitions(self) -> Vec<u32> {
         match self {

@@ -15,15 +15,13 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use crate::batch::Batch;
 use crate::budget::{Found, Memory, Stop, Watch};
-use crate::marking::{Dynamic, Width, holds, linear_hash, slice};
+use crate::marking::{Dynamic, Width, holds, linear_hash};
 use crate::net::{Net, Rules};
 use crate::step::{Components, Factor, Steps};
-use crate::table::{Candidates, Table};
+use crate::table::{Candidates, NONE, Table};
 use crate::with_width;
-
-/// Stands for "no marking" where an index is stored.
-pub const NONE: u32 = u32::MAX;
 
 /// The discipline and the budgets of an exploration.
 #[derive(Clone, Copy, Debug)]
@@ -69,39 +67,6 @@ pub struct Space {
     pub memory: Memory,
     /// How long it took.
     pub seconds: f64,
-}
-
-/// Up to 64 markings of one batch, sliced.
-pub(crate) struct Batch {
-    pub(crate) markings: Vec<u64>,
-    pub(crate) hashes: [u64; 64],
-    pub(crate) slices: Vec<u64>,
-    pub(crate) valid: u64,
-    pub(crate) count: usize,
-}
-
-impl Batch {
-    pub(crate) fn new(words: usize) -> Self {
-        Batch {
-            markings: Vec::with_capacity(64 * words),
-            hashes: [0; 64],
-            slices: vec![0; 64 * words],
-            valid: 0,
-            count: 0,
-        }
-    }
-
-    /// Loads markings that stand end to end in `self.markings`.
-    #[inline(always)]
-    pub(crate) fn cut<W: Width>(&mut self, width: W) {
-        let words = width.words();
-        self.count = self.markings.len() / words;
-        self.valid = if self.count == 64 { !0 } else { (1 << self.count) - 1 };
-        for (hash, marking) in self.hashes.iter_mut().zip(self.markings.chunks_exact(words)) {
-            *hash = linear_hash(width, marking);
-        }
-        slice(width, &self.markings, &mut self.slices);
-    }
 }
 
 impl Space {
@@ -389,6 +354,45 @@ pub(crate) mod tests {
     pub(crate) fn explore(net: Net, step: bool) -> Space {
         let limits = Limits { step, markings: 1 << 20, memory_bytes: 1 << 28, time: None };
         Space::explore(net, limits, &mut unwatched).expect("fits")
+    }
+
+    /// Graphs of small random nets: tokens that move, merge and split under gates.
+    pub(crate) fn random_spaces(count: u64, step: bool) -> impl Iterator<Item = Space> {
+        let mut seed = 5_u64;
+        let mut below = move |n: u64| {
+            seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            (crate::marking::mix(seed) % n) as u32
+        };
+        (0..count).map(move |round| {
+            // Some nets are wider than a word.
+            let (places, spread) = (4 + below(9), [1, 1, 7, 40][round as usize % 4]);
+            let mut transitions: Vec<Transition> = (0..places + below(6))
+                .map(|_| {
+                    let mut some = |most: u64| -> Vec<u32> {
+                        (0..below(most + 1)).map(|_| below(u64::from(places)) * spread).collect()
+                    };
+                    let (mut inputs, mut outputs) = (some(2), some(2));
+                    outputs.retain(|p| !inputs.contains(p));
+                    if below(4) > 0 {
+                        inputs.truncate(1);
+                        outputs.truncate(1);
+                    }
+                    let mut gate =
+                        |n: u64| if below(n) == 0 { vec![below(u64::from(places)) * spread] } else { Vec::new() };
+                    Transition::new(&inputs, &outputs, &gate(5), &gate(5), &[])
+                })
+                .collect();
+            // Most of these only lose tokens; where many firings can be taken back, runs go on.
+            let back = below(4);
+            for t in 0..transitions.len() {
+                if below(3) < back {
+                    let Transition { inputs, outputs, .. } = &transitions[t];
+                    transitions.push(Transition::new(outputs, inputs, &[], &[], &[]));
+                }
+            }
+            let initial: Vec<u32> = (0..places).filter(|_| below(2) == 0).map(|p| p * spread).collect();
+            explore(Net::new((places * spread) as usize, transitions, &initial).expect("well formed"), step)
+        })
     }
 
     #[test]

@@ -8,6 +8,12 @@
 //! Nobody can conclude from a part: a method whose answer needs the whole graph raises on an incomplete one.
 
 #[forbid(unsafe_code)]
+pub mod batch;
+#[forbid(unsafe_code)]
+pub mod bits;
+#[forbid(unsafe_code)]
+pub mod bottoms;
+#[forbid(unsafe_code)]
 pub mod budget;
 #[forbid(unsafe_code)]
 pub mod csr;
@@ -15,6 +21,10 @@ pub mod csr;
 pub mod edges;
 #[forbid(unsafe_code)]
 pub mod explore;
+#[forbid(unsafe_code)]
+pub mod fan;
+#[forbid(unsafe_code)]
+pub mod fixpoints;
 #[forbid(unsafe_code)]
 pub mod marking;
 #[forbid(unsafe_code)]
@@ -25,6 +35,8 @@ pub mod paths;
 pub mod scc;
 #[forbid(unsafe_code)]
 pub mod step;
+#[forbid(unsafe_code)]
+pub mod store;
 #[forbid(unsafe_code)]
 pub mod table;
 

@@ -1,17 +1,13 @@
-//! Firing sequences and backward reach, from the markings alone.
+//! Firing sequences, from the markings alone.
 //!
 //! A shortest sequence from M0 is found backwards under interleaving: the rule is run in reverse and the lowest
 //! predecessor is taken, so a path costs its length times the number of transitions. Under steps the parent
-//! was stored. Between two markings it is a breadth-first search. Backward reach (which markings can still get
-//! there: doomed markings are the complement) runs the rule in reverse, 64 markings at a time, and so needs no edges;
-//! under steps, where the rule has no simple reverse, it turns the stored edges round (`csr.rs`).
+//! was stored. Between two markings it is a breadth-first search.
 
 use crate::budget::{Memory, Stop, Watch};
-use crate::csr::Csr;
 use crate::edges::Edges;
-use crate::explore::{NONE, Space};
-use crate::marking::{Width, linear_hash, slice};
-use crate::with_width;
+use crate::explore::Space;
+use crate::table::NONE;
 
 /// What a witness may take beyond the budget: a graph that ended for want of memory must still show what it found.
 pub const WITNESS_BYTES: usize = 64 << 20;
@@ -120,82 +116,6 @@ pub fn path_between(
     Ok(Some((sequence(space, &path, &memory, watch)?, reached)))
 }
 
-/// The markings from which a target can be reached, one byte each, targets included; every marking on the way before
-/// the target is in `within`.
-pub fn backward(space: &Space, targets: &[u8], within: Option<&[u8]>, watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
-    let memory = space.memory.clone();
-    let mut reach = memory.filled(0u8, space.len())?;
-    let mut stack = Vec::new();
-    for (index, _) in targets.iter().enumerate().filter(|&(_, &target)| target != 0) {
-        reach[index] = 1;
-        memory.push(&mut stack, index as u32)?;
-    }
-    if space.step {
-        let edges = Csr::new(space, None, &memory, watch)?.reversed(&memory, watch)?;
-        while let Some(index) = stack.pop() {
-            let sources = edges.targets(index);
-            for &source in sources {
-                if reach[source as usize] == 0 && within.is_none_or(|within| within[source as usize] != 0) {
-                    reach[source as usize] = 1;
-                    memory.push(&mut stack, source)?;
-                }
-            }
-            watch.tick(1 + sources.len())?;
-        }
-    } else {
-        with_width!(space.net.words, width => {
-            backward_interleaving(width, space, within, &mut reach, &mut stack, &memory, watch)
-        })?;
-    }
-    Ok(reach)
-}
-
-fn backward_interleaving<W: Width>(
-    width: W,
-    space: &Space,
-    within: Option<&[u8]>,
-    reach: &mut [u8],
-    stack: &mut Vec<u32>,
-    memory: &Memory,
-    watch: &mut Watch<'_>,
-) -> Result<(), Stop> {
-    let words = width.words();
-    let net = &*space.net;
-    let mut markings = Vec::with_capacity(64 * words);
-    let mut slices = vec![0; 64 * words];
-    let mut before = vec![0; words];
-    while !stack.is_empty() {
-        let rest = stack.len().saturating_sub(64);
-        markings.clear();
-        for &index in &stack[rest..] {
-            markings.extend_from_slice(space.table.store.get(width, index as usize));
-        }
-        let count = stack.len() - rest;
-        stack.truncate(rest);
-        slice(width, &markings, &mut slices);
-        let valid = if count == 64 { !0 } else { (1 << count) - 1 };
-        for t in 0..net.transitions.len() {
-            let (base, _) = net.backward.test(t, &slices, valid);
-            let mut fire = base & net.backward.edge(t);
-            while fire != 0 {
-                let j = fire.trailing_zeros() as usize;
-                fire &= fire - 1;
-                for ((to, from), flip) in before.iter_mut().zip(&markings[j * words..]).zip(net.flip(t, words)) {
-                    *to = from ^ flip;
-                }
-                let Some(source) = space.table.find(width, &before, linear_hash(width, &before)) else { continue };
-                if reach[source as usize] == 0 && within.is_none_or(|within| within[source as usize] != 0) {
-                    reach[source as usize] = 1;
-                    memory.push(stack, source)?;
-                }
-                watch.tick(1)?;
-            }
-        }
-        watch.tick(count)?;
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -229,7 +149,7 @@ mod tests {
             assert_eq!(path_between(&space, two, &targets, Some(&within), &mut watch), Ok(None));
             let mut start = vec![0; 4];
             start[0] = 1;
-            let reach = backward(&space, &start, None, &mut watch).expect("fits");
+            let reach = crate::fixpoints::backward(&space, &start, None, &mut watch).expect("fits");
             assert_eq!((reach.iter().map(|&b| u32::from(b)).sum::<u32>(), reach[dead as usize]), (3, 0));
         }
     }

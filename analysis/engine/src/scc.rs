@@ -1,20 +1,15 @@
-//! Strongly connected components of the reachability graph, and what follows from the bottom ones.
+//! Strongly connected components of the reachability graph, or of its part within a set of markings.
 //!
-//! A bottom component is one that no edge leaves; every run can be led into one and none gets out. So a transition is live
-//! exactly if it fires in every bottom component, a home marking exists exactly if there is one bottom component
-//! (and then its markings are the home markings), and the net is reversible exactly if all markings are one component.
-//!
-//! Under interleaving the common case needs no edges: if M0 is reached backwards from everywhere, there is one component.
-//! Otherwise edges are stored as compressed rows (4 bytes each, 8 a marking) within the memory budget, and
-//! components are found by Pearce's one-array form of Tarjan's algorithm ("A space-efficient algorithm for finding strongly
-//! connected components", 2016), with its own stack. Forward-backward splitting without edges was rejected: its cost
-//! grows with the number of components, and an acyclic graph has as many as markings.
+//! Edges are stored as compressed rows (4 bytes each, 8 a marking) within the memory budget, and components are found by
+//! Pearce's one-array form of Tarjan's algorithm ("A space-efficient algorithm for finding strongly connected
+//! components", 2016), with its own stack. Forward-backward splitting without edges was rejected: its cost grows with
+//! the number of components, and an acyclic graph has as many as markings. Where only the bottom components matter,
+//! and where all markings are one component, no edges are stored at all: `bottoms.rs`.
 
 use crate::budget::{Memory, Stop, Watch};
 use crate::csr::Csr;
 use crate::edges::Edges;
 use crate::explore::Space;
-use crate::paths;
 
 /// The strongly connected components, numbered so that edges lead from higher to lower numbers or stay.
 #[derive(Debug)]
@@ -32,26 +27,25 @@ pub struct Scc {
 impl Scc {
     /// The components of the graph, or of its part within a set of markings.
     pub fn new(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> Result<Self, Stop> {
-        if !space.step && within.is_none() && reversible(space, watch)? {
-            let memory = space.memory.clone();
-            return Ok(Scc {
-                of: memory.filled(0, space.len())?,
-                sizes: vec![space.len() as u32],
-                bottom: vec![1],
-                trivial: vec![u8::from(space.edges == 0)],
-            });
-        }
         let memory = space.memory.clone();
         let edges = Csr::new(space, within, &memory, watch)?;
         Scc::of_edges(&edges, within, &memory, watch)
     }
 
-    fn of_edges(edges: &Csr, within: Option<&[u8]>, memory: &Memory, watch: &mut Watch<'_>) -> Result<Self, Stop> {
+    /// All markings as one component.
+    pub fn whole(space: &Space) -> Result<Self, Stop> {
+        let of = space.memory.clone().filled(0, space.len())?;
+        let trivial = vec![u8::from(space.edges == 0)];
+        Ok(Scc { of, sizes: vec![space.len() as u32], bottom: vec![1], trivial })
+    }
+
+    /// The components of stored edges, which stay within a set of markings.
+    pub fn of_edges(edges: &Csr, within: Option<&[u8]>, memory: &Memory, watch: &mut Watch<'_>) -> Result<Self, Stop> {
         let (of, count) = pearce(edges, within, memory, watch)?;
         let mut sizes = memory.filled(0u32, count)?;
         let mut bottom = memory.filled(1u8, count)?;
         let mut trivial = memory.filled(1u8, count)?;
-        for (index, &component) in of.iter().enumerate().filter(|&(_, &component)| component != crate::explore::NONE) {
+        for (index, &component) in of.iter().enumerate().filter(|&(_, &component)| component != crate::table::NONE) {
             let component = component as usize;
             sizes[component] += 1;
             for &target in edges.targets(index as u32) {
@@ -129,22 +123,11 @@ fn pearce(
         }
     }
     for rank in &mut rank {
-        *rank = if *rank == 0 { crate::explore::NONE } else { top - *rank };
+        *rank = if *rank == 0 { crate::table::NONE } else { top - *rank };
     }
     memory.drop_vec(open);
     memory.drop_vec(way);
     Ok((rank, (top - component) as usize))
-}
-
-/// Whether M0 can be reached from everywhere.
-pub fn reversible(space: &Space, watch: &mut Watch<'_>) -> Result<bool, Stop> {
-    if space.step {
-        return Ok(Scc::new(space, None, watch)?.sizes.len() == 1);
-    }
-    let memory = space.memory.clone();
-    let mut initial = memory.filled(0u8, space.len())?;
-    initial[0] = 1;
-    Ok(paths::backward(space, &initial, None, watch)?.iter().all(|&reached| reached != 0))
 }
 
 /// For each transition, whether it fires in every bottom component.

@@ -1,7 +1,6 @@
-//! The set of markings: an append-only array of them, and a hash table of 32-bit indexes into it.
+//! The set of markings: an append-only array of them (`store.rs`), and a hash table of 32-bit indexes into it.
 //!
-//! The array is at once the set, the breadth-first queue and the numbering of markings; it grows by chunks, so nothing
-//! is copied and memory is what is stated. The table holds 4 bytes a slot, open addressing with linear probing. A slot
+//! The table holds 4 bytes a slot, open addressing with linear probing. A slot
 //! of a table of 2^b slots keeps the index in its low b bits and, in the bits that are left, a tag of the hash: most
 //! probes of another marking end at the tag without touching the array (at 2^24 slots one in 256 does).
 //!
@@ -13,91 +12,7 @@
 
 use crate::budget::{Memory, Stop};
 use crate::marking::{Width, linear_hash, mix};
-
-/// Bytes of a full chunk of the array, about.
-const CHUNK_BYTES_LOG2: u32 = 21;
-
-/// The append-only array of markings.
-#[derive(Debug)]
-pub struct Store {
-    words: usize,
-    chunk_log2: u32,
-    chunks: Vec<Vec<u64>>,
-    len: usize,
-    /// How many more markings the last chunk takes.
-    room: usize,
-}
-
-impl Store {
-    /// An empty array of markings of so many words.
-    pub fn new(words: usize) -> Self {
-        let chunk_log2 = (CHUNK_BYTES_LOG2 - 3).saturating_sub(words.next_power_of_two().trailing_zeros()).max(4);
-        Store { words, chunk_log2, chunks: Vec::new(), len: 0, room: 0 }
-    }
-
-    /// How many markings there are.
-    pub fn len(&self) -> usize {
-        self.len
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
-    /// The marking of an index.
-    #[inline(always)]
-    pub fn get<W: Width>(&self, width: W, index: usize) -> &[u64] {
-        let chunk = &self.chunks[index >> self.chunk_log2];
-        let start = (index & ((1 << self.chunk_log2) - 1)) * width.words();
-        &chunk[start..start + width.words()]
-    }
-
-    /// Appends the markings of a range of indexes to `into`.
-    pub fn copy_range(&self, start: usize, end: usize, into: &mut Vec<u64>) {
-        let mut index = start;
-        while index < end {
-            let chunk = index >> self.chunk_log2;
-            let stop = end.min((chunk + 1) << self.chunk_log2);
-            let base = chunk << self.chunk_log2;
-            into.extend_from_slice(&self.chunks[chunk][(index - base) * self.words..(stop - base) * self.words]);
-            index = stop;
-        }
-    }
-
-    #[inline(always)]
-    fn push(&mut self, marking: &[u64], memory: &Memory) -> Result<(), Stop> {
-        if self.room == 0 {
-            self.make_room(memory)?;
-        }
-        let last = self.chunks.len() - 1;
-        self.chunks[last].extend_from_slice(&marking[..self.words]);
-        self.room -= 1;
-        self.len += 1;
-        Ok(())
-    }
-
-    /// Enlarges the last chunk, which small nets never fill, or begins another.
-    #[cold]
-    fn make_room(&mut self, memory: &Memory) -> Result<(), Stop> {
-        let whole = self.words << self.chunk_log2;
-        if self.chunks.last().is_none_or(|chunk| chunk.len() == whole) {
-            self.chunks.push(Vec::new());
-        }
-        let first = self.chunks.len() == 1;
-        let Some(chunk) = self.chunks.last_mut() else { return Err(Stop::Memory) };
-        let old = chunk.len();
-        let new = if first { (2 * old).clamp(16 * self.words, whole) } else { whole };
-        memory.claim(8 * new)?;
-        if chunk.try_reserve_exact(new - chunk.len()).is_err() {
-            memory.release(8 * new);
-            return Err(Stop::Memory);
-        }
-        memory.release(8 * old);
-        self.room = (new - chunk.len()) / self.words;
-        Ok(())
-    }
-}
+use crate::store::Store;
 
 /// A batch of markings on their way into the table.
 #[derive(Debug, Default)]
@@ -111,6 +26,9 @@ pub struct Candidates {
     /// The candidates not found in their first slot.
     open: Vec<u32>,
 }
+
+/// Stands for "no marking" where an index is stored.
+pub const NONE: u32 = u32::MAX;
 
 /// Candidates that wait before they are inserted together.
 const BATCH: usize = 128;
@@ -262,6 +180,38 @@ impl Table {
         hashes.clear();
         markings.clear();
         Ok(())
+    }
+
+    /// The indexes of a batch in its order, `NONE` for those not in the set; empties the batch.
+    #[inline(always)]
+    pub fn find_batch<W: Width>(&self, width: W, batch: &mut Candidates, found: &mut Vec<u32>) {
+        let Candidates { hashes, markings, slots, open } = batch;
+        let words = width.words();
+        slots.clear();
+        for &hash in hashes.iter() {
+            slots.push(self.slots[self.home(mix(hash))]);
+        }
+        let mut count = 0;
+        open.resize(slots.len(), 0);
+        found.clear();
+        for (c, (&slot, &hash)) in slots.iter().zip(hashes.iter()).enumerate() {
+            let slot = u64::from(slot);
+            let index = (slot & self.index_mask()).wrapping_sub(1) as u32;
+            let known = slot & !self.index_mask() == self.tag(mix(hash))
+                && slot != 0
+                && self.store.get(width, index as usize) == &markings[c * words..(c + 1) * words];
+            found.push(if known { index } else { NONE });
+            open[count] = c as u32;
+            count += usize::from(!known && slot != 0);
+        }
+        for &c in &open[..count] {
+            let c = c as usize;
+            if let Some(index) = self.find(width, &markings[c * words..(c + 1) * words], hashes[c]) {
+                found[c] = index;
+            }
+        }
+        hashes.clear();
+        markings.clear();
     }
 
     /// Doubles the slots and files every marking again.

@@ -8,18 +8,21 @@ use pyo3::types::{PyBytes, PyInt};
 
 use super::components::Components;
 use super::{IncompleteGraph, Patience, answered, little_endian, marking_of, mask};
+use crate::bottoms::Bottoms;
 use crate::budget::{Memory, Stop, Watch};
 use crate::csr::Csr;
 use crate::edges::Edges;
-use crate::explore::{NONE, Space};
+use crate::explore::Space;
 use crate::scc::Scc;
-use crate::{paths, scc};
+use crate::table::NONE;
+use crate::{fixpoints, paths};
 
 /// A reachability graph; see the stub `_engine.pyi` for the meaning of each member.
 #[pyclass(frozen, module = "firable.analysis._engine")]
 pub(crate) struct Graph {
     space: Space,
     scc: OnceLock<Arc<Scc>>,
+    bottoms: OnceLock<Bottoms>,
 }
 
 /// A set of markings from Python: indexes, or one byte for each marking.
@@ -31,7 +34,7 @@ enum Markings<'py> {
 
 impl Graph {
     pub(crate) fn new(space: Space) -> Self {
-        Graph { space, scc: OnceLock::new() }
+        Graph { space, scc: OnceLock::new(), bottoms: OnceLock::new() }
     }
 
     fn long<T: Send>(
@@ -85,13 +88,23 @@ impl Graph {
         }
     }
 
+    fn bottoms(&self, py: Python<'_>, patience: &Patience) -> PyResult<&Bottoms> {
+        self.whole("what holds of all runs")?;
+        if let Some(bottoms) = self.bottoms.get() {
+            return Ok(bottoms);
+        }
+        let bottoms = self.long(py, patience, Bottoms::new)?;
+        Ok(self.bottoms.get_or_init(|| bottoms))
+    }
+
     fn scc(&self, py: Python<'_>, patience: &Patience) -> PyResult<Arc<Scc>> {
-        self.whole("strongly connected components")?;
         if let Some(scc) = self.scc.get() {
             return Ok(Arc::clone(scc));
         }
-        let scc = Arc::new(self.long(py, patience, |space, watch| Scc::new(space, None, watch))?);
-        Ok(Arc::clone(self.scc.get_or_init(|| scc)))
+        let one = self.bottoms(py, patience)?.reversible;
+        let scc =
+            self.long(py, patience, |space, watch| if one { Scc::whole(space) } else { Scc::new(space, None, watch) })?;
+        Ok(Arc::clone(self.scc.get_or_init(|| Arc::new(scc))))
     }
 }
 
@@ -265,7 +278,7 @@ impl Graph {
         let targets = self.bitmap(targets)?;
         let within = within.map(|within| self.bitmap(within)).transpose()?;
         let reach =
-            self.long(py, &patience, |space, watch| paths::backward(space, &targets, within.as_deref(), watch))?;
+            self.long(py, &patience, |space, watch| fixpoints::backward(space, &targets, within.as_deref(), watch))?;
         Ok(PyBytes::new(py, &reach))
     }
 
@@ -301,15 +314,12 @@ impl Graph {
 
     #[pyo3(signature = (*, max_seconds=None, cancelled=None))]
     fn live(&self, py: Python<'_>, max_seconds: Option<f64>, cancelled: Option<Py<PyAny>>) -> PyResult<Vec<bool>> {
-        let patience = Patience::new(max_seconds, cancelled)?;
-        let components = self.scc(py, &patience)?;
-        self.long(py, &patience, |space, watch| scc::live(space, &components, watch))
+        Ok(self.bottoms(py, &Patience::new(max_seconds, cancelled)?)?.live.clone())
     }
 
     #[pyo3(signature = (*, max_seconds=None, cancelled=None))]
     fn reversible(&self, py: Python<'_>, max_seconds: Option<f64>, cancelled: Option<Py<PyAny>>) -> PyResult<bool> {
-        let patience = Patience::new(max_seconds, cancelled)?;
-        Ok(self.scc(py, &patience)?.sizes.len() == 1)
+        Ok(self.bottoms(py, &Patience::new(max_seconds, cancelled)?)?.reversible)
     }
 
     #[pyo3(signature = (*, max_seconds=None, cancelled=None))]
@@ -319,12 +329,47 @@ impl Graph {
         max_seconds: Option<f64>,
         cancelled: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyBytes>> {
+        let bottoms = self.bottoms(py, &Patience::new(max_seconds, cancelled)?)?;
+        if bottoms.reversible {
+            return Ok(PyBytes::new(py, &vec![1; self.space.len()]));
+        }
+        Ok(PyBytes::new(py, &bottoms.home))
+    }
+
+    #[pyo3(signature = (targets, by=None, *, max_seconds=None, cancelled=None))]
+    fn before<'py>(
+        &self,
+        py: Python<'py>,
+        targets: Markings<'_>,
+        by: Option<Vec<usize>>,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
         let patience = Patience::new(max_seconds, cancelled)?;
-        let components = self.scc(py, &patience)?;
-        let home = components.bottom.iter().filter(|&&bottom| bottom != 0).count() == 1;
-        let markings: Vec<u8> =
-            components.of.iter().map(|&of| if home { components.bottom[of as usize] } else { 0 }).collect();
-        Ok(PyBytes::new(py, &markings))
+        self.whole("what leads to a set of markings")?;
+        let targets = self.bitmap(targets)?;
+        let check = |by: Vec<usize>| -> PyResult<Vec<u32>> {
+            by.into_iter().map(|t| Ok(self.check_transition(t)? as u32)).collect()
+        };
+        let by = by.map(check).transpose()?;
+        let found =
+            self.long(py, &patience, |space, watch| fixpoints::before(space, &targets, by.as_deref(), watch))?;
+        Ok(PyBytes::new(py, &found))
+    }
+
+    #[pyo3(signature = (within=None, *, max_seconds=None, cancelled=None))]
+    fn endless<'py>(
+        &self,
+        py: Python<'py>,
+        within: Option<Markings<'_>>,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let patience = Patience::new(max_seconds, cancelled)?;
+        self.whole("that a run can go on for ever")?;
+        let within = within.map(|within| self.bitmap(within)).transpose()?;
+        let found = self.long(py, &patience, |space, watch| fixpoints::endless(space, within.as_deref(), watch))?;
+        Ok(PyBytes::new(py, &found))
     }
 
     #[pyo3(signature = (pairs, *, max_seconds=None, cancelled=None))]

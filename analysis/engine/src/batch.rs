@@ -1,0 +1,42 @@
+//! Up to 64 markings taken together as bit slices, one word for each place: the unit in which everything fires.
+
+use crate::marking::{Width, linear_hash, slice};
+
+/// Up to 64 markings, sliced.
+pub struct Batch {
+    /// The markings, end to end.
+    pub markings: Vec<u64>,
+    /// Their linear hashes.
+    pub hashes: [u64; 64],
+    /// Bit `j` of slice `p` says whether marking `j` holds place `p`.
+    pub slices: Vec<u64>,
+    /// A bit for each marking.
+    pub valid: u64,
+    /// How many markings.
+    pub count: usize,
+}
+
+impl Batch {
+    /// An empty batch of markings of so many words.
+    pub fn new(words: usize) -> Self {
+        Batch {
+            markings: Vec::with_capacity(64 * words),
+            hashes: [0; 64],
+            slices: vec![0; 64 * words],
+            valid: 0,
+            count: 0,
+        }
+    }
+
+    /// Slices the markings that stand end to end in `self.markings`.
+    #[inline(always)]
+    pub fn cut<W: Width>(&mut self, width: W) {
+        let words = width.words();
+        self.count = self.markings.len() / words;
+        self.valid = if self.count == 64 { !0 } else { (1 << self.count) - 1 };
+        for (hash, marking) in self.hashes.iter_mut().zip(self.markings.chunks_exact(words)) {
+            *hash = linear_hash(width, marking);
+        }
+        slice(width, &self.markings, &mut self.slices);
+    }
+}

@@ -1,0 +1,236 @@
+//! What leads where, one step or any number of them: EX, EF (E[U]) and EG over the stored markings.
+//!
+//! Under interleaving no edge is stored. The rule runs backwards from 64 markings at a time (`Fan`), and what waits is
+//! taken in the order of the indexes (`Agenda`), so a search against the edges costs about what the exploration did. One
+//! step back is asked from whichever side is smaller: the predecessors of few targets are computed, and of many, each
+//! marking looks for one edge into them, of which it usually finds one at once.
+//!
+//! The greatest fixpoint EG counts for each marking the edges that stay inside; a marking with none is taken out, and its
+//! predecessors count one less (Arnold and Crubille, "A linear algorithm to solve fixed-point equations on transition
+//! systems", 1988). Sweeping until nothing changes was rejected: on a chain it is quadratic.
+//!
+//! Under steps, where the rule has no simple reverse, edges are stored and turned round (`csr.rs`).
+
+use crate::bits::{Agenda, Bits};
+use crate::budget::{Stop, Watch};
+use crate::csr::Csr;
+use crate::edges::{Edges, Fired};
+use crate::explore::Space;
+use crate::fan::Fan;
+use crate::marking::Width;
+use crate::with_width;
+
+/// The markings from which a target can be reached, one byte each, targets included; every marking on the way before
+/// the target is in `within`.
+pub fn backward(space: &Space, targets: &[u8], within: Option<&[u8]>, watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
+    let memory = space.memory.clone();
+    let mut reach = Bits::from_bytes(targets, &memory)?;
+    let mut agenda = Agenda::new(space.len(), &memory)?;
+    reach.iter().for_each(|index| agenda.add(index));
+    // What still may be added.
+    let open = |reach: &Bits, source: u32| {
+        !reach.has(source as usize) && within.is_none_or(|within| within[source as usize] != 0)
+    };
+    let mut taken = Vec::with_capacity(64);
+    if space.step {
+        let edges = Csr::new(space, None, &memory, watch)?.reversed(&memory, watch)?;
+        while agenda.take(&mut taken) {
+            for &index in &taken {
+                let sources = edges.targets(index);
+                for &source in sources {
+                    if open(&reach, source) {
+                        reach.add(source as usize);
+                        agenda.add(source as usize);
+                    }
+                }
+                watch.tick(1 + sources.len())?;
+            }
+        }
+    } else {
+        let transitions = space.net.transitions.len();
+        let mut fan = Fan::backward(space);
+        with_width!(space.net.words, width => {
+            while agenda.take(&mut taken) {
+                let mut edges = 0;
+                fan.load(width, &taken);
+                fan.each(width, !0, 0..transitions, &mut |_, _, source| {
+                    edges += 1;
+                    if open(&reach, source) {
+                        reach.add(source as usize);
+                        agenda.add(source as usize);
+                    }
+                    false
+                });
+                watch.tick(taken.len() + edges + transitions)?;
+            }
+        });
+    }
+    Ok(reach.to_bytes(space.len()))
+}
+
+/// The markings with an edge into the targets, one byte each; with `by`, an edge that fires one of these transitions.
+pub fn before(space: &Space, targets: &[u8], by: Option<&[u32]>, watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
+    let memory = space.memory.clone();
+    let mut found = memory.filled(0u8, space.len())?;
+    if space.step {
+        let by = by.map(|by| {
+            let mut marked = vec![false; space.net.transitions.len()];
+            by.iter().for_each(|&t| marked[t as usize] = true);
+            marked
+        });
+        let fires = |fired: Fired<'_>| by.as_ref().is_none_or(|by| fired.any(|t| by[t as usize]));
+        let mut edges = Edges::new(space);
+        for index in 0..space.len() as u32 {
+            edges.visit(&[index], &memory, watch, &mut |source, fired, target| {
+                if targets[target as usize] != 0 && found[source as usize] == 0 && fires(fired) {
+                    found[source as usize] = 1;
+                }
+                Ok(())
+            })?;
+        }
+        return Ok(found);
+    }
+    let transitions: Vec<usize> = match by {
+        Some(by) => by.iter().map(|&t| t as usize).collect(),
+        None => (0..space.net.transitions.len()).collect(),
+    };
+    let count = targets.iter().filter(|&&target| target != 0).count();
+    with_width!(space.net.words, width => {
+        if count < space.len() / 4 {
+            into_few(width, space, targets, &transitions, &mut found, watch)?;
+        } else {
+            into_many(width, space, targets, transitions, &mut found, watch)?;
+        }
+    });
+    Ok(found)
+}
+
+fn into_few<W: Width>(
+    width: W,
+    space: &Space,
+    targets: &[u8],
+    transitions: &[usize],
+    found: &mut [u8],
+    watch: &mut Watch<'_>,
+) -> Result<(), Stop> {
+    let mut fan = Fan::backward(space);
+    let mut batch = Vec::with_capacity(64);
+    let mut all = (0..space.len() as u32).filter(|&index| targets[index as usize] != 0);
+    loop {
+        batch.clear();
+        batch.extend(all.by_ref().take(64));
+        if batch.is_empty() {
+            return Ok(());
+        }
+        fan.load(width, &batch);
+        fan.each(width, !0, transitions.iter().copied(), &mut |_, _, source| {
+            found[source as usize] = 1;
+            false
+        });
+        watch.tick(64 + transitions.len())?;
+    }
+}
+
+fn into_many<W: Width>(
+    width: W,
+    space: &Space,
+    targets: &[u8],
+    mut transitions: Vec<usize>,
+    found: &mut [u8],
+    watch: &mut Watch<'_>,
+) -> Result<(), Stop> {
+    let mut fan = Fan::forward(space);
+    let mut wins = vec![0u32; space.net.transitions.len()];
+    for (round, first) in (0..space.len()).step_by(64).enumerate() {
+        fan.load_range(width, first, space.len().min(first + 64));
+        fan.each(width, !0, transitions.iter().copied(), &mut |j, t, target| {
+            let hit = targets[target as usize] != 0;
+            found[first + j] |= u8::from(hit);
+            wins[t as usize] += u32::from(hit);
+            hit
+        });
+        // Transitions that lead into the targets are tried first.
+        if round.is_power_of_two() || round % 1024 == 0 {
+            transitions.sort_by_key(|&t| std::cmp::Reverse(wins[t]));
+            wins.iter_mut().for_each(|wins| *wins /= 2);
+        }
+        watch.tick(64 + transitions.len() / 4)?;
+    }
+    Ok(())
+}
+
+/// The markings from which a run can go on for ever inside a set (EG over infinite runs), one byte each.
+pub fn endless(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> Result<Vec<u8>, Stop> {
+    let memory = space.memory.clone();
+    let count = space.len();
+    let mut inside = match within {
+        Some(within) => within.iter().map(|&byte| u8::from(byte != 0)).collect(),
+        None => memory.filled(1u8, count)?,
+    };
+    // For each marking inside, its edges that stay inside; those at 0 have to go.
+    let mut stay = memory.filled(0u32, count)?;
+    let mut agenda = Agenda::new(count, &memory)?;
+    let mut taken = Vec::with_capacity(64);
+    let lose = |inside: &mut [u8], stay: &mut [u32], agenda: &mut Agenda, source: u32| {
+        let source = source as usize;
+        if inside[source] != 0 {
+            stay[source] -= 1;
+            if stay[source] == 0 {
+                inside[source] = 0;
+                agenda.add(source);
+            }
+        }
+    };
+    let begin = |inside: &mut [u8], stay: &[u32], agenda: &mut Agenda| {
+        for index in (0..count).filter(|&index| stay[index] == 0 && inside[index] != 0) {
+            agenda.add(index);
+        }
+        for (inside, &stay) in inside.iter_mut().zip(stay) {
+            *inside &= u8::from(stay > 0);
+        }
+    };
+    if space.step {
+        let edges = Csr::new(space, Some(&inside), &memory, watch)?;
+        for (stay, row) in stay.iter_mut().zip(edges.offsets.windows(2)) {
+            *stay = u32::try_from(row[1] - row[0]).map_err(|_| Stop::Memory)?;
+        }
+        let edges = edges.reversed(&memory, watch)?;
+        begin(&mut inside, &stay, &mut agenda);
+        while agenda.take(&mut taken) {
+            for &index in &taken {
+                edges.targets(index).iter().for_each(|&source| lose(&mut inside, &mut stay, &mut agenda, source));
+                watch.tick(1 + edges.targets(index).len())?;
+            }
+        }
+        return Ok(inside);
+    }
+    let transitions = space.net.transitions.len();
+    with_width!(space.net.words, width => {
+        let mut fan = Fan::forward(space);
+        for first in (0..count).step_by(64) {
+            let end = count.min(first + 64);
+            fan.load_range(width, first, end);
+            if within.is_none() {
+                fan.count(&mut stay[first..end]);
+            } else {
+                let sources = inside[first..end].iter().rev().fold(0, |bits, &byte| bits << 1 | u64::from(byte));
+                fan.each(width, sources, 0..transitions, &mut |j, _, target| {
+                    stay[first + j] += u32::from(inside[target as usize]);
+                    false
+                });
+            }
+            watch.tick(64 + 2 * transitions)?;
+        }
+        begin(&mut inside, &stay, &mut agenda);
+        let mut fan = Fan::backward(space);
+        while agenda.take(&mut taken) {
+            fan.load(width, &taken);
+            fan.each(width, !0, 0..transitions, &mut |_, _, source| {
+                lose(&mut inside, &mut stay, &mut agenda, source);
+                false
+            });
+            watch.tick(64 + 2 * transitions)?;
+        }
+    });
+    Ok(inside)
+}
