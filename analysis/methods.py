@@ -11,15 +11,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib import import_module
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from firable.analysis.goal import Finding, Limits
-from firable.analysis.spaces.space import StateSpace
-from firable.nets.formula import Formula
-from firable.nets.net import Net
+if TYPE_CHECKING:  # the command line reads this table for its help, and so loads nothing with it
+    from firable.analysis.goal import Finding, Limits
+    from firable.analysis.spaces.space import StateSpace
+    from firable.nets.formula import Formula
+    from firable.nets.net import Net
 
-GoalDecider = Callable[[Net, Formula, Limits], Finding]
-SpaceMaker = Callable[[Net, Limits], StateSpace[Any]]
+    GoalDecider = Callable[[Net, Formula, Limits], Finding]
+    SpaceMaker = Callable[[Net, Limits], StateSpace[Any]]
 
 
 class Method(StrEnum):

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from firable.analysis.methods import Method
 from firable.cli import text
 from firable.cli.options import analysis_options, answer_all, budget, format_option, load_net, write_folder
 from firable.cli.report import Report
@@ -43,9 +44,6 @@ class _Asked:
         }
 
 
-METHODS: Final = ("auto", "explicit")
-
-
 @click.command(short_help="Check nets: deadlock, contact, liveness, conflicts, their own properties.")
 @click.argument("nets", metavar="NET...", nargs=-1, required=True)
 @click.option(
@@ -57,11 +55,10 @@ METHODS: Final = ("auto", "explicit")
 )
 @click.option(
     "--method",
-    type=click.Choice(METHODS),
-    default="auto",
+    type=click.Choice([str(method) for method in Method]),
+    default=str(Method.AUTO),
     show_default=True,
-    metavar="METHOD",
-    help=f"Let one technique answer: {', '.join(METHODS)}.",
+    help="Let one technique answer; `auto` lets them race where exploring a moment does not suffice.",
 )
 @analysis_options
 @click.option("--trace-dir", metavar="DIR", help="Write the firing sequence of each violation, for `firable replay`.")
