@@ -5,8 +5,9 @@ technique that found it, can check:
 
 - a *firing sequence* leads from M0 to a marking where the goal holds;
 - an *inductive invariant* is true of M0, kept by every firing, and excludes the goal. It is a conjunction of equations
-  (weighted sums of tokens that no firing changes: P-invariants) and of clauses (some of these places holds a token, or
-  some of those holds none). A trap that is marked in M0 is such a clause, so the argument of siphons and traps is an
+  (weighted sums of tokens that no firing changes: P-invariants), of inequalities (such sums that no firing lowers, as
+  the state equation gives them), and of clauses (some of these places holds a token, or some of those holds none). A
+  trap that is marked in M0 is such a clause, so the argument of siphons and traps is an
   inductive invariant too, whose premises need no trust: the checker fires the transitions as they are;
 - a *closed marking set* is that, with the invariant as a list: M0 is in it and every firing stays in it. With a
   distance for each marking it shows more: where each marking has a successor that is nearer to the goal, the goal can
@@ -34,6 +35,14 @@ class Equation:
 
 
 @dataclass(frozen=True, slots=True)
+class Inequality:
+    """The sum of the weights, of either sign, of the places that hold a token is at least `tokens`."""
+
+    weights: tuple[tuple[str, int], ...]
+    tokens: int
+
+
+@dataclass(frozen=True, slots=True)
 class Clause:
     """Some place of `marked` holds a token, or some place of `empty` holds none."""
 
@@ -50,15 +59,16 @@ class FiringSequence:
 
 @dataclass(frozen=True, slots=True)
 class InductiveInvariant:
-    """The equations hold, and with them the clauses and the negated goal are `depth`-inductive.
+    """The equations hold, and with them the clauses, inequalities and the negated goal are `depth`-inductive.
 
-    That is, with P for "every clause holds, and the goal does not": P holds in the first `depth` markings of every run
-    from M0, and where it holds in `depth` markings one after the other it holds in the next.
+    That is, with P for "every clause and inequality holds, and the goal does not": P holds in the first `depth`
+    markings of every run from M0, and where it holds in `depth` markings one after the other it holds in the next.
     """
 
     equations: tuple[Equation, ...] = ()
     clauses: tuple[Clause, ...] = ()
     depth: int = 1
+    inequalities: tuple[Inequality, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ the context; z3's own timeout knows the clock only.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
 from threading import Event, Thread
 from typing import Final
@@ -26,8 +27,8 @@ def solver_of(context: z3.Context, *, logic: str = "") -> z3.Solver:
     return solver
 
 
-def answer(solver: z3.Solver, deadline: Deadline) -> z3.CheckSatResult:
-    """What z3 says of the assertions: `unknown` where the deadline came first, or where it gives up.
+def answer(solver: z3.Solver, deadline: Deadline, assumed: Sequence[z3.BoolRef] = ()) -> z3.CheckSatResult:
+    """What z3 says of the assertions and what is assumed: `unknown` where the deadline came first, or it gives up.
 
     Raises `KeyboardInterrupt` where the user ended it: z3 takes the signal for itself and calls it an answer.
     """
@@ -36,14 +37,14 @@ def answer(solver: z3.Solver, deadline: Deadline) -> z3.CheckSatResult:
     if deadline.cancelled is None:
         if deadline.at_seconds != inf:
             solver.set("timeout", deadline.left_milliseconds)
-        found = solver.check()
+        found = solver.check(*assumed)
         stopped = deadline.over
     else:
         done = Event()
         watcher = Thread(target=_watch, args=(solver.ctx, deadline, done), daemon=True)
         watcher.start()
         try:
-            found = solver.check()
+            found = solver.check(*assumed)
         finally:
             done.set()
             watcher.join()

@@ -1,0 +1,131 @@
+"""What the state equation and traps refute is not reachable, and what they rest on is inductive, marking by marking."""
+
+from __future__ import annotations
+
+from threading import Event
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.dense_nets import dense_nets
+from support.reference import load_net, reference_names
+from support.ring_nets import ring_nets
+from support.whole_nets import formulas
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import Certificate, Clause, InductiveInvariant
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.structure.state_equation import decide_by_state_equation
+from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not
+from firable.nets.net import Net, Place, Transition
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import Player, holds_in
+
+
+def holds(net: Net, formula: Formula, marking: int) -> bool:
+    return evaluate(BOOL, net, formula, holds_in(marking))
+
+
+def certified(net: Net, certificate: Certificate | None, marking: int) -> bool:
+    """Whether a marking satisfies the equations, inequalities and clauses."""
+    assert isinstance(certificate, InductiveInvariant)
+    full = set(net.names(marking))
+    return (
+        all(sum(w for p, w in e.weights if p in full) == e.tokens for e in certificate.equations)
+        and all(sum(w for p, w in i.weights if p in full) >= i.tokens for i in certificate.inequalities)
+        and all(full & set(clause.marked) or set(clause.empty) - full for clause in certificate.clauses)
+    )
+
+
+def check_finding(net: Net, goal: Formula, found: Finding) -> None:
+    """A refuted goal is not reachable; the certificate holds in M0, is kept by every firing and excludes the goal."""
+    assert found.reachable in (False, None)
+    if found.reachable is None:
+        assert found.bound
+        assert found.certificate is None
+        return
+    player = Player(net)
+    assert not any(holds(net, goal, marking) for marking in player.reachable())
+    assert certified(net, found.certificate, net.initial_marking)
+    for marking in range(1 << len(net.places)):
+        if certified(net, found.certificate, marking):
+            assert not holds(net, goal, marking)
+            assert all(certified(net, found.certificate, after) for _, after in player.successors(marking))
+
+
+@st.composite
+def nets_with_goals(draw: st.DrawFn) -> tuple[Net, Formula]:
+    net = draw(st.one_of(ring_nets(), dense_nets()))
+    goal = draw(formulas([p.name for p in net.places], [t.name for t in net.transitions]))
+    return net, goal
+
+
+@settings(max_examples=80, deadline=None)
+@given(nets_with_goals())
+def test_what_is_refuted_is_not_reachable_and_the_certificate_is_an_inductive_invariant(
+    drawn: tuple[Net, Formula],
+) -> None:
+    net, goal = drawn
+    check_finding(net, goal, decide_by_state_equation(net, goal, Limits()))
+
+
+@pytest.mark.parametrize("name", reference_names())
+def test_every_pair_of_places_never_marked_together_in_a_reference_net_is_refuted_or_left_open(name: str) -> None:
+    net = load_net(name)
+    reachable = Player(net).reachable()
+    for other in net.places[1:4]:
+        goal = And((Holds(net.places[0].name), Holds(other.name)))
+        found = decide_by_state_equation(net, goal, Limits())
+        assert found.reachable is None or not any(holds(net, goal, marking) for marking in reachable)
+
+
+def test_the_cell_is_free_of_deadlock_by_units_and_traps_alone() -> None:
+    assert decide_by_state_equation(load_net("cell1"), Deadlock(), Limits()).reachable is False
+    assert decide_by_state_equation(load_net("cell1_mc_late"), Deadlock(), Limits()).reachable is None
+
+
+def test_a_trap_refutes_what_the_state_equation_alone_cannot() -> None:
+    """Each of two tokens is taken only while the other is there: the sums allow that both are gone."""
+    net = Net(
+        "n",
+        (Place("p", marked=True), Place("q", marked=True)),
+        (Transition("t", ("p",), permissive=("q",)), Transition("u", ("q",), permissive=("p",))),
+    )
+    goal = And((Not(Holds("p")), Not(Holds("q"))))
+    found = decide_by_state_equation(net, goal, Limits())
+    assert found.reachable is False
+    check_finding(net, goal, found)
+    assert found.certificate == InductiveInvariant(clauses=(Clause(marked=("p", "q")),))
+
+
+def test_a_place_that_no_token_can_come_to_keeps_transitions_dead() -> None:
+    net = Net("n", (Place("p", marked=True), Place("q"), Place("r")), (Transition("t", ("p", "q"), ("r",)),))
+    found = decide_by_state_equation(net, Firable("t"), Limits())
+    assert found.reachable is False
+    check_finding(net, Firable("t"), found)
+    assert decide_by_state_equation(net, Holds("r"), Limits()).reachable is False
+
+
+def test_a_goal_that_nothing_satisfies_needs_no_constraint() -> None:
+    found = decide_by_state_equation(Net("n", (Place("p"),)), Constant(value=False), Limits())
+    assert found.reachable is False
+
+
+def test_a_limit_or_a_flag_leaves_the_goal_undecided() -> None:
+    net, flag = load_net("cell1"), Event()
+    assert decide_by_state_equation(net, Deadlock(), Limits(Deadline.after(0))).bound == "the time was over"
+    assert decide_by_state_equation(net, Deadlock(), Limits(Deadline(cancelled=flag))).reachable is False
+    flag.set()
+    assert decide_by_state_equation(net, Deadlock(), Limits(Deadline(cancelled=flag))).reachable is None
+
+
+def test_an_inequality_excludes_what_a_sum_that_only_grows_cannot_come_back_to() -> None:
+    """A token that moved from p to q cannot come back; nothing but the direction of the arc says so."""
+    net = Net("n", (Place("p", marked=True), Place("q")), (Transition("t", ("p",), ("q",)), Transition("u", ("q",))))
+    goal = And((Holds("p"), Holds("q")))
+    found = decide_by_state_equation(net, goal, Limits())
+    check_finding(net, goal, found)
+    assert found.reachable is False
+    assert isinstance(found.certificate, InductiveInvariant)
+    assert found.certificate.inequalities
