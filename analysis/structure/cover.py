@@ -18,8 +18,8 @@ producer and one consumer, a cycle of firings that may fork and join but never c
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Final
 
 from firable.analysis.deadline import NEVER, Deadline
@@ -57,7 +57,7 @@ def cover(
     >>> cover([{0: -1, 1: 1, 2: 1}, {1: -1, 2: -1, 0: 1}], 3)
     Cover(units=((0, 1), (0, 2)), uncovered=(), complete=True)
     """
-    search = _Search(distinct(equations), n_variables, marked, n_variables if tokens_max is None else tokens_max)
+    search = UnitSearch(equations, n_variables, marked, tokens_max)
     units: list[tuple[int, ...]] = []
     complete = True
     for start in range(n_variables):
@@ -69,7 +69,6 @@ def cover(
             break
         if unit:
             units.append(unit)
-            search.covered.update(unit)
     uncovered = tuple(v for v in range(n_variables) if v not in search.covered)
     return Cover(tuple(units), uncovered, complete)
 
@@ -78,32 +77,36 @@ Side = tuple[int, bool]
 """An equation, and which of its two signs."""
 
 
-@dataclass(slots=True)
-class _Search:
-    """The equations by their two sides, and the choice as it stands, with the trail by which it is taken back."""
+class UnitSearch:
+    """Looks for units one by one; what is in one that was found is `covered`.
 
-    equations: Sequence[Sparse]
-    n_variables: int
-    marked: frozenset[int]
-    tokens_max: int
-    covered: set[int] = field(default_factory=set)
-    sides: list[tuple[list[int], list[int]]] = field(init=False)
-    standing: list[list[Side]] = field(init=False)
-    chosen: set[int] = field(default_factory=set)
-    barred: dict[int, int] = field(default_factory=dict)
-    holder: dict[Side, int] = field(default_factory=dict)
-    open: dict[Side, None] = field(default_factory=dict)
-    tokens: int = 0
+    Holds the equations by their two sides, and the choice as it stands, with the order in which it is taken back.
+    """
 
-    def __post_init__(self) -> None:
-        self.sides = [([], []) for _ in self.equations]
-        self.standing = [[] for _ in range(self.n_variables)]
-        for number, equation in enumerate(self.equations):
+    def __init__(
+        self,
+        equations: Iterable[Sparse],
+        n_variables: int,
+        marked: frozenset[int] = frozenset(),
+        tokens_max: int | None = None,
+    ) -> None:
+        kept = distinct(equations)
+        self.marked = marked
+        self.tokens_max = n_variables if tokens_max is None else tokens_max
+        self.covered = set[int]()
+        self.sides: list[tuple[list[int], list[int]]] = [([], []) for _ in kept]
+        self.standing: list[list[Side]] = [[] for _ in range(n_variables)]
+        for number, equation in enumerate(kept):
             for variable, coefficient in equation.items():
                 self.sides[number][coefficient > 0].append(variable)
                 self.standing[variable].append((number, coefficient > 0))
+        self.chosen = set[int]()
+        self.barred: dict[int, int] = {}
+        self.holder: dict[Side, int] = {}
+        self.open: dict[Side, None] = {}
+        self.tokens = 0
 
-    def unit(self, start: int, tries_max: int, deadline: Deadline) -> tuple[int, ...] | None:
+    def unit(self, start: int, tries_max: int = TRIES_MAX, deadline: Deadline = NEVER) -> tuple[int, ...] | None:
         """A unit through the start, the empty one where none was found; None where the deadline came first."""
         undo: list[int] = []  # the variables in the order they were taken
         branches: list[tuple[int, list[int]]] = []  # how much was done before a choice, and what is left to try
@@ -115,6 +118,7 @@ class _Search:
                 return None
             if alive and not self.open:
                 unit = tuple(sorted(self.chosen))
+                self.covered.update(unit)
                 self._back(undo, 0)
                 return unit
             if alive:

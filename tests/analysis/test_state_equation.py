@@ -8,50 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.inductive import check_finding, holds
 from support.reference import load_net, reference_names
 from support.ring_nets import ring_nets
 from support.whole_nets import formulas
 
 from firable.analysis.deadline import Deadline
-from firable.analysis.evidence.certificate import Certificate, Clause, InductiveInvariant
-from firable.analysis.goal import Finding, Limits
+from firable.analysis.evidence.certificate import Clause, InductiveInvariant
+from firable.analysis.goal import Limits
 from firable.analysis.structure.state_equation import decide_by_state_equation
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not
 from firable.nets.net import Net, Place, Transition
-from firable.semantics.algebra import BOOL
-from firable.semantics.formulas import evaluate
-from firable.semantics.player import Player, holds_in
-
-
-def holds(net: Net, formula: Formula, marking: int) -> bool:
-    return evaluate(BOOL, net, formula, holds_in(marking))
-
-
-def certified(net: Net, certificate: Certificate | None, marking: int) -> bool:
-    """Whether a marking satisfies the equations, inequalities and clauses."""
-    assert isinstance(certificate, InductiveInvariant)
-    full = set(net.names(marking))
-    return (
-        all(sum(w for p, w in e.weights if p in full) == e.tokens for e in certificate.equations)
-        and all(sum(w for p, w in i.weights if p in full) >= i.tokens for i in certificate.inequalities)
-        and all(full & set(clause.marked) or set(clause.empty) - full for clause in certificate.clauses)
-    )
-
-
-def check_finding(net: Net, goal: Formula, found: Finding) -> None:
-    """A refuted goal is not reachable; the certificate holds in M0, is kept by every firing and excludes the goal."""
-    assert found.reachable in (False, None)
-    if found.reachable is None:
-        assert found.bound
-        assert found.certificate is None
-        return
-    player = Player(net)
-    assert not any(holds(net, goal, marking) for marking in player.reachable())
-    assert certified(net, found.certificate, net.initial_marking)
-    for marking in range(1 << len(net.places)):
-        if certified(net, found.certificate, marking):
-            assert not holds(net, goal, marking)
-            assert all(certified(net, found.certificate, after) for _, after in player.successors(marking))
+from firable.semantics.player import Player
 
 
 @st.composite

@@ -1,0 +1,163 @@
+"""Contact excluded by invariants: a full output place where the inputs are there would be a token too many.
+
+At a contact the inputs and permissive gate places of a transition hold tokens, and so does one of its output places
+besides. If a unit with one token contains two of these places, that cannot be: one token is not in two places. A unit
+that contains the output place contains an input too, since units are balanced. So if every place that gets tokens is
+in a unit with at most one, the net is contact-free: it is 1-safe as an ordinary net. This is how an engineer knows it,
+and what cells, protocols and processes are made of; it takes a second for ten thousand places.
+
+Where no such unit is found for a place, an inequality is looked for that excludes the contact
+(`firable.analysis.structure.inequalities`): it may be weighted, or use that some transitions only ever fire in one
+direction. The first contact that neither excludes ends the search, for then nothing is proved; that it is reachable
+is not said. The rejected alternative, to list the minimal invariants first, waits for exponentially many of which a few
+are needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import Clause, Equation, InductiveInvariant
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.structure.cover import UnitSearch
+from firable.analysis.structure.inequalities import AtLeast, Refuter
+from firable.analysis.structure.invariants import columns
+from firable.analysis.structure.ordinary import Ordinary, markable, ordinary
+from firable.nets.net import Net
+from firable.nets.verdict import Cost
+
+METHOD = "units with one token"
+
+
+@dataclass(frozen=True, slots=True)
+class ContactProof:
+    """What excludes contact. `whole`: at every transition; `behaves`: at every one that does not contradict itself.
+
+    `units` and `inequalities` are what was used, `undecided` says of an unfinished proof where it ended.
+    """
+
+    whole: bool
+    behaves: bool
+    units: tuple[tuple[int, ...], ...]
+    inequalities: tuple[AtLeast, ...]
+    undecided: str = ""
+
+
+def decide_contact_by_invariants(net: Net, limits: Limits) -> Finding:
+    """Refute that a marking in contact is reachable; never says that one is.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> decide_contact_by_invariants(catalogue_net("one_robot"), Limits()).reachable
+    False
+    """
+    start = perf_counter()
+    proof = contact_proof(net, limits.deadline)
+    cost = Cost(seconds=perf_counter() - start)
+    if not proof.whole:
+        return Finding(None, METHOD, bound=proof.undecided, cost=cost)
+    names = [place.name for place in net.places]
+    of = ordinary(net)
+    certificate = InductiveInvariant(
+        tuple(Equation(tuple((names[p], 1) for p in unit), sum(p in of.marked for p in unit)) for unit in proof.units),
+        tuple(Clause(empty=(names[p],)) for p in sorted(set(range(of.n_places)) - markable(of))),
+        inequalities=tuple(inequality.named(net) for inequality in proof.inequalities),
+    )
+    return Finding(reachable=False, method=METHOD, cost=cost, certificate=certificate)
+
+
+def contact_proof(net: Net, deadline: Deadline) -> ContactProof:
+    """Exclude contact at one transition after the other, those first that can fire."""
+    search = _Search(net, deadline)
+    behaves = False
+    # Those that contradict themselves never fire, but are in contact where the inputs and an output place are full.
+    fires = set(search.of.transitions)
+    for late in (False, True):
+        for t, place in _contacts(net, fires, late=late):
+            if not search.excluded(t, place):
+                told = f"contact at {net.transitions[t].name} with {net.places[place].name} is not excluded"
+                return search.proof(whole=False, behaves=behaves, undecided=told)
+        behaves = True
+    return search.proof(whole=True, behaves=True, undecided="")
+
+
+def _contacts(net: Net, fires: set[int], *, late: bool) -> Iterator[tuple[int, int]]:
+    for t, transition in enumerate(net.transitions):
+        if (t in fires) is not late:
+            yield from ((t, net.place_index[name]) for name in transition.outputs if name not in transition.inputs)
+
+
+class _Search:
+    """The units found so far, by their places, and what they leave to inequalities."""
+
+    def __init__(self, net: Net, deadline: Deadline) -> None:
+        self.net, self.deadline, self.of = net, deadline, ordinary(net)
+        self.may_be_marked = markable(self.of)
+        self.changes = columns(net)
+        self.search = UnitSearch(self.changes, self.of.n_places, self.of.marked, 1)
+        self.units: list[tuple[frozenset[int], int]] = []
+        self.at: dict[int, list[int]] = {}
+        self.used: dict[int, None] = {}
+        self.tried: set[int] = set()
+        self.inequalities: list[AtLeast] = []
+
+    def excluded(self, t: int, place: int) -> bool:
+        """Whether no reachable marking has the inputs and permissive gates of a transition full, and this place."""
+        transition, index = self.net.transitions[t], self.net.place_index
+        full = {index[name] for name in (*transition.inputs, *transition.permissive)} | {place}
+        empty = {index[name] for name in transition.inhibitive}
+        if full & empty or not full <= self.may_be_marked:
+            return True
+        if self._by_unit(full, full) or self._by_inequality(full, empty):
+            return True
+        if place not in self.tried and place not in self.at:
+            self.tried.add(place)
+            unit = self.search.unit(place, deadline=self.deadline)
+            if unit:
+                self._add(unit)
+                return self._by_unit(full, {place})
+        found = self._refuter.inequality(full, empty, self.deadline)
+        if found is not None:
+            self.inequalities.append(found)
+        return found is not None
+
+    def _by_unit(self, full: set[int], places: set[int]) -> bool:
+        for place in places:
+            for k in self.at.get(place, ()):
+                unit, tokens = self.units[k]
+                if len(full & unit) > tokens:
+                    self.used[k] = None
+                    return True
+        return False
+
+    def _by_inequality(self, full: set[int], empty: set[int]) -> bool:
+        return any(
+            sum(weight if p in full else max(0, weight) for p, weight in found.weights if p not in empty) < found.tokens
+            for found in self.inequalities
+        )
+
+    def _add(self, unit: tuple[int, ...]) -> None:
+        self.units.append((frozenset(unit), len(self.of.marked.intersection(unit))))
+        for place in unit:
+            self.at.setdefault(place, []).append(len(self.units) - 1)
+
+    @cached_property
+    def _refuter(self) -> Refuter:
+        # Only the transitions that can fire: the certificate says which places they are that stay empty.
+        fires = (t for k, t in enumerate(self.of.transitions) if self.may_be_marked.issuperset(self.of.inputs[k]))
+        return Refuter([self.changes[t] for t in fires], self.of.n_places, self.of.marked)
+
+    def proof(self, *, whole: bool, behaves: bool, undecided: str) -> ContactProof:
+        """What was found, with the units that were needed."""
+        units = tuple(tuple(sorted(self.units[k][0])) for k in self.used)
+        told = "the time was over" if undecided and self.deadline.over else undecided
+        return ContactProof(whole, behaves, units, tuple(self.inequalities), told)
+
+
+def covered(of: Ordinary, proof: ContactProof) -> bool:
+    """Whether every place that has arcs is in a unit of the proof: the net has a positive P-invariant."""
+    within = {p for unit in proof.units for p in unit}
+    return all(p in within for p in range(of.n_places) if of.consumers[p] or of.producers[p])
