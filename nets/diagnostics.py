@@ -45,6 +45,7 @@ CODES: Final[dict[str, str]] = {
     "F1015": "not valid JSON",
     "F1016": "not carried over by the conversion",
     "F1017": "the file cannot be written",
+    "F1018": "not a file of queries",
     # F2: the net
     "F2001": "duplicate name",
     "F2002": "unknown place",

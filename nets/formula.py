@@ -32,6 +32,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from firable.nets.formula_tokens import tokens_of
+
 
 @dataclass(frozen=True, slots=True)
 class Constant:
@@ -125,16 +127,6 @@ class FormulaError(ValueError):
         self.column = column
 
 
-_SIGN: Final = r"<=|>=|!=|=|<|>"
-_END: Final = r"(?=\s|[()\[\],]|->|$)"
-_TOKEN: Final = re.compile(
-    rf"""\s*(?:(?P<symbol>->|[()\[\],])
-        |"(?P<quoted>[^\s"]+)"{_END}
-        |(?P<number>[0-9]+)(?=\s*(?:{_SIGN})\s*tokens\s*\()
-        |(?P<name>[^\s()\[\],]+?){_END})""",
-    re.VERBOSE,
-)
-_IN_COMPARISON: Final = re.compile(rf"\s*(?:(?P<sign>{_SIGN}|\+)|(?P<number>[0-9]+)(?=\s*(?:{_SIGN}|[()\]]|\s|->|$)))")
 _KEYWORDS: Final = frozenset({"and", "or", "not"})
 _SYMBOLS: Final = frozenset({"->", "(", ")", "[", "]", ","})
 _NUMBER: Final = re.compile(r"[0-9]{1,9}")
@@ -144,43 +136,33 @@ CONSTANT_ATOMS: Final = frozenset({"true", "false", "start", "deadlock"})
 """Words that are atoms by themselves, so a place of that name is named in quotes."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Token:
-    text: str
-    column: int
-    quoted: bool = False
-
-
-def _tokens(text: str) -> Iterator[_Token]:
-    # Nothing is passed over but blanks: every other character is a symbol or part of a name. `<` and `+` may be part of
-    # a name too, but no name can follow a closing bracket.
-    position, comparing = 0, False
-    while True:
-        match = (_IN_COMPARISON.match(text, position) if comparing else None) or _TOKEN.match(text, position)
-        if match is None:
-            return
-        kind = match.lastgroup or ""
-        position = match.end()
-        comparing = kind in {"sign", "number"} or match[kind] == ")"
-        yield _Token(match[kind], match.start(kind), kind == "quoted")
-
-
-class _Parser:
-    """Recursive descent over the grammar of the module's docstring."""
+class FormulaParser:
+    """Recursive descent over the grammar of the module's docstring, which others extend; `atom` is where it ends."""
 
     def __init__(self, text: str) -> None:
-        self.tokens = list(_tokens(text))
+        self.tokens = list(tokens_of(text))
         self.position = 0
         self.end = len(text)
         self.depth = 0
 
     def peek(self) -> str | None:
+        """The next token, or None at the end."""
         return self.tokens[self.position].text if self.position < len(self.tokens) else None
 
     def column(self) -> int:
+        """Where the next token stands."""
         return self.tokens[self.position].column if self.position < len(self.tokens) else self.end
 
+    def quoted(self) -> bool:
+        """Whether a name in quotes stands here."""
+        return self.position < len(self.tokens) and self.tokens[self.position].quoted
+
+    def following(self) -> str:
+        """What stands after the next token."""
+        return self.tokens[self.position + 1].text if self.position + 1 < len(self.tokens) else ""
+
     def take(self) -> str:
+        """Go past the next token, and give it."""
         token = self.peek()
         if token is None:
             raise FormulaError("the formula ends too early", self.end)
@@ -188,6 +170,7 @@ class _Parser:
         return token
 
     def expect(self, wanted: str) -> None:
+        """Go past the next token, which must be this one."""
         column = self.column()
         found = self.peek()
         if found != wanted:
@@ -201,6 +184,7 @@ class _Parser:
             raise FormulaError(f"nests too deeply, more than {NESTING_MAX} levels", self.column())
 
     def implication(self) -> Formula:
+        """A formula."""
         left = self.disjunction()
         if self.peek() == "->":
             self.take()
@@ -211,6 +195,7 @@ class _Parser:
         return left
 
     def disjunction(self) -> Formula:
+        """What `->` joins."""
         operands = [self.conjunction()]
         while self.peek() == "or":
             self.take()
@@ -218,6 +203,7 @@ class _Parser:
         return operands[0] if len(operands) == 1 else Or(tuple(operands))
 
     def conjunction(self) -> Formula:
+        """What `or` joins."""
         operands = [self.literal()]
         while self.peek() == "and":
             self.take()
@@ -225,6 +211,7 @@ class _Parser:
         return operands[0] if len(operands) == 1 else And(tuple(operands))
 
     def literal(self) -> Formula:
+        """What `and` joins."""
         # `not not not ...` is a loop, so that only parentheses nest.
         negations = 0
         while self.peek() == "not":
@@ -240,16 +227,17 @@ class _Parser:
     def name(self, of: str) -> str:
         """The name that stands here, in quotes or not."""
         column = self.column()
-        quoted = self.position < len(self.tokens) and self.tokens[self.position].quoted
+        quoted = self.quoted()
         name = self.take()
         if not quoted and (name in _SYMBOLS or name in _KEYWORDS):
             raise FormulaError(f"expected the name of a {of}, found {name!r}", column)
         return name
 
     def atom(self) -> Formula:
-        if self.tokens[self.position : self.position + 1] and self.tokens[self.position].quoted:
+        """What `not` stands before."""
+        if self.quoted():
             return Holds(self.take())
-        following = self.tokens[self.position + 1].text if self.position + 1 < len(self.tokens) else ""
+        following = self.following()
         match self.peek():
             case "(":
                 self.take()
@@ -284,6 +272,7 @@ class _Parser:
         return name
 
     def comparison(self) -> Formula:
+        """Two counts and the sign between them."""
         left, column = self.counted(), self.column()
         sign = self.take()
         if sign not in {*Sign}:
@@ -291,6 +280,7 @@ class _Parser:
         return Compare(left, Sign(sign), self.counted())
 
     def counted(self) -> Count:
+        """A side of a comparison."""
         if self.peek() != "tokens":
             return Count(added=self.number())
         self.take()
@@ -306,6 +296,7 @@ class _Parser:
         return Count(tuple(places), self.number())
 
     def number(self) -> int:
+        """A number, not too large to be meant."""
         column = self.column()
         token = self.take()
         if not _NUMBER.fullmatch(token):
@@ -324,7 +315,7 @@ def parse_formula(text: str) -> Formula:
     Traceback (most recent call last):
     firable.nets.formula.FormulaError: the formula ends too early
     """
-    parser = _Parser(text)
+    parser = FormulaParser(text)
     formula = parser.implication()
     if parser.peek() is not None:
         raise FormulaError(f"unexpected {parser.peek()!r}", parser.column())

@@ -7,9 +7,9 @@ content alone would let a broken PNML file be reported as broken YAML.
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -26,11 +26,15 @@ TEXT_SUFFIXES: Final = frozenset({".yaml", ".yml"})
 
 @dataclass(frozen=True)
 class Loaded:
-    """A net, what of its file it does not carry (nothing, for a net file), and where its parts stand in the file."""
+    """A net, what of its file it does not carry (nothing, for a net file), and where its parts stand in the file.
+
+    `renamed` holds the names that the net has for identifiers of a PNML file that are no names here.
+    """
 
     net: Net
     notes: tuple[Diagnostic, ...] = ()
     positions: Positions | None = None
+    renamed: Mapping[str, str] = field(default_factory=dict)
 
     @contextmanager
     def placing(self) -> Generator[None]:
@@ -54,7 +58,7 @@ def load(path: str | Path) -> Loaded:
     suffix = Path(path).suffix.lower()
     if suffix in PNML_SUFFIXES or (suffix not in TEXT_SUFFIXES and _looks_like_xml(head)):
         imported = pnml.read_pnml(path)
-        return Loaded(imported.net, imported.notes)
+        return Loaded(imported.net, imported.notes, renamed=imported.renamed)
     net, positions = text.read_positioned(path)
     return Loaded(net, positions=positions)
 

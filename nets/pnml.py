@@ -16,7 +16,7 @@ The ordinary firing rule lets a token pile up where the contact rule blocks; the
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -46,10 +46,11 @@ _PT_TYPES: Final = re.compile(r"symmetric|highlevel|high-level|hlpng|colou?red|s
 
 @dataclass(frozen=True)
 class PnmlImport:
-    """A net read from PNML, and what of the file it does not carry."""
+    """A net read from PNML, what of the file it does not carry, and the names that it has for other identifiers."""
 
     net: Net
     notes: tuple[Diagnostic, ...]
+    renamed: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_pnml(path: str | Path) -> PnmlImport:
@@ -70,7 +71,8 @@ def parse_pnml(data: bytes | str, file: str = "<pnml>") -> PnmlImport:
     source = Source(file, data.decode("utf-8-sig", "replace"))
     with without_cycle_search():
         importing = _Import(source, parse_xml(source, data, encoding))
-        return PnmlImport(importing.net(), tuple(importing.notes()))
+        net = importing.net()
+        return PnmlImport(net, tuple(importing.notes()), importing.renamed)
 
 
 @dataclass(slots=True)
@@ -91,7 +93,7 @@ class _Import:
         self.records = records
         self.problems: list[Diagnostic] = []
         self.self_loops: list[str] = []
-        self.renamed: list[str] = []
+        self.renamed: dict[str, str] = {}
         self.capacities: list[str] = []
 
     def refuse(self, record: Record, code: str, message: str, hint: str) -> None:
@@ -161,7 +163,7 @@ class _Import:
                 name = f"{base}_{suffix[base]}"
             taken.add(name)
             names[one] = name
-            self.renamed.append(f"{quoted(one)} is '{name}'")
+            self.renamed[one] = name
         return names
 
     def references(self, nodes: dict[str, Record]) -> dict[str, str]:
@@ -317,8 +319,9 @@ class _Import:
                 "each such pair of arcs is read as a permissive gate",
             )
         if self.renamed:
+            renamed = [f"{quoted(one)} is '{name}'" for one, name in self.renamed.items()]
             yield note(
-                f"{len(self.renamed):,} identifiers are no names here: {_few(self.renamed)}",
+                f"{len(self.renamed):,} identifiers are no names here: {_few(renamed)}",
                 "a name has no blanks, brackets, quotes or YAML signs",
             )
         if self.capacities:

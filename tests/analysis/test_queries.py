@@ -1,0 +1,149 @@
+"""Queries of each kind, and their verdicts."""
+
+from itertools import product as all_pairs
+
+import pytest
+from hypothesis import given
+from support.dense_nets import dense_nets
+from support.naive_space import NaiveSpace
+from support.ring_nets import ring_nets
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.spaces.reachability import Budget, explore
+from firable.analysis.temporal.automaton import TimeEndedError, TooLargeError, automaton_of, positive
+from firable.analysis.temporal.queries import answer, as_goal, upper_bound
+from firable.nets.catalogue import catalogue_net
+from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
+from firable.nets.queries import parse_query
+from firable.nets.temporal import parse_temporal
+from firable.nets.verdict import Status, Verdict
+
+CELL = catalogue_net("one_robot")
+LATE = catalogue_net("one_robot_mc_late")
+
+
+def ask(net: Net, text: str, **limits: int) -> Verdict:
+    return answer(explore(net, budget=Budget(**limits)), parse_query(text))
+
+
+@pytest.mark.parametrize(
+    ("net", "text", "status"),
+    [
+        (CELL, "AG EF start", Status.PROVED),
+        (LATE, "AG EF start", Status.VIOLATED),
+        (LATE, "EF deadlock", Status.PROVED),
+        (CELL, "AG not deadlock", Status.PROVED),
+        (CELL, "live", Status.PROVED),
+        (LATE, "live", Status.VIOLATED),
+        (LATE, "quasi_live", Status.PROVED),
+        (CELL, "stable_marking", Status.VIOLATED),
+        (CELL, "one_safe", Status.PROVED),
+    ],
+)
+def test_the_example_cell_is_asked(net: Net, text: str, status: Status) -> None:
+    verdict = ask(net, text)
+    assert verdict.status is status
+    assert verdict.name == "query.query"
+
+
+def test_a_bound_is_found_and_shown() -> None:
+    verdict = ask(CELL, "bound tokens(robot.free, robot.free, mc.free)")
+    assert verdict.status is Status.PROVED
+    assert verdict.statement.endswith("is 3")
+    assert verdict.witness is not None
+    assert verdict.witness.firings == ()
+
+
+@given(ring_nets())
+def test_the_bound_is_the_most_tokens_of_any_marking(net: Net) -> None:
+    space = NaiveSpace(net)
+    for places in all_pairs("ab", "ba", "ab"):
+        counts = (sum(marking >> net.place_index[p] & 1 for p in places) for marking in space.graph)
+        assert upper_bound(explore(net), places) == max(counts)
+
+
+@given(ring_nets(signals=True))
+def test_liveness_is_that_of_ctl(net: Net) -> None:
+    space = explore(net)
+    names = [transition.name for transition in net.transitions]
+    for kind, formula in (("live", "AG EF firable({})"), ("quasi_live", "EF firable({})")):
+        each = [answer(space, parse_query(formula.format(name))).status is Status.PROVED for name in names]
+        verdict = answer(space, parse_query(kind))
+        assert verdict.status is (Status.PROVED if all(each) else Status.VIOLATED)
+        assert set(verdict.subjects) == {name for name, holds in zip(names, each, strict=True) if not holds}
+
+
+def ordinary_is_safe(net: Net) -> bool:
+    """Whether the net without the contact rule keeps one token on every place."""
+    start = tuple(int(place.marked) for place in net.places)
+    todo, seen = [start], {start}
+    for tokens in todo:
+        for t in net.transitions:
+            at = net.place_index
+            if not t.openable or not all(tokens[at[p]] for p in (*t.inputs, *t.permissive)):
+                continue
+            if any(tokens[at[p]] for p in t.inhibitive):
+                continue
+            change = [(p.name in t.outputs) - (p.name in t.inputs) for p in net.places]
+            after = tuple(now + by for now, by in zip(tokens, change, strict=True))
+            if max(after) > 1:
+                return False
+            if after not in seen:
+                seen.add(after)
+                todo.append(after)
+    return True
+
+
+@given(dense_nets(signals=True))
+def test_one_safe_speaks_of_the_net_without_the_contact_rule(net: Net) -> None:
+    verdict = ask(net, "one_safe")
+    if any(t.self_loops for t in net.transitions):
+        assert verdict.status is Status.UNKNOWN
+    else:
+        assert verdict.status is (Status.PROVED if ordinary_is_safe(net) else Status.VIOLATED)
+
+
+def test_a_contact_that_no_valuation_opens_is_none() -> None:
+    both = (ExternalGate("s"), ExternalGate("s", wanted=False))
+    net = Net("n", (Place("p", marked=True),), (Transition("t", (), ("p",), external=both),), (Signal("s"),))
+    assert ask(net, "one_safe").status is Status.PROVED
+
+
+def test_a_stable_place_is_named() -> None:
+    net = Net("n", (Place("p", marked=True), Place("q")), (Transition("t", (), ("q",)),))
+    assert ask(net, "stable_marking").subjects == ("p",)
+
+
+@pytest.mark.parametrize("text", ["AG EF start", "G F start", "AG not deadlock", "live", "stable_marking", "one_safe",
+                                  "bound tokens(robot.free)", "AF start", "F deadlock"])  # fmt: skip
+def test_without_all_markings_nothing_is_proved(text: str) -> None:
+    verdict = ask(CELL, text, markings=10)
+    assert verdict.status is Status.UNKNOWN
+    assert (verdict.code, verdict.bound != "") == ("F3004", True)
+
+
+def test_one_marking_decides_what_one_marking_can() -> None:
+    assert ask(CELL, "EF not start", markings=10).status is Status.PROVED
+    for text in ("AG start", "G start"):
+        assert ask(CELL, text, markings=10).status is Status.VIOLATED
+
+
+@pytest.mark.parametrize("text", ["EF p", "AG not p", "G p"])
+def test_a_goal_decides_what_it_can(text: str) -> None:
+    assert as_goal(parse_query(text)) is not None
+    assert as_goal(parse_query(f"{text} and X p" if text == "G p" else f"{text} and EX p")) is None
+
+
+def test_the_time_ends_a_search_for_a_run() -> None:
+    verdict = answer(explore(CELL), parse_query("G F X start"), Deadline.after(0))
+    assert (verdict.status, verdict.code) == (Status.UNKNOWN, "F3004")
+
+
+def test_an_automaton_that_is_too_large_is_not_made() -> None:
+    formula = positive(parse_temporal(" and ".join(f"F (p{i} and X q{i})" for i in range(5))))
+    with pytest.raises(TooLargeError, match="states"):
+        automaton_of(formula, states_max=100)
+    with pytest.raises(TooLargeError, match="alternatives"):
+        automaton_of(formula, states_max=5)
+    with pytest.raises(TimeEndedError):
+        automaton_of(formula, deadline=Deadline.after(0))

@@ -1,0 +1,105 @@
+"""The formulas of the model-checking contest come out with its published verdicts.
+
+The nets and formulas are not part of the repository: see `test_public_nets`. Nets with more than `MARKINGS_MAX`
+markings are left to the benchmarks, and of a net that is not 1-safe as an ordinary net only that is compared: the rest
+speaks of tokens that the contact rule keeps back. The verdicts are numbered in the order of the formulas' names.
+"""
+
+import csv
+import os
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from firable.analysis.spaces.reachability import ReachabilityGraph, explore
+from firable.analysis.temporal.queries import answer
+from firable.nets.loading import load
+from firable.nets.queries import QueryKind, parse_query, read_queries
+from firable.nets.verdict import Status, Verdict
+
+FOLDER = os.environ.get("FIRABLE_NETS", "")
+MARKINGS_MAX: Final = 10_000
+EXAMINATIONS: Final = (
+    "CTLCardinality",
+    "CTLFireability",
+    "LTLCardinality",
+    "LTLFireability",
+    "ReachabilityCardinality",
+    "ReachabilityFireability",
+    "UpperBounds",
+)
+GLOBAL: Final = {
+    "contest_deadlock": "EF deadlock",
+    "contest_live": "live",
+    "contest_quasi_live": "quasi_live",
+    "contest_stable_marking": "stable_marking",
+}
+STATUS: Final = {Status.PROVED: "TRUE", Status.VIOLATED: "FALSE", Status.UNKNOWN: "unknown"}
+
+
+def table(name: str) -> list[dict[str, str]]:
+    if not (Path(FOLDER) / name).is_file():
+        return []
+    with (Path(FOLDER) / name).open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream, delimiter="\t"))
+
+
+def nets() -> list[str]:
+    asked = {row["net"] for row in table("queries/expected.tsv")} if FOLDER else set()
+    return [
+        row["file"]
+        for row in (table("expected.tsv") if FOLDER else [])
+        if Path(row["file"]).stem in asked
+        and row["one_safe"] == "yes"
+        and row["markings"]
+        and int(row["markings"]) <= MARKINGS_MAX
+    ]
+
+
+def published() -> dict[tuple[str, str, int], str]:
+    rows = table("queries/expected.tsv")
+    return {(row["net"], row["examination"], int(row["index"])): row["value"] for row in rows}
+
+
+def value(verdict: Verdict, kind: QueryKind) -> str:
+    if kind is QueryKind.BOUND and verdict.status is Status.PROVED:
+        return verdict.statement.rpartition(" is ")[2]
+    return STATUS[verdict.status]
+
+
+def space_of(file: str) -> tuple[ReachabilityGraph, dict[str, str]]:
+    loaded = load(Path(FOLDER) / file)
+    return explore(loaded.net), dict(loaded.renamed)
+
+
+@pytest.mark.skipif(not FOLDER, reason="FIRABLE_NETS does not name the folder of the public nets")
+@pytest.mark.parametrize("file", nets())
+def test_the_formulas_of_the_contest_have_their_published_values(file: str) -> None:
+    (graph, renamed), net, expected = space_of(file), Path(file).stem, published()
+    compared = 0
+    for examination in EXAMINATIONS:
+        queries = read_queries(Path(FOLDER) / "queries" / net / f"{examination}.xml", graph.net, renamed)
+        for index, query in enumerate(sorted(queries, key=lambda query: query.name)):
+            if (wanted := expected.get((net, examination, index))) is not None:
+                assert value(answer(graph, query), query.kind) == wanted, query.name
+                compared += 1
+    assert compared > 80
+
+
+@pytest.mark.skipif(not FOLDER, reason="FIRABLE_NETS does not name the folder of the public nets")
+def test_the_global_questions_of_the_contest_have_their_published_values() -> None:
+    compared = 0
+    for row in table("expected.tsv"):
+        if not row["markings"] or int(row["markings"]) > MARKINGS_MAX or not row["contest_one_safe"]:
+            continue
+        graph, _ = space_of(row["file"])
+        asked = {"contest_one_safe": "one_safe"}
+        if row["one_safe"] == "yes":
+            asked |= GLOBAL
+        for column, text in asked.items():
+            if row[column]:
+                query = parse_query(text, column)
+                assert value(answer(graph, query), query.kind) == row[column], (row["file"], column)
+                compared += 1
+    assert compared > 40
