@@ -193,6 +193,8 @@ class Graph:
 
         Needs the whole graph.
         """
+    def bottom(self, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None) -> bytes:
+        """The bitmap of the bottom component that has the lowest marking. Needs the whole graph."""
     def effective_conflicts(
         self,
         pairs: list[tuple[int, int]],

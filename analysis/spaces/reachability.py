@@ -24,7 +24,7 @@ import numpy.typing as npt
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.spaces.space import Derived, WitnessError, Witnesses
+from firable.analysis.spaces.space import Derived, Witnesses
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
@@ -46,7 +46,6 @@ __all__ = [
     "indexes",
 ]
 
-_Offsets = npt.NDArray[np.intp]
 Column = npt.NDArray[np.bool_]
 """A set of markings of a graph: one Boolean for each index."""
 
@@ -218,42 +217,8 @@ class ReachabilityGraph(Derived):
 
     def before(self, targets: Column, by: Iterable[int] | None = None) -> Column:
         """The markings with an edge into the targets (EX); with `by`, an edge that fires one of these transitions."""
-        found = self.none()
-        if by is not None and self.discipline is Discipline.STEP:
-            chosen = set(by)
-            for index in range(self.n_markings):
-                edges = self.successors(index)
-                found[index] = any(targets[target] and not chosen.isdisjoint(fired) for fired, target in edges)
-            return found
-        _, reached, rows, starts = self._rows
-        if len(reached):
-            hits = targets[reached]
-            if by is not None:
-                wanted = np.zeros(len(self.net.transitions), dtype=np.bool_)
-                wanted[list(by)] = True
-                hits &= wanted[self._fired_on]
-            found[rows] = np.logical_or.reduceat(hits, starts)
-        return found
-
-    @cached_property
-    def _rows(self) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint32], npt.NDArray[np.int64], _Offsets]:
-        """The edges as compressed rows, the markings that have any, and where the row of each of these begins."""
-        self.require_complete()
-        offsets, targets = self.edges()
-        rows = np.flatnonzero(offsets[1:] > offsets[:-1])
-        return offsets, targets, rows, offsets[rows].astype(np.intp)
-
-    @cached_property
-    def _fired_on(self) -> npt.NDArray[np.uint32]:
-        """The transition that fires on each edge, under interleaving, where rows are in the order of transitions."""
-        offsets, targets, _, _ = self._rows
-        fired = np.empty(len(targets), dtype=np.uint32)
-        following = offsets[:-1].astype(np.int64)
-        for t in range(len(self.net.transitions)):
-            sources = np.flatnonzero(self.may_fire(t))
-            fired[following[sources]] = t
-            following[sources] += 1
-        return fired
+        bitmap = self.engine.before(targets.tobytes(), None if by is None else list(by), **self._limits)
+        return _column(bitmap)
 
     def backward(self, targets: Column, within: Column | None = None) -> Column:
         """The markings from which a target can be reached (EF), going only through `within` (E[within U targets])."""
@@ -262,16 +227,11 @@ class ReachabilityGraph(Derived):
 
     def endless(self, within: Column | None = None) -> Column:
         """The markings from which a run can go on for ever inside `within` (EG over infinite runs only)."""
-        return self.backward(self.components(within).nontrivial, within)
+        return _column(self.engine.endless(None if within is None else within.tobytes(), **self._limits))
 
     def bottom(self) -> Column:
         """The markings of the bottom component that is nearest to M0."""
-        components = self.components()
-        nearest = first(components.bottom[components.of])
-        if nearest is None:
-            raise WitnessError("a finite graph has a bottom component")
-        found: Column = components.of == components.of[nearest]
-        return found
+        return _column(self.engine.bottom(**self._limits))
 
     def contacts(self) -> Sequence[int]:
         """For each transition, in how many markings found it is in contact."""

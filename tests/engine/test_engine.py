@@ -316,6 +316,8 @@ def test_live_home_and_reversible_follow_from_reachability(net: Drawn, step: boo
     assert graph.reversible() == all(0 in reach[i] for i in everything)
     home = {j for j in everything if all(j in reach[i] for i in everything)}
     assert graph.home_markings() == bitmap(graph, home)
+    nearest = next(i for i in everything if all(i in reach[j] for j in reach[i]))
+    assert graph.bottom() == bitmap(graph, reach[nearest])
 
 
 @both

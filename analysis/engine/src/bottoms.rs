@@ -28,6 +28,7 @@ use crate::explore::Space;
 use crate::fan::Fan;
 use crate::marking::Width;
 use crate::scc::{self, Scc};
+use crate::table::NONE;
 use crate::with_width;
 
 /// What follows from the bottom components.
@@ -37,8 +38,10 @@ pub struct Bottoms {
     pub reversible: bool,
     /// For each transition, whether it fires in every bottom component.
     pub live: Vec<bool>,
-    /// The home markings, one byte each: the bottom component where there is one, else none. Empty where all are.
-    pub home: Vec<u8>,
+    /// The bottom component with the lowest marking, one byte for each marking; empty where all markings are one.
+    pub nearest: Vec<u8>,
+    /// Whether there is no other bottom component, so that its markings are the home markings.
+    pub only: bool,
 }
 
 impl Bottoms {
@@ -76,7 +79,7 @@ impl Bottoms {
     /// All markings are one component.
     fn whole(space: &Space) -> Self {
         let live = space.fired.iter().map(|&edges| edges > 0).collect();
-        Bottoms { reversible: true, live, home: Vec::new() }
+        Bottoms { reversible: true, live, nearest: Vec::new(), only: true }
     }
 
     fn of_components(space: &Space, memory: &Memory, watch: &mut Watch<'_>) -> Result<Self, Stop> {
@@ -85,9 +88,11 @@ impl Bottoms {
         if scc.sizes.len() == 1 {
             return Ok(Bottoms::whole(space));
         }
-        let count = scc.bottom.iter().filter(|&&bottom| bottom != 0).count();
-        let home = scc.of.iter().map(|&of| if count == 1 { scc.bottom[of as usize] } else { 0 }).collect();
-        Ok(Bottoms { reversible: false, live: scc::live(space, &scc, watch)?, home })
+        let only = scc.bottom.iter().filter(|&&bottom| bottom != 0).count() == 1;
+        let lowest = scc.of.iter().copied().find(|&of| scc.bottom[of as usize] != 0);
+        let nearest = scc.of.iter().map(|&of| u8::from(Some(of) == lowest)).collect();
+        let live = scc::live(space, &scc, watch)?;
+        Ok(Bottoms { reversible: false, live, nearest, only })
     }
 }
 
@@ -193,7 +198,8 @@ fn search<W: Width>(
 ) -> Result<Option<Bottoms>, Stop> {
     let count = space.net.transitions.len();
     let mut seen = Bits::new(space.len(), memory)?;
-    let mut inside = Bits::new(space.len(), memory)?;
+    let mut nearest: Vec<u32> = Vec::new();
+    let mut lowest = NONE;
     let mut live = vec![true; count];
     let mut fires = vec![false; count];
     let mut bottoms = 0;
@@ -202,13 +208,13 @@ fn search<W: Width>(
     let mut batch = Vec::with_capacity(64);
     let mut wasted = 0;
     for &from in left {
-        if bottoms > 1 && !live.contains(&true) {
-            break;
-        }
         if space.deadlocks.binary_search(&from).is_ok() {
             bottoms += 1;
             live.fill(false);
-            inside.add(from as usize);
+            if from < lowest {
+                lowest = from;
+                nearest = vec![from];
+            }
             continue;
         }
         if tops[from as usize] != from {
@@ -250,8 +256,10 @@ fn search<W: Width>(
             for (live, &fires) in live.iter_mut().zip(&fires) {
                 *live &= fires;
             }
-            for &member in &members {
-                inside.add(member as usize);
+            let low = members.iter().copied().min().unwrap_or(from);
+            if low < lowest {
+                lowest = low;
+                std::mem::swap(&mut nearest, &mut members);
             }
         } else {
             wasted += members.len();
@@ -263,8 +271,11 @@ fn search<W: Width>(
     if bottoms == 0 {
         return Ok(Some(Bottoms::whole(space)));
     }
-    let home = if bottoms == 1 { inside.to_bytes(space.len()) } else { vec![0; space.len()] };
-    Ok(Some(Bottoms { reversible: false, live, home }))
+    let mut bytes = vec![0; space.len()];
+    for member in nearest {
+        bytes[member as usize] = 1;
+    }
+    Ok(Some(Bottoms { reversible: false, live, nearest: bytes, only: bottoms == 1 }))
 }
 
 #[cfg(test)]
@@ -282,8 +293,7 @@ mod tests {
             let found = Bottoms::new(&space, &mut watch).expect("fits");
             let expected = Bottoms::of_components(&space, &space.memory.clone(), &mut watch).expect("fits");
             assert_eq!(found, expected);
-            let home = found.home.iter().any(|&home| home != 0);
-            *(match (found.reversible, home) {
+            *(match (found.reversible, found.only) {
                 (true, _) => &mut reversible,
                 (false, true) => &mut one,
                 (false, false) => &mut several,

@@ -330,10 +330,24 @@ impl Graph {
         cancelled: Option<Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyBytes>> {
         let bottoms = self.bottoms(py, &Patience::new(max_seconds, cancelled)?)?;
+        if bottoms.reversible || !bottoms.only {
+            return Ok(PyBytes::new(py, &vec![u8::from(bottoms.only); self.space.len()]));
+        }
+        Ok(PyBytes::new(py, &bottoms.nearest))
+    }
+
+    #[pyo3(signature = (*, max_seconds=None, cancelled=None))]
+    fn bottom<'py>(
+        &self,
+        py: Python<'py>,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let bottoms = self.bottoms(py, &Patience::new(max_seconds, cancelled)?)?;
         if bottoms.reversible {
             return Ok(PyBytes::new(py, &vec![1; self.space.len()]));
         }
-        Ok(PyBytes::new(py, &bottoms.home))
+        Ok(PyBytes::new(py, &bottoms.nearest))
     }
 
     #[pyo3(signature = (targets, by=None, *, max_seconds=None, cancelled=None))]
