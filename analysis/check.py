@@ -31,9 +31,11 @@ from firable.analysis.race import Contestant, Outcome, race
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace, WitnessError
-from firable.analysis.verdicts.goals import Goal, goals_of
+from firable.analysis.verdicts.goals import Goal, goals_of, query_goals
+from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import Formula
 from firable.nets.net import Net
+from firable.nets.queries import Query
 from firable.nets.verdict import Status, Verdict
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
@@ -54,12 +56,15 @@ def check(
     budget: Budget | None = None,
     *,
     method: Method | str = Method.AUTO,
+    queries: Sequence[Query] = (),
     progress: Callable[[int, int], object] | None = None,
 ) -> CheckReport:
     """Decide every verdict on a net under a discipline, external gates free, by the method named.
 
+    The verdicts on `queries` follow those on the net's own properties.
+
     Raises `InputError` F2013 where the arbiters do not fit the conflicts of the net, F3004 where the budget does not
-    hold the net itself.
+    hold the net itself, F3006 where the method knows no synchronous steps.
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> report = check(catalogue_net("conceptual_one_robot"))
@@ -71,9 +76,12 @@ def check(
     deadline = Deadline(cancelled=interrupted)
     if budget.seconds is not None:
         deadline = Deadline.after(budget.seconds, interrupted)
-    one = _Check(net, discipline, budget, deadline, interrupted, progress)
+    one = _Check(net, discipline, budget, deadline, interrupted, tuple(queries), progress)
     if method is Method.EXPLICIT or (method is Method.AUTO and discipline is Discipline.STEP):
         return one.explicitly()
+    if discipline is Discipline.STEP:
+        message = f"the method '{method}' knows no synchronous steps"
+        raise InputError([Diagnostic("F3006", message, "leave out --method, or name `explicit`")])
     return one.automatically() if method is Method.AUTO else one.by(method)
 
 
@@ -86,28 +94,32 @@ class _Check:
     budget: Budget
     deadline: Deadline
     interrupted: Event
+    queries: tuple[Query, ...]
     progress: Callable[[int, int], object] | None
 
     def explicitly(self) -> CheckReport:
         """The report of the explicit engine alone, within the whole budget."""
         graph = self._explore(self.budget)
-        return _told(report_on(graph), [f"explored: {_size(graph)}"])
+        return _told(self._report(graph), [f"explored: {_size(graph)}"])
 
     def automatically(self) -> CheckReport:
         """The report of the three stages, as far as they are needed."""
         first = self._explore(replace(self.budget, markings=min(FIRST_MARKINGS, self.budget.markings)))
         if first.complete or first.engine.reason == "interrupted":
-            return _told(report_on(first), [f"explored: {_size(first)}"])
+            return _told(self._report(first), [f"explored: {_size(first)}"])
         course = [f"the first {first.n_markings:,} markings are not all"]
-        return self._settled(report_on(self._whole(course) or first), GOAL_LANES, course)
+        return self._settled(self._report(self._whole(course) or first), GOAL_LANES, course)
 
     def by(self, method: Method) -> CheckReport:
         """The report of one technique: what it does not decide stays unknown."""
         if method in SPACES:
             space = SPACES[method].load()(self.net, Limits(self.deadline, self.budget.memory_bytes))
-            return _told(report_on(space), [f"{SPACES[method].words}: {_size(space)}"])
+            return _told(self._report(space), [f"{SPACES[method].words}: {_size(space)}"])
         nothing = self._explore(replace(self.budget, markings=1))
-        return self._settled(report_on(nothing), ((method,),), [f"{GOALS[method].words}, and nothing else"])
+        return self._settled(self._report(nothing), ((method,),), [f"{GOALS[method].words}, and nothing else"])
+
+    def _report(self, space: StateSpace[Any]) -> CheckReport:
+        return report_on(space, self.queries, self.deadline)
 
     def _explore(self, budget: Budget) -> ReachabilityGraph:
         return explore(self.net, self.discipline, budget, deadline=self.deadline, progress=self.progress)
@@ -150,7 +162,7 @@ class _Check:
         self, verdict: Verdict, fired: set[str], lanes: Sequence[Sequence[Method]], course: list[str]
     ) -> Verdict:
         """The verdict after a race for each of its goals; as it was where one stays undecided or there are too many."""
-        asked = goals_of(self.net, verdict.name, fired)
+        asked = goals_of(self.net, verdict.name, fired) or query_goals(self.queries, verdict)
         if asked is None or not lanes or len(asked[1]) > _GOALS_MAX:
             return verdict
         question, goals = asked

@@ -28,6 +28,7 @@ class Method(StrEnum):
 
     AUTO = "auto"
     EXPLICIT = "explicit"
+    STATE_EQUATION = "state-equation"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,11 @@ def _loaded(at: str) -> Any:
 
 SPACES: Final[dict[Method, SpaceMethod]] = {}
 
-GOALS: Final[dict[Method, GoalMethod]] = {}
+GOALS: Final[dict[Method, GoalMethod]] = {
+    Method.STATE_EQUATION: GoalMethod(
+        "state equation", "firable.analysis.structure.state_equation:decide_by_state_equation"
+    ),
+}
 
-GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = ()
+GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = ((Method.STATE_EQUATION,),)
 """How `auto` races them: what finds violations beside what proves; each lane from the quick to the thorough."""

@@ -10,14 +10,16 @@ here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.question import Answer, Question
 from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
+from firable.analysis.temporal.queries import answer
 from firable.analysis.verdicts import behaviour as behaviour_of
 from firable.analysis.verdicts import conflicts as conflict
 from firable.analysis.verdicts.behaviour import Behaviour
@@ -31,6 +33,7 @@ from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pairs, Steps
 from firable.analysis.verdicts.properties import decide_properties
 from firable.analysis.verdicts.starvation import starvation_free
 from firable.nets.net import Net
+from firable.nets.queries import Query
 from firable.nets.verdict import Status, Verdict, Weight, overall
 from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
@@ -110,8 +113,11 @@ class CheckReport:
         raise KeyError(name)
 
 
-def report_on(space: StateSpace[Any]) -> CheckReport:
-    """Decide every verdict of this room on a state space that was explored before."""
+def report_on(space: StateSpace[Any], queries: Iterable[Query] = (), deadline: Deadline = NEVER) -> CheckReport:
+    """Decide every verdict of this room, and the queries, on a state space that was explored before.
+
+    The deadline is for the queries whose formulas must be turned into automata.
+    """
     behaviour, conflicts = Behaviour(space), ConflictAnalysis(space)
     steps = _steps(space)
     verdicts = [
@@ -122,6 +128,7 @@ def report_on(space: StateSpace[Any]) -> CheckReport:
         *(decide(space) for decide in _ON_SPACE),
         starvation_free(behaviour),
         *decide_properties(space),
+        *(answer(space, query, deadline) for query in queries),
     ]
     return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), tuple(verdicts), space)
 

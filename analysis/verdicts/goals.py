@@ -10,10 +10,11 @@ Liveness, reversibility and response are no such questions: they speak of what r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 from firable.analysis.question import Question, listed
+from firable.analysis.temporal.queries import as_goal
 from firable.analysis.verdicts.behaviour import CONTACT_FREE, DEADLOCK_FREE, QUASI_LIVE
 from firable.analysis.verdicts.commands import (
     COMMANDS_AGREE,
@@ -27,6 +28,8 @@ from firable.analysis.verdicts.commands import (
 from firable.analysis.verdicts.properties import statement
 from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Or, format_formula
 from firable.nets.net import Marking, Net, Property, PropertyKind, Transition
+from firable.nets.queries import Query
+from firable.nets.verdict import Verdict
 from firable.semantics.algebra import BOOL
 from firable.semantics.firing import in_contact
 from firable.semantics.player import holds_in
@@ -72,6 +75,17 @@ def goals_of(net: Net, name: str, fired: Collection[str] = ()) -> tuple[Question
             return None if goals is None else (Question(name, statement(of)), goals)
         case _:
             return None
+
+
+def query_goals(queries: Iterable[Query], verdict: Verdict) -> tuple[Question, tuple[Goal, ...]] | None:
+    """The question of the verdict on one of the queries, and its goal; None where it is none, or none does."""
+    query = next((query for query in queries if f"query.{query.name}" == verdict.name), None)
+    asked = None if query is None else as_goal(query)
+    if asked is None:
+        return None
+    formula, wanted = asked
+    note = f"here ({format_formula(formula)}) holds"
+    return Question(verdict.name, verdict.statement), (Goal(formula, lambda _: ((), note), wanted),)
 
 
 def _never(bad: Formula, told: Callable[[Marking], Told]) -> tuple[Goal, ...]:

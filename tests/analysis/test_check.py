@@ -1,0 +1,58 @@
+"""How `check` chooses: exploring first, racing where that does not suffice, one technique where it is named."""
+
+from __future__ import annotations
+
+import pytest
+
+from firable.analysis import check as module
+from firable.analysis.check import check
+from firable.analysis.methods import GOALS, SPACES, Method
+from firable.analysis.spaces.reachability import Budget
+from firable.nets.catalogue import catalogue_net
+from firable.nets.diagnostics import InputError
+from firable.nets.queries import parse_query
+from firable.nets.verdict import Status
+
+
+@pytest.mark.parametrize("method", [*GOALS, *SPACES])
+def test_a_technique_without_synchronous_steps_refuses_them(method: Method) -> None:
+    with pytest.raises(InputError) as refused:
+        check(catalogue_net("one_robot"), "step", method=method)
+    assert [d.code for d in refused.value.diagnostics] == ["F3006"]
+
+
+def test_few_markings_are_explored_and_nothing_else_is_tried() -> None:
+    report = check(catalogue_net("one_robot"))
+    assert report.course == ("explored: 40 markings, 70 edges",)
+    assert {verdict.method for verdict in report.verdicts if verdict.name == "deadlock-free"} == {
+        "reachability graph, interleaving"
+    }
+
+
+def test_a_net_with_more_markings_than_the_first_look_is_decided_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    net = catalogue_net("one_robot_mc_late")
+    explored = check(net)
+    monkeypatch.setattr(module, "FIRST_MARKINGS", 5)
+    raced = check(net)
+    assert [(v.name, v.status) for v in raced.verdicts] == [(v.name, v.status) for v in explored.verdicts]
+    assert raced.course[0] == "the first 5 markings are not all"
+    assert "was the first to hold all markings: 76 markings, 154 edges" in raced.course[-1]
+
+
+def test_synchronous_steps_are_explored_whatever_their_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "FIRST_MARKINGS", 5)
+    assert check(catalogue_net("one_robot"), "step").figures.complete
+
+
+def test_a_budget_that_holds_no_space_leaves_unknown_what_no_goal_decides() -> None:
+    report = check(catalogue_net("one_robot"), budget=Budget(markings=3), method="explicit")
+    assert report.status is Status.UNKNOWN
+    assert report.verdict("live").status is Status.UNKNOWN
+    assert report.verdict("live").bound == "3 markings found, 3 edges followed: the budget of markings is used up"
+
+
+def test_queries_are_answered_after_the_properties_of_the_net() -> None:
+    queries = (parse_query("AG EF robot.free", "again"), parse_query("G not robot.free", "never"))
+    report = check(catalogue_net("one_robot"), queries=queries)
+    assert [verdict.name for verdict in report.verdicts[-2:]] == ["query.again", "query.never"]
+    assert [verdict.status for verdict in report.verdicts[-2:]] == [Status.PROVED, Status.VIOLATED]
