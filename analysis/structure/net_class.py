@@ -17,9 +17,9 @@ is listed; the alternative, counting gates as arcs, would name a class whose the
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import pairwise
 
 import networkx as nx
 
@@ -69,22 +69,46 @@ def net_class(net: Net, *, contact_free: bool | None = None) -> NetClass:
     'state machine and marked graph'
     """
     graph = arcs(net)
-    consumers = [frozenset(transitions) for transitions in net.consumers]
-    sharing = [(a, b) for a, b in combinations(consumers, 2) if a & b]
+    index = net.place_index
+    inputs = [[index[name] for name in t.inputs] for t in net.transitions]
     empty = not graph.number_of_nodes()
     return NetClass(
         state_machine=all(len(t.inputs) == 1 == len(t.outputs) for t in net.transitions),
         marked_graph=all(len(c) == 1 == len(p) for c, p in zip(net.consumers, net.producers, strict=True)),
-        free_choice=all(
-            len(net.transitions[t].inputs) == 1 for group in net.consumers if len(group) > 1 for t in group
-        ),
-        extended_free_choice=all(a == b for a, b in sharing),
-        asymmetric_choice=all(a <= b or b <= a for a, b in sharing),
+        free_choice=all(len(inputs[t]) == 1 for group in net.consumers if len(group) > 1 for t in group),
+        extended_free_choice=extended_free_choice(inputs, net.consumers),
+        asymmetric_choice=asymmetric_choice(inputs, net.consumers),
         pure=not any(t.self_loops for t in net.transitions),
         connected=empty or nx.is_weakly_connected(graph),
         strongly_connected=empty or nx.is_strongly_connected(graph),
         outside=tuple(_outside(net, contact_free)),
     )
+
+
+def extended_free_choice(inputs: Sequence[Sequence[int]], consumers: Sequence[tuple[int, ...]]) -> bool:
+    """Whether the inputs of each transition have the same consumers. Cost: linear in the arcs."""
+    same = _equal(consumers)
+    return all(same[p] == same[places[0]] for places in inputs for p in places)
+
+
+def asymmetric_choice(inputs: Sequence[Sequence[int]], consumers: Sequence[tuple[int, ...]]) -> bool:
+    """Whether of the inputs of each transition, two by two, one has all consumers of the other."""
+    same, compared = _equal(consumers), dict[tuple[int, int], bool]()
+    for places in inputs:
+        by_size = sorted(places, key=lambda p: len(consumers[p]))
+        for p, q in pairwise(by_size):
+            pair = same[p], same[q]
+            if pair not in compared:  # each pair once, for a place may have as many consumers as there are transitions
+                compared[pair] = pair[0] == pair[1] or set(consumers[p]) <= set(consumers[q])
+            if not compared[pair]:
+                return False
+    return True
+
+
+def _equal(consumers: Sequence[tuple[int, ...]]) -> list[int]:
+    """A number for each place, the same for places with the same consumers."""
+    numbers: dict[tuple[int, ...], int] = {}
+    return [numbers.setdefault(group, len(numbers)) for group in consumers]
 
 
 def arcs(net: Net) -> nx.DiGraph[tuple[str, str]]:

@@ -32,7 +32,8 @@ from firable.nets.net import Net
 class Ordinary:
     """An ordinary net in indexes: `transitions[k]` is the index in the extended net, `inputs[k]` its inputs and reads.
 
-    `outputs[k]` are its outputs and reads, `marked` the places with a token in M0.
+    `outputs[k]` are its outputs and reads, `marked` the places with a token in M0; `places[p]` is the index of the
+    place in the extended net, where some are left out.
     """
 
     n_places: int
@@ -41,6 +42,7 @@ class Ordinary:
     outputs: tuple[tuple[int, ...], ...]
     marked: frozenset[int]
     inhibited: bool
+    places: tuple[int, ...]
 
     @cached_property
     def consumers(self) -> tuple[tuple[int, ...], ...]:
@@ -75,7 +77,8 @@ def ordinary(net: Net) -> Ordinary:
         outputs.append(tuple(index[name] for name in (*transition.outputs, *reads)))
         inhibited |= bool(transition.inhibitive)
     marked = frozenset(i for i, place in enumerate(net.places) if place.marked)
-    return Ordinary(len(net.places), tuple(transitions), tuple(inputs), tuple(outputs), marked, inhibited)
+    places = tuple(range(len(net.places)))
+    return Ordinary(len(places), tuple(transitions), tuple(inputs), tuple(outputs), marked, inhibited, places)
 
 
 def markable(of: Ordinary) -> frozenset[int]:
