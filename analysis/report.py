@@ -46,7 +46,8 @@ class Figures:
     """The numbers and sets behind the verdicts, by the names of the net; None is unknown, as the budget ended.
 
     `deadlocks`, `doomed`, `home` and the values of `contacts` count markings. `nonserialisable` holds the steps of a
-    step graph that no order replays; it is None for an interleaving graph, which has no steps.
+    step graph that no order replays; it is None for an interleaving graph, which has no steps. `cut_short` names the
+    figures that hold only the first of very many pairs.
     """
 
     markings: int
@@ -66,6 +67,7 @@ class Figures:
     structural_conflicts: Pairs
     effective_conflicts: Pairs | None
     gate_races: tuple[tuple[str, str], ...]
+    cut_short: tuple[str, ...]
     nonserialisable: tuple[tuple[str, ...], ...] | None
 
     def to_json(self) -> dict[str, Any]:
@@ -198,8 +200,12 @@ def figures(behaviour: Behaviour[Any], conflicts: ConflictAnalysis[Any], steps: 
         self_loops=self_loops(net),
         firable_in_initial_marking=tuple(net.transitions[t].name for t in firable),
         structural_conflicts=conflicts.structural,
-        effective_conflicts=conflicts.effective if whole else None,
+        effective_conflicts=_known(lambda: conflicts.effective) if whole else None,
         gate_races=conflicts.races,
+        cut_short=(
+            *(("structural_conflicts",) if conflicts.structural.more else ()),
+            *(("gate_races",) if conflicts.more_races else ()),
+        ),
         nonserialisable=None if steps is None else _known(lambda: steps.nonserialisable),
     )
 

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -104,7 +105,8 @@ class Arbitration:
         groups = []
         for c, members in enumerate(relation.components):
             name, sequence, by = named.get(c, (f"conflict-{c + 1}", (), ArbitrationRule.PRIORITY))
-            rest = tuple(t for t in members if t not in sequence)
+            first = set(sequence)
+            rest = tuple(t for t in members if t not in first)
             groups.append(Group(name, sequence, rest, by))
         return cls(relation, tuple(groups))
 
@@ -113,19 +115,38 @@ class Arbitration:
         """The turns before anything was decided."""
         return (0,) * len(self.groups)
 
+    @cached_property
+    def _group_of(self) -> Mapping[int, int]:
+        return {t: g for g, group in enumerate(self.groups) for t in (*group.sequence, *group.rest)}
+
+    @cached_property
+    def _in_file_order(self) -> frozenset[int]:
+        """The groups without an arbiter: their order is known without going through all members."""
+        return frozenset(
+            g for g, group in enumerate(self.groups) if not group.sequence and list(group.rest) == sorted(group.rest)
+        )
+
     def decide(self, enabled: Iterable[int], turns: Turns) -> tuple[FiringSet, Turns]:
         """The granted transitions, a maximal set without conflict of the enabled ones, and the turns after it."""
-        candidates = frozenset(enabled)
-        granted = {t for t in candidates if self.conflicts.component_of[t] < 0}
+        competing: dict[int, set[int]] = {}
+        granted: set[int] = set()
+        for t in enabled:
+            if self.conflicts.component_of[t] < 0:
+                granted.add(t)
+            elif (g := self._group_of.get(t)) is not None:
+                competing.setdefault(g, set()).add(t)
         after = list(turns)
-        for g, group in enumerate(self.groups):
-            won: set[int] = set()
-            preference = [t for t in group.preference(turns[g]) if t in candidates]
-            for t in preference:
-                if not self.conflicts.rivals[t] & won:
-                    won.add(t)
-            for t in preference:
-                if t in won and self.conflicts.input_rivals[t] & (candidates - won):
+        for g, candidates in competing.items():
+            group = self.groups[g]
+            preference = (
+                sorted(candidates)
+                if g in self._in_file_order
+                else [t for t in group.preference(turns[g]) if t in candidates]
+            )
+            won = self.conflicts.maximal(preference)
+            lost = candidates - won
+            for t in preference if lost and group.by is not ArbitrationRule.PRIORITY else ():
+                if t in won and self.conflicts.input_rivals[t] & lost:
                     after[g] = group.turn_after(t, turns[g])
             granted |= won
         return tuple(sorted(granted)), tuple(after)

@@ -8,10 +8,65 @@ and fires nothing on cycles (SEMANTICS, "Arbitration").
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from itertools import islice
+from typing import Final, overload
 
 from firable.nets.net import Net
+
+PAIRS_MAX: Final = 20_000
+"""How many conflicting pairs are listed: a place with 10,000 consumers has 50 million, which nobody reads."""
+
+
+_KEPT_MAX: Final = 64  # sets up to this size are kept: players ask for the same ones at every firing
+
+
+class Sharing(Sequence[frozenset[int]]):
+    """For each transition, the others that stand with it at one place; worked out when asked for, not held.
+
+    A place with n consumers makes n (n - 1) pairs, so that all the sets together may be quadratic in the net.
+    """
+
+    def __init__(self, n_transitions: int, *tables: tuple[tuple[int, ...], ...]) -> None:
+        self._together: list[list[tuple[int, ...]]] = [[] for _ in range(n_transitions)]
+        self._small: dict[int, frozenset[int]] = {}
+        for table in tables:
+            for together in table:
+                if len(together) > 1:
+                    for t in together:
+                        self._together[t].append(together)
+
+    def __len__(self) -> int:
+        return len(self._together)
+
+    @overload
+    def __getitem__(self, t: int) -> frozenset[int]: ...
+
+    @overload
+    def __getitem__(self, t: slice) -> list[frozenset[int]]: ...
+
+    def __getitem__(self, t: int | slice) -> frozenset[int] | list[frozenset[int]]:
+        if isinstance(t, slice):
+            return [self[u] for u in range(*t.indices(len(self)))]
+        if (known := self._small.get(t)) is not None:
+            return known
+        together = self._together[t]
+        others = frozenset[int]().union(*together) - {t}
+        if len(others) <= _KEPT_MAX:
+            self._small[t] = others
+        return others
+
+    def groups(self, t: int) -> Sequence[tuple[int, ...]]:
+        """The transitions at each shared place of `t`, itself among them."""
+        return self._together[t]
+
+    def pairs(self) -> Iterator[tuple[int, int]]:
+        """The pairs `t < u` that share a place, in order, found as they are asked for."""
+        for t, groups in enumerate(self._together):
+            if groups:
+                yield from ((t, u) for u in sorted({u for group in groups for u in group if u > t}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,57 +78,70 @@ class Conflicts:
     of the component of `t`, or -1 for a transition that conflicts with none.
     """
 
-    rivals: tuple[frozenset[int], ...]
-    input_rivals: tuple[frozenset[int], ...]
+    rivals: Sharing
+    input_rivals: Sharing
     components: tuple[tuple[int, ...], ...]
     component_of: tuple[int, ...]
 
     def free(self, transitions: Iterable[int]) -> bool:
         """Whether no two of the transitions conflict."""
         chosen = set(transitions)
-        return all(not self.rivals[t] & chosen for t in chosen)
+        return len(self.maximal(chosen)) == len(chosen)
+
+    def maximal(self, preference: Iterable[int]) -> AbstractSet[int]:
+        """The transitions granted in this order, each that conflicts with none before; in time linear in their arcs."""
+        granted: set[int] = set()
+        taken: set[int] = set()
+        for t in preference:
+            # A shared place is known by the tuple of those who stand at it, one tuple for all of them.
+            groups = [id(group) for group in self.rivals.groups(t)]
+            if taken.isdisjoint(groups):
+                granted.add(t)
+                taken.update(groups)
+        return granted
 
 
 def conflicts(net: Net) -> Conflicts:
-    """The structural conflict relation; time linear in the net plus the number of conflicting pairs."""
-    input_rivals = _sharing(net.consumers, len(net.transitions))
-    output_rivals = _sharing(net.producers, len(net.transitions))
-    rivals = tuple(frozenset(a | b) for a, b in zip(input_rivals, output_rivals, strict=True))
-    component_of = [-1] * len(rivals)
+    """The structural conflict relation; time linear in the net."""
+    n_transitions = len(net.transitions)
+    rivals = Sharing(n_transitions, net.consumers, net.producers)
+    component_of = [-1] * n_transitions
     components: list[tuple[int, ...]] = []
-    for start in range(len(rivals)):
-        if component_of[start] >= 0 or not rivals[start]:
+    reached: set[int] = set()
+    for start in range(n_transitions):
+        if component_of[start] >= 0 or not rivals.groups(start):
             continue
         members, todo = {start}, [start]
         while todo:
-            for t in rivals[todo.pop()] - members:
-                members.add(t)
-                todo.append(t)
+            for group in rivals.groups(todo.pop()):
+                if id(group) not in reached:  # each shared place is gone through once
+                    reached.add(id(group))
+                    todo += [t for t in group if t not in members]
+                    members.update(group)
         for t in members:
             component_of[t] = len(components)
         components.append(tuple(sorted(members)))
-    return Conflicts(rivals, tuple(map(frozenset, input_rivals)), tuple(components), tuple(component_of))
+    return Conflicts(rivals, Sharing(n_transitions, net.consumers), tuple(components), tuple(component_of))
 
 
-def _sharing(adjacent: tuple[tuple[int, ...], ...], n_transitions: int) -> list[set[int]]:
-    """For each transition, the others that stand with it at one place."""
-    found: list[set[int]] = [set() for _ in range(n_transitions)]
-    for together in adjacent:
-        if len(together) > 1:
-            for t in together:
-                found[t].update(together)
-    for t, others in enumerate(found):
-        others.discard(t)
-    return found
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """Pairs of transitions in order; where `more`, only the first `PAIRS_MAX` of them."""
+
+    pairs: tuple[tuple[int, int], ...]
+    more: bool
 
 
-def structural_conflicts(net: Net) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:
+def _listed(pairs: Iterator[tuple[int, int]]) -> Listed:
+    first = tuple(islice(pairs, PAIRS_MAX))
+    return Listed(first, next(pairs, None) is not None)
+
+
+def structural_conflicts(net: Net) -> tuple[Listed, Listed]:
     """The pairs `t < u` that share an input, and the pairs that share an output."""
-    pairs = []
-    for adjacent in (net.consumers, net.producers):
-        sharing = _sharing(adjacent, len(net.transitions))
-        pairs.append(tuple((t, u) for t, others in enumerate(sharing) for u in sorted(others) if t < u))
-    return pairs[0], pairs[1]
+    n_transitions = len(net.transitions)
+    by_input, by_output = (Sharing(n_transitions, table).pairs() for table in (net.consumers, net.producers))
+    return _listed(by_input), _listed(by_output)
 
 
 def jointly_openable(net: Net, transitions: Iterable[int]) -> bool:
@@ -86,23 +154,30 @@ def jointly_openable(net: Net, transitions: Iterable[int]) -> bool:
     return True
 
 
-def gate_races(net: Net) -> Iterator[tuple[int, int]]:
-    """The pairs (t, u), t and u different, where firing t closes an internal gate of u.
+def gate_races(net: Net, among: Iterable[int] | None = None) -> Iterator[tuple[int, int]]:
+    """The pairs (t, u), t and u different, where firing t closes an internal gate of u; with `among`, of these only.
 
     That is, I(t) meets Gp(u) or O(t) meets Gi(u). In a step that holds both, u must be replayed before t.
     """
-    permissive, inhibitive = _gated(net)
-    for t in range(len(net.transitions)):
+    considered = range(len(net.transitions)) if among is None else sorted(set(among))
+    permissive, inhibitive = _gated(net, considered)
+    for t in considered:
         transition = net.transitions[t]
         closed = {u for place in transition.inputs for u in permissive.get(place, ())}
         closed |= {u for place in transition.outputs for u in inhibitive.get(place, ())}
         yield from ((t, u) for u in sorted(closed - {t}))
 
 
-def _gated(net: Net) -> tuple[dict[str, list[int]], dict[str, list[int]]]:
+def listed_races(net: Net) -> Listed:
+    """The gate races, as many as are listed."""
+    return _listed(gate_races(net))
+
+
+def _gated(net: Net, considered: Iterable[int]) -> tuple[dict[str, list[int]], dict[str, list[int]]]:
     permissive: dict[str, list[int]] = {}
     inhibitive: dict[str, list[int]] = {}
-    for u, transition in enumerate(net.transitions):
+    for u in considered:
+        transition = net.transitions[u]
         for place in transition.permissive:
             permissive.setdefault(place, []).append(u)
         for place in transition.inhibitive:

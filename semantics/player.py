@@ -49,11 +49,6 @@ class Player:
         """The conflict relation of the net."""
         return conflicts(self.net)
 
-    @cached_property
-    def races(self) -> frozenset[tuple[int, int]]:
-        """The gate races of the net: (t, u) where t closes an internal gate of u."""
-        return frozenset(gate_races(self.net))
-
     def firable(self, marking: Marking) -> FiringSet:
         """The transitions that are firable by Eq. (1), whatever their external gates."""
         holds = holds_in(marking)
@@ -110,7 +105,7 @@ class Player:
         for t in sorted(fired):
             if not firable(BOOL, self.net, t, holds):
                 raise NotFirableError(f"'{self.net.transitions[t].name}' is not firable in {self._shown(marking)}")
-            if rivals := self.conflicts.rivals[t] & fired:
+            if len(fired) > 1 and (rivals := self.conflicts.rivals[t] & fired):
                 names = sorted(self.net.transitions[u].name for u in (t, *rivals))
                 raise NotFirableError(f"{', '.join(names)} conflict and cannot fire together")
         touched = {
@@ -212,9 +207,12 @@ class Player:
     def order_of(self, step: Iterable[int]) -> tuple[int, ...] | None:
         """An order that replays the step one by one, None where the gate races within it are cyclic."""
         remaining, order = set(step), list[int]()
+        closed: dict[int, set[int]] = {}
+        for t, u in gate_races(self.net, remaining):
+            closed.setdefault(t, set()).add(u)
         while remaining:
             # The next to replay closes no gate of one that still has to fire.
-            free = sorted(t for t in remaining if not any((t, u) in self.races for u in remaining))
+            free = sorted(t for t in remaining if t not in closed or closed[t].isdisjoint(remaining))
             if not free:
                 return None
             order += free

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic
+from typing import Any, Final, Generic
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.question import Answer, Question, listed, no, yes
@@ -24,19 +24,30 @@ from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import S, StateSpace
 from firable.nets.net import Net
 from firable.nets.verdict import Verdict, Weight
-from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts
+from firable.semantics.conflict import (
+    PAIRS_MAX,
+    Listed,
+    conflicts,
+    gate_races,
+    jointly_openable,
+    listed_races,
+    structural_conflicts,
+)
 from firable.semantics.firing import firable
 from firable.semantics.trace import Discipline
 
 Pair = tuple[str, str]
 
+_ONLY_THE_FIRST: Final = f"there are more: only the first {PAIRS_MAX:,} pairs are listed"
+
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """Conflicting pairs of transitions in the order of the net, by what they share."""
+    """Conflicting pairs of transitions in the order of the net, by what they share; `more`: only the first of them."""
 
     by_input: tuple[Pair, ...] = ()
     by_output: tuple[Pair, ...] = ()
+    more: bool = False
 
     @property
     def all(self) -> tuple[Pair, ...]:
@@ -54,11 +65,11 @@ class ConflictAnalysis(Generic[S]):
     def structural(self) -> Pairs:
         """The pairs that share an input or an output place."""
         by_input, by_output = structural_conflicts(self.space.net)
-        return Pairs(self._named(by_input), self._named(by_output))
+        return Pairs(self._named(by_input.pairs), self._named(by_output.pairs), by_input.more or by_output.more)
 
     @cached_property
     def met(self) -> tuple[Pair, ...]:
-        """The pairs in effective conflict at a marking found."""
+        """The pairs in effective conflict at a marking found, among the structural ones that are listed."""
         pairs = [self._indexes(pair) for pair in self.structural.all]
         pairs = [pair for pair in pairs if jointly_openable(self.space.net, pair)]
         found = self.space.firable_together(pairs)
@@ -73,17 +84,32 @@ class ConflictAnalysis(Generic[S]):
     @cached_property
     def effective(self) -> Pairs:
         """The pairs in effective conflict; raises `IncompleteGraph` where more may come."""
-        self.space.require_complete()
+        self.require_complete()
         met = set(self.met)
         return Pairs(
             tuple(pair for pair in self.structural.by_input if pair in met),
             tuple(pair for pair in self.structural.by_output if pair in met),
         )
 
+    def require_complete(self) -> None:
+        """Raise `IncompleteGraph` unless all pairs are listed and all markings known."""
+        self.space.require_complete()
+        if self.structural.more:
+            raise IncompleteGraph(_ONLY_THE_FIRST)
+
+    @cached_property
+    def _races(self) -> Listed:
+        return listed_races(self.space.net)
+
     @cached_property
     def races(self) -> tuple[Pair, ...]:
         """The gate races (t, u): t closes an internal gate of u."""
-        return self._named(tuple(gate_races(self.space.net)))
+        return self._named(self._races.pairs)
+
+    @property
+    def more_races(self) -> bool:
+        """Whether only the first races are listed."""
+        return self._races.more
 
     def _indexes(self, pair: Pair) -> tuple[int, int]:
         return self.space.net.transition_index[pair[0]], self.space.net.transition_index[pair[1]]
@@ -100,13 +126,20 @@ def races_may_cycle(net: Net) -> bool:
     for t, u in gate_races(net):
         if u not in relation.rivals[t] and jointly_openable(net, (t, u)):
             after.setdefault(t, set()).add(u)
-    remaining = set(after)
-    while remaining:
-        ends = {t for t in remaining if not after[t] & remaining}
-        if not ends:
-            return True
-        remaining -= ends
-    return False
+    # Those that close no gate of a remaining one are taken away until none is left, or a cycle is.
+    before: dict[int, list[int]] = {}
+    left = {t: len(closed) for t, closed in after.items()}
+    for t, closed in after.items():
+        for u in closed:
+            before.setdefault(u, []).append(t)
+    ends = [u for u in before if u not in left]
+    while ends:
+        for t in before.get(ends.pop(), ()):
+            left[t] -= 1
+            if not left[t]:
+                del left[t]
+                ends.append(t)
+    return bool(left)
 
 
 @dataclass(frozen=True)
@@ -152,7 +185,8 @@ def structural_conflict_free(analysis: ConflictAnalysis[Any]) -> Verdict:
         "structural-conflicts", "no two transitions share an input or an output place", Weight.INFORMATION
     )
     pairs = analysis.structural.all
-    return question.ask(analysis.space, lambda: Answer(not pairs, _spelled(pairs)))
+    hint = _ONLY_THE_FIRST if analysis.structural.more else ""
+    return question.ask(analysis.space, lambda: Answer(not pairs, _spelled(pairs), hint=hint))
 
 
 def effective_conflict_free(analysis: ConflictAnalysis[Any]) -> Verdict:
@@ -176,7 +210,7 @@ def effective_conflict_free(analysis: ConflictAnalysis[Any]) -> Verdict:
     def find() -> Answer:
         space = analysis.space
         if not analysis.met:
-            space.require_complete()
+            analysis.require_complete()
             return yes()
         hint = ""
         if undecided:
@@ -194,7 +228,8 @@ def race_free(analysis: ConflictAnalysis[Any]) -> Verdict:
     """No transition closes an internal gate of another."""
     question = Question("gate-races", "no transition closes an internal gate of another one", Weight.INFORMATION)
     races = tuple(f"{t} -> {u}" for t, u in analysis.races)
-    return question.ask(analysis.space, lambda: Answer(not races, races))
+    hint = _ONLY_THE_FIRST if analysis.more_races else ""
+    return question.ask(analysis.space, lambda: Answer(not races, races, hint=hint))
 
 
 def steps_serialisable(steps: Steps) -> Verdict:

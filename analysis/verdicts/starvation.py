@@ -16,7 +16,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.question import Answer, Question, no, unknown, yes
+from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.analysis.verdicts.behaviour import Behaviour
 from firable.nets.net import Net
@@ -38,7 +40,7 @@ class EagerRun:
     """The run in which all enabled transitions fire as the arbiters choose: first `prefix`, then `cycle` for ever.
 
     Each element is the set fired in one step. An empty cycle is a deadlock, or, where not `complete`, a run that was
-    cut off after `STEPS_MAX` steps.
+    cut off after `STEPS_MAX` steps or by a deadline.
     """
 
     prefix: tuple[tuple[str, ...], ...]
@@ -53,8 +55,8 @@ class EagerRun:
         return tuple(fired)
 
 
-def eager_run(net: Net, *, steps_max: int = STEPS_MAX) -> EagerRun:
-    """The arbitrated run from M0 with all external gates open.
+def eager_run(net: Net, *, steps_max: int = STEPS_MAX, deadline: Deadline = NEVER) -> EagerRun:
+    """The arbitrated run from M0 with all external gates open, as far as it comes before the deadline.
 
     Raises `InputError` F2013 where the arbiters do not fit the conflicts, `GatesCannotBeOpenError` where no valuation
     opens the gates.
@@ -70,7 +72,7 @@ def eager_run(net: Net, *, steps_max: int = STEPS_MAX) -> EagerRun:
     seen = {(marking, turns): 0}
     fired: list[tuple[str, ...]] = []
     enabled = player.may_fire(marking)
-    while len(fired) < steps_max:
+    while len(fired) < steps_max and not deadline.over:
         if not enabled:
             return EagerRun(tuple(fired), ())
         if not jointly_openable(net, enabled):
@@ -122,7 +124,7 @@ def starvation_free(behaviour: Behaviour[Any]) -> Verdict:
     def find() -> Answer:
         space = behaviour.space
         try:
-            run = eager_run(space.net)
+            run = eager_run(space.net, deadline=space.deadline if isinstance(space, ReachabilityGraph) else NEVER)
         except GatesCannotBeOpenError as error:
             return unknown(str(error), "there is no run with all gates open; starvation depends on the signals")
         if not run.complete:
