@@ -5,8 +5,8 @@
 1. *Explore.* Most cells have few markings: the explicit engine looks at up to 200,000 of them first, alone, which takes
    a moment and gives the shortest witnesses. What it finds whole is reported the same way every time.
 2. *Hold all markings* by whichever of the explicit engine and the decision diagram is first, side by side.
-3. *Decide the questions one by one*, where no technique could hold all markings: the verdicts that come down to goals,
-   by a race of the techniques that decide those.
+3. *Decide the questions one by one*, where no technique could hold all markings: those that theorems on the net's
+   class answer, and the verdicts that come down to goals by a race of the techniques that decide those.
 
 Under synchronous steps only the explicit engine knows the rule; there `auto` is `explicit`.
 
@@ -20,23 +20,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import Event
+from time import perf_counter
 from typing import Any, Final, TypeVar
 
 from firable.analysis._engine import IncompleteGraph
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Finding, Limits
-from firable.analysis.methods import GOAL_LANES, GOALS, SPACES, Method, SpaceMethod
+from firable.analysis.methods import GOAL_LANES, GOALS, KNOWERS, SPACES, Method, SpaceMethod
 from firable.analysis.question import Answer, Question, no, yes
 from firable.analysis.race import Contestant, Outcome, race
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace, WitnessError
+from firable.analysis.verdicts.behaviour import QUESTIONS
 from firable.analysis.verdicts.goals import Goal, goals_of, query_goals
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import Formula
 from firable.nets.net import Net
 from firable.nets.queries import Query
-from firable.nets.verdict import Status, Verdict
+from firable.nets.verdict import Cost, Status, Verdict
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import holds_in
@@ -47,6 +49,7 @@ T = TypeVar("T")
 FIRST_MARKINGS: Final = 200_000
 """How many markings `auto` explores before it lets techniques race."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
+_THEOREMS_SHARE: Final = 0.25  # of the time that is left then, for theorems
 _GOALS_MAX: Final = 64  # a verdict of more goals than this takes longer than anybody waits
 
 
@@ -108,7 +111,7 @@ class _Check:
         if first.complete or first.engine.reason == "interrupted":
             return _told(self._report(first), [f"explored: {_size(first)}"])
         course = [f"the first {first.n_markings:,} markings are not all"]
-        return self._settled(self._report(self._whole(course) or first), GOAL_LANES, course)
+        return self._settled(self._report(self._whole(course) or first), tuple(KNOWERS), GOAL_LANES, course)
 
     def by(self, method: Method) -> CheckReport:
         """The report of one technique: what it does not decide stays unknown."""
@@ -116,7 +119,9 @@ class _Check:
             space = SPACES[method].load()(self.net, Limits(self.deadline, self.budget.memory_bytes))
             return _told(self._report(space), [f"{SPACES[method].words}: {_size(space)}"])
         nothing = self._explore(replace(self.budget, markings=1))
-        return self._settled(self._report(nothing), ((method,),), [f"{GOALS[method].words}, and nothing else"])
+        if method in KNOWERS:
+            return self._settled(self._report(nothing), (method,), (), [f"{KNOWERS[method].words}, and nothing else"])
+        return self._settled(self._report(nothing), (), ((method,),), [f"{GOALS[method].words}, and nothing else"])
 
     def _report(self, space: StateSpace[Any]) -> CheckReport:
         return report_on(space, self.queries, self.deadline)
@@ -149,14 +154,39 @@ class _Check:
         graph.require_complete()
         return graph
 
-    def _settled(self, report: CheckReport, lanes: Sequence[Sequence[Method]], course: list[str]) -> CheckReport:
-        """The report with those of its unknown verdicts decided that come down to goals."""
+    def _settled(
+        self, report: CheckReport, knowers: Sequence[Method], lanes: Sequence[Sequence[Method]], course: list[str]
+    ) -> CheckReport:
+        """The report with those of its unknown verdicts decided that are known at once or come down to goals."""
+        open_ = {verdict.name for verdict in report.verdicts if verdict.status is Status.UNKNOWN}
+        known: dict[str, Verdict] = {}
+        for of in knowers if open_ else ():
+            known |= self._known(of, report)
+            if said := open_ & known.keys():
+                course.append(f"{KNOWERS[of].words}: {', '.join(sorted(said))}")
         fired = {self.net.transitions[t].name for t, count in enumerate(report.space.fired()) if count}
         verdicts = [
-            verdict if verdict.status is not Status.UNKNOWN else self._by_goals(verdict, fired, lanes, course)
+            verdict
+            if verdict.name not in open_
+            else known.get(verdict.name) or self._by_goals(verdict, fired, lanes, course)
             for verdict in report.verdicts
         ]
         return _told(replace(report, verdicts=tuple(verdicts)), course)
+
+    def _known(self, of: Method, report: CheckReport) -> dict[str, Verdict]:
+        """The verdicts that a technique knows at once."""
+        began = perf_counter()
+        limits = Limits(_share(self.deadline, _THEOREMS_SHARE), self.budget.memory_bytes)
+        found = KNOWERS[of].load()(self.net, limits)
+        seconds = perf_counter() - began
+        questions = {question.name: question for question in QUESTIONS}
+        return {
+            verdict.name: questions[verdict.name].settle(
+                known.answer, known.method, self.discipline, Cost(seconds=seconds)
+            )
+            for verdict in report.verdicts
+            if (known := found.get(verdict.name)) is not None
+        }
 
     def _by_goals(
         self, verdict: Verdict, fired: set[str], lanes: Sequence[Sequence[Method]], course: list[str]

@@ -7,7 +7,7 @@ structure of the net. They are loaded when they are used, because solvers take a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib import import_module
@@ -16,11 +16,13 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:  # the command line reads this table for its help, and so loads nothing with it
     from firable.analysis.goal import Finding, Limits
     from firable.analysis.spaces.space import StateSpace
+    from firable.analysis.structure.theorems import Known
     from firable.nets.formula import Formula
     from firable.nets.net import Net
 
     GoalDecider = Callable[[Net, Formula, Limits], Finding]
     SpaceMaker = Callable[[Net, Limits], StateSpace[Any]]
+    Knower = Callable[[Net, Limits], Mapping[str, Known]]
 
 
 class Method(StrEnum):
@@ -28,6 +30,7 @@ class Method(StrEnum):
 
     AUTO = "auto"
     EXPLICIT = "explicit"
+    STRUCTURE = "structure"
     STATE_EQUATION = "state-equation"
 
 
@@ -57,12 +60,29 @@ class SpaceMethod:
         return make
 
 
+@dataclass(frozen=True, slots=True)
+class KnowingMethod:
+    """A technique that knows verdicts at once: what it is in words, and where it is (`module:function`)."""
+
+    words: str
+    at: str
+
+    def load(self) -> Knower:
+        """The function itself."""
+        know: Knower = _loaded(self.at)
+        return know
+
+
 def _loaded(at: str) -> Any:
     module, _, name = at.partition(":")
     return getattr(import_module(module), name)
 
 
 SPACES: Final[dict[Method, SpaceMethod]] = {}
+
+KNOWERS: Final[dict[Method, KnowingMethod]] = {
+    Method.STRUCTURE: KnowingMethod("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),
+}
 
 GOALS: Final[dict[Method, GoalMethod]] = {
     Method.STATE_EQUATION: GoalMethod(

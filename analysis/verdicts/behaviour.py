@@ -65,6 +65,8 @@ NO_DOOMED: Final = Question(
     Weight.WARNING,
     hint="the last firing of the sequence is the point of no return: give it an input or gate that forbids it",
 )
+QUESTIONS: Final = (CONTACT_FREE, DEADLOCK_FREE, NO_DOOMED, QUASI_LIVE, LIVE, REVERSIBLE, HOME_MARKINGS)
+"""The questions of this file, which other techniques may answer too."""
 
 
 @dataclass(frozen=True)

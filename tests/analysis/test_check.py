@@ -6,7 +6,7 @@ import pytest
 
 from firable.analysis import check as module
 from firable.analysis.check import check
-from firable.analysis.methods import GOALS, SPACES, Method
+from firable.analysis.methods import GOALS, KNOWERS, SPACES, Method
 from firable.analysis.spaces.reachability import Budget
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
@@ -14,7 +14,7 @@ from firable.nets.queries import parse_query
 from firable.nets.verdict import Status
 
 
-@pytest.mark.parametrize("method", [*GOALS, *SPACES])
+@pytest.mark.parametrize("method", [*GOALS, *SPACES, *KNOWERS])
 def test_a_technique_without_synchronous_steps_refuses_them(method: Method) -> None:
     with pytest.raises(InputError) as refused:
         check(catalogue_net("one_robot"), "step", method=method)
@@ -56,3 +56,13 @@ def test_queries_are_answered_after_the_properties_of_the_net() -> None:
     report = check(catalogue_net("one_robot"), queries=queries)
     assert [verdict.name for verdict in report.verdicts[-2:]] == ["query.again", "query.never"]
     assert [verdict.status for verdict in report.verdicts[-2:]] == [Status.PROVED, Status.VIOLATED]
+
+
+def test_what_theorems_know_is_not_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    report = check(catalogue_net("one_robot"), method="structure")
+    live = report.verdict("live")
+    assert (live.status, live.method) == (Status.PROVED, "theorem of Commoner on asymmetric-choice nets")
+    assert report.verdict("effective-conflicts").status is Status.UNKNOWN
+    assert report.course[-1] == (
+        "theorems on net classes: contact-free, deadlock-free, doomed-markings, live, quasi-live"
+    )

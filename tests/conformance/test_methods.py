@@ -68,9 +68,8 @@ def test_check_by_one_technique_never_contradicts_exploration(method: Method, ne
     for verdict in check(net, method=method).verdicts:
         if verdict.status is not Status.UNKNOWN:
             assert verdict.status is known[verdict.name].status, verdict
-            assert (verdict.witness is None) <= (known[verdict.name].witness is None or verdict.holds), verdict
         else:
-            assert method in GOALS, verdict
+            assert method not in SPACES, verdict
 
 
 @pytest.mark.parametrize("method", SPACES)
