@@ -13,10 +13,10 @@ technique that found it, can check:
   distance for each marking it shows more: where each marking has a successor that is nearer to the goal, the goal can
   be reached from everywhere, which is what liveness and reversibility say.
 
-With a depth d above 1 the invariant is d-inductive: it holds in the first d markings of every run, and after d markings
-where it holds it holds again (Sheeran, Singh and Stålmarck 2000, "Checking safety properties using induction and a
-SAT-solver"). Rejected: a solver's proof object (DRAT, Alethe), which shows that a formula is unsatisfiable but not that
-it speaks of this net.
+Where the invariant does not exclude the goal by itself, the absence of the goal may still be d-inductive within it: the
+goal is not among the first d markings of any run, and after d markings without it comes another one (Sheeran, Singh
+and Stålmarck 2000, "Checking safety properties using induction and a SAT-solver"). Rejected: a solver's proof object
+(DRAT, Alethe), which shows that a formula is unsatisfiable but not that it speaks of this net.
 """
 
 from __future__ import annotations
@@ -59,15 +59,15 @@ class FiringSequence:
 
 @dataclass(frozen=True, slots=True)
 class InductiveInvariant:
-    """The equations hold, and with them the clauses, inequalities and the negated goal are `depth`-inductive.
+    """No firing changes the equations, none lowers the inequalities, the clauses are kept with them; the goal is excluded.
 
-    That is, with P for "every clause and inequality holds, and the goal does not": P holds in the first `depth`
-    markings of every run from M0, and where it holds in `depth` markings one after the other it holds in the next.
+    With a `depth` above 0 they exclude it only together with that many markings before it in which it does not hold,
+    and M0 and the markings after it, `depth` of them in each run, are free of it.
     """
 
     equations: tuple[Equation, ...] = ()
     clauses: tuple[Clause, ...] = ()
-    depth: int = 1
+    depth: int = 0
     inequalities: tuple[Inequality, ...] = ()
 
 

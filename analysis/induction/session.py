@@ -1,0 +1,127 @@
+"""A session with z3 that ends when nobody wants the answer any more.
+
+Methods that race each other run in threads, and each of them may be told at any moment that another one was first. A
+solver in the middle of a question hears nothing of that, so a second thread listens for it and interrupts the solver.
+It interrupts again and again until the session ends: an interruption that comes between two questions is lost.
+
+Every session has a context of its own, because one context of z3 may be used by one thread only. The solver is z3's
+for finite domains (`QF_FD`): clauses and sums over Booleans, learnt clauses kept from question to question, and what an
+answer rested on as a core of the assumptions. The rejected alternative, a timeout of some milliseconds for each
+question asked anew, throws away what the solver was about to learn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from threading import Event, Thread, current_thread, main_thread
+from types import TracebackType
+from typing import Any, Final
+
+import z3
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.induction.smt import SEED, Answer, Operator, Term, subterms
+
+_LISTEN_SECONDS: Final = 0.03
+
+
+class OutOfTimeError(Exception):
+    """The deadline came before the answer."""
+
+
+class Session:
+    """Solvers in one context of z3, interrupted at a deadline; a context manager.
+
+    >>> from firable.analysis.induction.smt import Terms
+    >>> terms = Terms()
+    >>> p = terms.variable("p")
+    >>> with Session(Deadline()) as session:
+    ...     solver = session.solver()
+    ...     solver.add(session.translated([terms.negation(p)]))
+    ...     session.ask(solver), session.ask(solver, session.variable("p"))
+    (<Answer.SAT: 'sat'>, <Answer.UNSAT: 'unsat'>)
+    """
+
+    def __init__(self, deadline: Deadline) -> None:
+        self.deadline = deadline
+        self.context = z3.Context()
+        self._translated: dict[Term, Any] = {}
+        self._ended = Event()
+        self._listener = Thread(target=self._listen, daemon=True)
+
+    def __enter__(self) -> Session:
+        self._listener.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._ended.set()
+        self._listener.join()
+
+    def _listen(self) -> None:
+        while not self._ended.wait(_LISTEN_SECONDS):
+            if self.deadline.over:
+                self.context.interrupt()
+
+    def solver(self) -> z3.Solver:
+        """A solver for Boolean terms and weighted sums of them, that keeps what it has learnt."""
+        solver = z3.SolverFor("QF_FD", ctx=self.context)
+        solver.set("random_seed", SEED)
+        # z3 answers Ctrl-C by itself, in whatever thread it is; only the main thread may.
+        solver.set("ctrl_c", current_thread() is main_thread())
+        return solver
+
+    def variable(self, name: str) -> z3.BoolRef:
+        """The Boolean of this name."""
+        return z3.Bool(name, self.context)
+
+    def translated(self, terms: Sequence[Term]) -> list[z3.BoolRef]:
+        """The terms as z3's own, in this context; what they share is shared, also with earlier ones.
+
+        Raises `OutOfTimeError` where the deadline comes first.
+        """
+        made = self._translated
+        for count, term in enumerate(subterms(terms)):
+            if count % 4096 == 4095:
+                self.check_time()
+            if term in made:
+                continue
+            operands = [made[operand] for operand in term.operands]
+            match term.operator:
+                case Operator.VARIABLE:
+                    made[term] = self.variable(term.name)
+                case Operator.TRUE | Operator.FALSE:
+                    made[term] = z3.BoolVal(term.operator is Operator.TRUE, self.context)
+                case Operator.NOT:
+                    made[term] = z3.Not(operands[0])
+                case Operator.AND:
+                    made[term] = z3.And(operands)
+                case Operator.OR:
+                    made[term] = z3.Or(operands)
+                case Operator.EQUAL:
+                    made[term] = operands[0] == operands[1]
+        return [made[term] for term in terms]
+
+    def some(self, operands: Iterable[z3.BoolRef]) -> z3.BoolRef:
+        """The OR of z3's own terms, of none too."""
+        operands = list(operands)
+        return z3.Or(operands) if operands else z3.BoolVal(val=False, ctx=self.context)
+
+    def check_time(self) -> None:
+        """Raise `OutOfTimeError` where the deadline has come."""
+        if self.deadline.over:
+            raise OutOfTimeError
+
+    def ask(self, solver: z3.Solver, *assumptions: z3.BoolRef) -> Answer:
+        """Whether all that the solver holds can be true together with the assumptions; never UNKNOWN.
+
+        Raises `OutOfTimeError` at the deadline, and `KeyboardInterrupt` where the user ends the solver.
+        """
+        self.check_time()
+        found = solver.check(*assumptions)
+        if found == z3.unknown:
+            self.check_time()
+            reason = solver.reason_unknown()
+            if "interrupted" in reason or "canceled" in reason:
+                raise KeyboardInterrupt
+            raise OutOfTimeError(reason)
+        return Answer.SAT if found == z3.sat else Answer.UNSAT
