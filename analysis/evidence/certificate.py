@@ -59,7 +59,7 @@ class FiringSequence:
 
 @dataclass(frozen=True, slots=True)
 class InductiveInvariant:
-    """No firing changes the equations, none lowers the inequalities, the clauses are kept with them; the goal is excluded.
+    """No firing changes the equations, none lowers the inequalities, the clauses are kept with them: no goal is left.
 
     With a `depth` above 0 they exclude it only together with that many markings before it in which it does not hold,
     and M0 and the markings after it, `depth` of them in each run, are free of it.
