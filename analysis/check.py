@@ -124,7 +124,7 @@ class _Check:
         return self._settled(self._report(nothing), (), ((method,),), [f"{GOALS[method].words}, and nothing else"])
 
     def _report(self, space: StateSpace[Any]) -> CheckReport:
-        return report_on(space, self.queries, self.deadline)
+        return report_on(space, self.queries)
 
     def _explore(self, budget: Budget) -> ReachabilityGraph:
         return explore(self.net, self.discipline, budget, deadline=self.deadline, progress=self.progress)

@@ -15,7 +15,6 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
-from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.question import Answer, Question
 from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
@@ -115,11 +114,8 @@ class CheckReport:
         raise KeyError(name)
 
 
-def report_on(space: StateSpace[Any], queries: Iterable[Query] = (), deadline: Deadline = NEVER) -> CheckReport:
-    """Decide every verdict of this room, and the queries, on a state space that was explored before.
-
-    The deadline is for the queries whose formulas must be turned into automata.
-    """
+def report_on(space: StateSpace[Any], queries: Iterable[Query] = ()) -> CheckReport:
+    """Decide every verdict of this room, and the queries, on a state space that was explored before."""
     behaviour, conflicts = Behaviour(space), ConflictAnalysis(space)
     steps = _steps(space)
     verdicts = [
@@ -130,7 +126,7 @@ def report_on(space: StateSpace[Any], queries: Iterable[Query] = (), deadline: D
         *(decide(space) for decide in _ON_SPACE),
         starvation_free(behaviour),
         *decide_properties(space),
-        *(answer(space, query, deadline) for query in queries),
+        *(answer(space, query) for query in queries),
     ]
     return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), tuple(verdicts), space)
 

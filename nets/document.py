@@ -112,16 +112,17 @@ class LeadsToDocument(_Document):
 
 
 PATTERNS: Final = ("never", "always", "reachable", "leads_to", "always_possible")
+LOGICS: Final = ("ctl", "ltl")
 
 
 class PropertyDocument(_Document):
-    """One temporal pattern."""
+    """One temporal pattern, or one formula of CTL or LTL."""
 
     model_config = ConfigDict(
         extra="forbid",
         strict=True,
         frozen=True,
-        json_schema_extra={"oneOf": [{"required": [pattern]} for pattern in PATTERNS]},
+        json_schema_extra={"oneOf": [{"required": [pattern]} for pattern in (*PATTERNS, *LOGICS)]},
     )
 
     never: FormulaText | None = None
@@ -139,12 +140,14 @@ class PropertyDocument(_Document):
         | None
     ) = None
     always_possible: FormulaText | None = None
+    ctl: FormulaText | None = Field(default=None, description="A formula of CTL, which must hold at first.")
+    ltl: FormulaText | None = Field(default=None, description="A formula of LTL, which every run must satisfy.")
 
     @model_validator(mode="after")
     def _one_pattern(self) -> PropertyDocument:
-        count = sum(getattr(self, pattern) is not None for pattern in PATTERNS)
+        count = sum(getattr(self, pattern) is not None for pattern in (*PATTERNS, *LOGICS))
         if count != 1:
-            raise ValueError(f"one of {', '.join(PATTERNS)} is wanted, {count or 'none'} given")
+            raise ValueError(f"one of {', '.join((*PATTERNS, *LOGICS))} is wanted, {count or 'none'} given")
         return self
 
 

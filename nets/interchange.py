@@ -32,8 +32,10 @@ from firable.nets.net import (
     PropertyKind,
     Signal,
     SignalKind,
+    TemporalProperty,
     Transition,
 )
+from firable.nets.temporal import Logic, format_temporal, logics, parse_temporal
 
 FORMAT: Final = "firable-net/1"
 
@@ -83,16 +85,20 @@ def net_to_json(net: Net) -> dict[str, Any]:
             for t in net.transitions
         ],
         "arbiters": [{"name": a.name, "among": list(a.among), "by": str(a.by)} for a in net.arbiters],
-        "properties": [
-            {
-                "name": p.name,
-                "kind": str(p.kind),
-                "formula": format_formula(p.formula),
-                "then": None if p.then is None else format_formula(p.then),
-                "fairness": str(p.fairness),
-            }
-            for p in net.properties
-        ],
+        "properties": [_property_to_json(p) for p in net.properties],
+    }
+
+
+def _property_to_json(of: Property | TemporalProperty) -> dict[str, Any]:
+    if isinstance(of, TemporalProperty):
+        text, fairness = format_temporal(of.formula), str(Fairness.NONE)
+        return {"name": of.name, "kind": str(of.logic), "formula": text, "then": None, "fairness": fairness}
+    return {
+        "name": of.name,
+        "kind": str(of.kind),
+        "formula": format_formula(of.formula),
+        "then": None if of.then is None else format_formula(of.then),
+        "fairness": str(of.fairness),
     }
 
 
@@ -178,23 +184,41 @@ def _without_descriptions(data: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _property(record: _PropertyRecord) -> Property:
+def _property(record: _PropertyRecord) -> Property | TemporalProperty:
     if (record.then is None) == (record.kind == "leads_to"):
         raise InputError(
             [Diagnostic("F1015", f"the property '{record.name}' wants 'then' exactly where it is a leads_to", "")]
         )
+    if record.kind in {*Logic}:
+        return _temporal_property(record)
     formula = _formula(record.name, record.formula)
     then = None if record.then is None else _formula(record.name, record.then)
     return Property(record.name, PropertyKind(record.kind), formula, then, Fairness(record.fairness))
+
+
+def _temporal_property(record: _PropertyRecord) -> TemporalProperty:
+    logic = Logic(record.kind)
+    if record.fairness != "none":
+        raise InputError([Diagnostic("F1015", f"the property '{record.name}' assumes no fairness", "")])
+    try:
+        formula = parse_temporal(record.formula)
+        if logic not in logics(formula):
+            raise FormulaError(f"not of {logic.upper()}", 0)
+    except FormulaError as error:
+        raise _no_formula(record.name, error) from None
+    return TemporalProperty(record.name, logic, formula)
 
 
 def _formula(name: str, text: str) -> Formula:
     try:
         return parse_formula(text)
     except FormulaError as error:
-        raise InputError(
-            [Diagnostic("F1012", f"the property '{name}' is not a formula: {error.message}", "", ("properties", name))]
-        ) from None
+        raise _no_formula(name, error) from None
+
+
+def _no_formula(name: str, error: FormulaError) -> InputError:
+    message = f"the property '{name}' is not a formula: {error.message}"
+    return InputError([Diagnostic("F1012", message, "", ("properties", name))])
 
 
 class _Record(BaseModel):
@@ -252,7 +276,7 @@ class _ArbiterRecord(_Record):
 
 class _PropertyRecord(_Record):
     name: str
-    kind: Literal["never", "always", "reachable", "leads_to", "always_possible"]
+    kind: Literal["never", "always", "reachable", "leads_to", "always_possible", "ctl", "ltl"]
     formula: str
     then: str | None
     fairness: Literal["none", "weak", "strong"]

@@ -24,6 +24,7 @@ from typing import Final
 
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula
+from firable.nets.temporal import Logic, Temporal
 
 Marking = int
 """The set of places with a token; bit i is place i of the net."""
@@ -173,6 +174,15 @@ class Property:
 
 
 @dataclass(frozen=True, slots=True)
+class TemporalProperty:
+    """A property that no temporal pattern says: a formula of CTL or LTL, which must hold in M0."""
+
+    name: str
+    logic: Logic
+    formula: Temporal
+
+
+@dataclass(frozen=True, slots=True)
 class Masks:
     """The sets of one transition as bit masks over the places."""
 
@@ -201,7 +211,7 @@ class Net:
     signals: tuple[Signal, ...] = ()
     controllers: tuple[Controller, ...] = ()
     arbiters: tuple[Arbiter, ...] = ()
-    properties: tuple[Property, ...] = ()
+    properties: tuple[Property | TemporalProperty, ...] = ()
     description: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:

@@ -28,8 +28,10 @@ from firable.nets.net import (
     PropertyKind,
     Signal,
     SignalKind,
+    TemporalProperty,
     Transition,
 )
+from firable.nets.temporal import format_temporal
 from firable.nets.text import parse_net
 from firable.nets.yaml_tree import is_ambiguous
 
@@ -189,7 +191,9 @@ def _transition(net: Net, transition: Transition) -> list[tuple[str, str]]:
     ]
 
 
-def _property(prop: Property) -> list[tuple[str, str]]:
+def _property(prop: Property | TemporalProperty) -> list[tuple[str, str]]:
+    if isinstance(prop, TemporalProperty):
+        return [(str(prop.logic), _text(format_temporal(prop.formula)))]
     if prop.kind is not PropertyKind.LEADS_TO or prop.then is None:
         return [(str(prop.kind), _text(format_formula(prop.formula)))]
     source, target = _text(format_formula(prop.formula)), _text(format_formula(prop.then))

@@ -24,7 +24,7 @@ which are half of the characters of a place's name and which no engineer reads a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -373,6 +373,30 @@ def atoms_in(formula: Temporal) -> Iterator[Holds | Firable | Fires]:
         case _:
             for operand in _operands(formula):
                 yield from atoms_in(operand)
+
+
+def with_states(formula: Temporal, changed: Callable[[Formula], Formula]) -> Temporal:
+    """The formula with each of its largest state formulas changed.
+
+    >>> format_temporal(with_states(parse_temporal("AG (p and q)"), Not))
+    'AG not (p and q)'
+    """
+    match formula:
+        case Fires():
+            return formula
+        case TemporalNot(operand):
+            return negated(with_states(operand, changed))
+        case TemporalAnd(operands):
+            return all_of(tuple(with_states(operand, changed) for operand in operands))
+        case TemporalOr(operands):
+            return any_of(tuple(with_states(operand, changed) for operand in operands))
+        case Next() | Eventually() | Globally():
+            return type(formula)(with_states(formula.operand, changed))
+        case Until() | Release() | WeakUntil():
+            return type(formula)(with_states(formula.left, changed), with_states(formula.right, changed))
+        case Exists() | ForAll():
+            return type(formula)(with_states(formula.path, changed))
+    return changed(formula)
 
 
 def has_events(formula: Temporal) -> bool:

@@ -39,10 +39,12 @@ from firable.nets.net import (
     PropertyKind,
     Signal,
     SignalKind,
+    TemporalProperty,
     Transition,
 )
 from firable.nets.pausing import without_cycle_search
 from firable.nets.source import Source, read_source
+from firable.nets.temporal import Logic, Temporal, logics, parse_temporal
 from firable.nets.text_positions import Positions
 from firable.nets.yaml_tree import Node, data, parse_tree
 
@@ -218,7 +220,7 @@ class _Reading:
                 transition.description,
             )
 
-    def properties(self) -> Iterator[Property]:
+    def properties(self) -> Iterator[Property | TemporalProperty]:
         for name, body in (self.document.properties or {}).items():
             if body.leads_to is not None:
                 source = self.formula(body.leads_to.source, ("properties", name, "leads_to", "from"))
@@ -230,19 +232,32 @@ class _Reading:
                 text = getattr(body, pattern)
                 if text is not None and (formula := self.formula(text, ("properties", name, pattern))):
                     yield Property(name, PropertyKind(pattern), formula)
+            for logic in Logic:
+                text = getattr(body, logic)
+                if text is not None and (temporal := self.temporal(text, logic, ("properties", name, logic))):
+                    yield TemporalProperty(name, logic, temporal)
 
     def formula(self, text: str, subject: Subject) -> Formula | None:
         try:
             return parse_formula(text)
         except FormulaError as error:
-            problem = Diagnostic(
-                "F1012",
-                f"not a formula: {error.message}",
-                "write places joined by and, or, not, -> and brackets",
-                subject,
-            )
-            self.problem(replace(problem, span=self.positions.in_formula(subject, error.column)))
+            self.no_formula(error, "write places joined by and, or, not, -> and brackets", subject)
             return None
+
+    def temporal(self, text: str, logic: Logic, subject: Subject) -> Temporal | None:
+        try:
+            formula = parse_temporal(text)
+            if logic not in logics(formula):
+                raise FormulaError(f"this is a formula of {'LTL' if logic is Logic.CTL else 'CTL'}", 0)
+        except FormulaError as error:
+            hint = "CTL has EX, EF, EG, E[p U q] and the same with A; LTL has X, F, G, p U q"
+            self.no_formula(error, hint, subject)
+            return None
+        return formula
+
+    def no_formula(self, error: FormulaError, hint: str, subject: Subject) -> None:
+        problem = Diagnostic("F1012", f"not a formula: {error.message}", hint, subject)
+        self.problem(replace(problem, span=self.positions.in_formula(subject, error.column)))
 
 
 def _unknown_start(scope: _Scope, local: str, subject: Subject) -> Diagnostic:

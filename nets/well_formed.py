@@ -12,8 +12,20 @@ from dataclasses import dataclass
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean
-from firable.nets.formula import CONSTANT_ATOMS, Holds, names_in
-from firable.nets.net import ArbitrationRule, ExternalGate, Net, Place, PropertyKind, Signal, SignalKind, Transition
+from firable.nets.formula import CONSTANT_ATOMS, Firable, Holds, names_in
+from firable.nets.net import (
+    ArbitrationRule,
+    ExternalGate,
+    Net,
+    Place,
+    Property,
+    PropertyKind,
+    Signal,
+    SignalKind,
+    TemporalProperty,
+    Transition,
+)
+from firable.nets.temporal import Fires, atoms_in, logics
 
 FORBIDDEN_IN_NAMES: Final = frozenset(" \t\r\n()[]{},:#&*!|>'\"%@`\\")
 
@@ -281,14 +293,23 @@ def _properties(net: Net) -> Iterator[Diagnostic]:
             ("places", name),
         )
     for prop in net.properties:
-        if (prop.then is None) == (prop.kind is PropertyKind.LEADS_TO):
-            raise ValueError(f"'{prop.name}': exactly `leads_to` has a second formula")
-        for formula in (prop.formula, prop.then):
-            for atom in names_in(formula) if formula else ():
-                if isinstance(atom, Holds):
-                    if atom.place not in places:
-                        subject: Subject = ("properties", prop.name, atom.place)
-                        yield _unknown("F2002", "place", atom.place, places, subject)
-                elif atom.transition not in transitions:
-                    subject = ("properties", prop.name, atom.transition)
-                    yield _unknown("F2004", "transition", atom.transition, transitions, subject)
+        for atom in _atoms(prop):
+            if isinstance(atom, Holds):
+                if atom.place not in places:
+                    subject: Subject = ("properties", prop.name, atom.place)
+                    yield _unknown("F2002", "place", atom.place, places, subject)
+            elif atom.transition not in transitions:
+                subject = ("properties", prop.name, atom.transition)
+                yield _unknown("F2004", "transition", atom.transition, transitions, subject)
+
+
+def _atoms(prop: Property | TemporalProperty) -> Iterator[Holds | Firable | Fires]:
+    if isinstance(prop, TemporalProperty):
+        if prop.logic not in logics(prop.formula):
+            raise ValueError(f"'{prop.name}' is no formula of {prop.logic.upper()}")
+        yield from atoms_in(prop.formula)
+        return
+    if (prop.then is None) == (prop.kind is PropertyKind.LEADS_TO):
+        raise ValueError(f"'{prop.name}': exactly `leads_to` has a second formula")
+    for formula in (prop.formula, prop.then):
+        yield from names_in(formula) if formula else ()

@@ -12,7 +12,8 @@ from dataclasses import replace
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import And, Compare, Count, Formula, Holds, Not, Or
-from firable.nets.net import Net, Transition
+from firable.nets.net import Net, TemporalProperty, Transition
+from firable.nets.temporal import with_states
 
 
 def complement(net: Net, place: str, *, new_name: str | None = None, flip_gates: bool = True) -> Net:
@@ -86,7 +87,9 @@ def complement(net: Net, place: str, *, new_name: str | None = None, flip_gates:
         places=tuple(replace(p, name=name, marked=not p.marked) if p is old else p for p in net.places),
         transitions=tuple(map(changed, net.transitions)),
         properties=tuple(
-            replace(prop, formula=reversed_in(prop.formula), then=reversed_in(prop.then) if prop.then else None)
+            replace(prop, formula=with_states(prop.formula, reversed_in))
+            if isinstance(prop, TemporalProperty)
+            else replace(prop, formula=reversed_in(prop.formula), then=reversed_in(prop.then) if prop.then else None)
             for prop in net.properties
         ),
     )

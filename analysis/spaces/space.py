@@ -97,6 +97,11 @@ class StateSpace(Protocol[S]):
         """The markings where no transition is firable and openable, among those that were expanded."""
         ...
 
+    @property
+    def deadline(self) -> Deadline:
+        """When questions to the space end."""
+        ...
+
     def until(self, deadline: Deadline) -> StateSpace[S]:
         """The same space, for questions that end with another deadline."""
         ...

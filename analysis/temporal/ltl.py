@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.temporal.automaton import FALSE, TRUE, automaton_of, positive, replaced
 from firable.analysis.temporal.product import Pairs, Product
 from firable.analysis.temporal.sets import Sets
@@ -23,9 +22,7 @@ from firable.nets.temporal import Temporal, negated
 S = TypeVar("S")
 
 
-def refuting(
-    sets: Sets[S], formula: Temporal, deadline: Deadline = NEVER
-) -> tuple[Product[S], Pairs[S], Pairs[S]] | None:
+def refuting(sets: Sets[S], formula: Temporal) -> tuple[Product[S], Pairs[S], Pairs[S]] | None:
     """The product with the automaton of the negation, where runs are accepted, and what leads there.
 
     None where M0 does not lead there: the formula holds.
@@ -40,8 +37,8 @@ def refuting(
             return FALSE
         return TRUE if sets.empty(sets.outside(markings)) else state
 
-    automaton = automaton_of(replaced(positive(negated(formula)), known), deadline=deadline)
-    product = Product.of(sets, automaton, deadline)
+    automaton = automaton_of(replaced(positive(negated(formula)), known), deadline=sets.space.deadline)
+    product = Product.of(sets, automaton)
     fair = product.fair()
     if not fair:
         return None

@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, TypeVar
 
-from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.temporal.automaton import Automaton, TimeEndedError
 from firable.analysis.temporal.sets import Sets
 from firable.nets.formula import Formula
@@ -51,10 +50,9 @@ class Product(Generic[S]):
     sets: Sets[S]
     edges: tuple[tuple[ProductEdge[S], ...], ...]
     n_marks: int
-    deadline: Deadline = NEVER
 
     @classmethod
-    def of(cls, sets: Sets[S], automaton: Automaton, deadline: Deadline = NEVER) -> Product[S]:
+    def of(cls, sets: Sets[S], automaton: Automaton) -> Product[S]:
         """The product with an automaton; edges whose atoms hold nowhere are left out."""
         net = sets.space.net
         rows: list[tuple[ProductEdge[S], ...]] = []
@@ -67,14 +65,14 @@ class Product(Generic[S]):
                 if possible and not sets.empty(markings):
                     row.append(ProductEdge(markings, by, not edge.fires, edge.target, edge.marks))
             rows.append(tuple(row))
-        return cls(sets, tuple(rows), automaton.n_marks, deadline)
+        return cls(sets, tuple(rows), automaton.n_marks)
 
     def back(self, edge: ProductEdge[S], pairs: Pairs[S], seen: dict[object, S]) -> S:
         """The markings from which the edge leads into the pairs; `seen` remembers steps back to the same set."""
         targets = pairs.get(edge.target)
         if targets is None:
             return self.sets.none
-        if self.deadline.over:
+        if self.sets.space.deadline.over:
             raise TimeEndedError
         key = (edge.target, edge.by)
         if key not in seen:

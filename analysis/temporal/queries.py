@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.question import Answer, Question, listed, no, unknown, yes
 from firable.analysis.spaces.space import StateSpace, WitnessError
 from firable.analysis.temporal.automaton import TimeEndedError, TooLargeError
@@ -22,6 +21,7 @@ from firable.analysis.temporal.lasso import TooLongError, accepted_run, satisfie
 from firable.analysis.temporal.ltl import refuting
 from firable.analysis.temporal.sets import Sets
 from firable.nets.formula import Compare, Count, Formula, Not, Sign, format_count
+from firable.nets.net import TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
 from firable.nets.temporal import (
     Eventually,
@@ -38,16 +38,16 @@ from firable.semantics.trace import Discipline
 S = TypeVar("S")
 
 
-def as_goal(query: Query) -> tuple[Formula, bool] | None:
-    """The goal that decides a query, and whether reaching it makes the query hold; None where no goal does.
+def as_goal(formula: Temporal | None) -> tuple[Formula, bool] | None:
+    """The goal that decides a formula, and whether reaching it makes the formula hold; None where no goal does.
 
     `EF p` holds iff p is reachable, `AG p` holds iff `not p` is not.
 
-    >>> from firable.nets.queries import parse_query
-    >>> as_goal(parse_query("AG p"))
+    >>> from firable.nets.temporal import parse_temporal
+    >>> as_goal(parse_temporal("AG p"))
     (Not(operand=Holds(place='p')), False)
     """
-    match query.formula:
+    match formula:
         case Exists(Eventually(operand)) if isinstance(operand, Formula):
             return operand, True
         case ForAll(Globally(operand)) if isinstance(operand, Formula):
@@ -77,15 +77,33 @@ def _at_least(places: tuple[str, ...], bound: int) -> Formula:
     return Compare(Count(places), Sign.AT_LEAST, Count(added=bound))
 
 
-def answer(space: StateSpace[Any], query: Query, deadline: Deadline = NEVER) -> Verdict:
+def answer(space: StateSpace[Any], query: Query) -> Verdict:
     """The verdict `query.NAME` on a query, under the discipline of the space.
 
-    Unknown where the space is not whole and the query needs it, and where the deadline comes.
+    Unknown where the space is not whole and the query needs it, and where the deadline of the space comes.
     """
-    question = Question(f"query.{query.name}", _statement(query))
     if query.kind is QueryKind.BOUND:
         return _bounded(space, query)
-    return question.ask(space, lambda: _answered(space, query, deadline))
+    return question_of(query).ask(space, lambda: _answered(space, query))
+
+
+def decide_temporal(space: StateSpace[Any], of: TemporalProperty) -> Verdict:
+    """The verdict `property.NAME` on a property of the net in CTL or LTL."""
+    return temporal_question(of).ask(space, lambda: _answered(space, _query(of)))
+
+
+def question_of(query: Query) -> Question:
+    """The question that a query of any kind but a bound is."""
+    return Question(f"query.{query.name}", _statement(query))
+
+
+def temporal_question(of: TemporalProperty) -> Question:
+    """The question that a temporal property is."""
+    return Question(f"property.{of.name}", _statement(_query(of)))
+
+
+def _query(of: TemporalProperty) -> Query:
+    return Query(of.name, QueryKind(of.logic), of.formula)
 
 
 def _statement(query: Query) -> str:
@@ -103,14 +121,14 @@ def _statement(query: Query) -> str:
     return format_query(query)
 
 
-def _answered(space: StateSpace[Any], query: Query, deadline: Deadline) -> Answer:
-    if (goal := as_goal(query)) is not None:
+def _answered(space: StateSpace[Any], query: Query) -> Answer:
+    if (goal := as_goal(query.formula)) is not None:
         return _goal(space, goal[0], holds=goal[1])
     match query.kind:
         case QueryKind.CTL if query.formula is not None:
             return _ctl(space, query.formula)
         case QueryKind.LTL if query.formula is not None:
-            return _ltl(space, query.formula, deadline)
+            return _ltl(space, query.formula)
         case QueryKind.LIVE:
             dead = [t.name for t, live in zip(space.net.transitions, space.live(), strict=True) if not live]
             return no(tuple(dead), hint=f"not live: {listed(dead)}") if dead else yes()
@@ -142,12 +160,12 @@ def _ctl(space: StateSpace[S], formula: Temporal) -> Answer:
     return no(witness=refuted(ctl, formula))
 
 
-def _ltl(space: StateSpace[S], formula: Temporal, deadline: Deadline) -> Answer:
+def _ltl(space: StateSpace[S], formula: Temporal) -> Answer:
     net = space.net
     if has_events(formula) and space.discipline is Discipline.STEP:
         return unknown("`fires` names one firing, and a step holds several", "ask it under interleaving")
     try:
-        found = refuting(Sets(space), formula, deadline)
+        found = refuting(Sets(space), formula)
     except TooLargeError as error:
         return unknown(str(error), "write a shorter formula, or several")
     except TimeEndedError:

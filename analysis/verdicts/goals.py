@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 from firable.analysis.question import Question, listed
-from firable.analysis.temporal.queries import as_goal
+from firable.analysis.temporal.queries import as_goal, temporal_question
 from firable.analysis.verdicts.behaviour import CONTACT_FREE, DEADLOCK_FREE, QUASI_LIVE
 from firable.analysis.verdicts.commands import (
     COMMANDS_AGREE,
@@ -27,7 +27,7 @@ from firable.analysis.verdicts.commands import (
 )
 from firable.analysis.verdicts.properties import statement
 from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Or, format_formula
-from firable.nets.net import Marking, Net, Property, PropertyKind, Transition
+from firable.nets.net import Marking, Net, Property, PropertyKind, TemporalProperty, Transition
 from firable.nets.queries import Query
 from firable.nets.verdict import Verdict
 from firable.semantics.algebra import BOOL
@@ -71,6 +71,9 @@ def goals_of(net: Net, name: str, fired: Collection[str] = ()) -> tuple[Question
             return COMPLETIONS_APART, _apart(net, completion_clashes(net))
         case _ if name.startswith("property."):
             of = next(of for of in net.properties if f"property.{of.name}" == name)
+            if isinstance(of, TemporalProperty):
+                goal = as_goal(of.formula)
+                return None if goal is None else (temporal_question(of), (_goal(*goal),))
             goals = _property(of)
             return None if goals is None else (Question(name, statement(of)), goals)
         case _:
@@ -80,12 +83,12 @@ def goals_of(net: Net, name: str, fired: Collection[str] = ()) -> tuple[Question
 def query_goals(queries: Iterable[Query], verdict: Verdict) -> tuple[Question, tuple[Goal, ...]] | None:
     """The question of the verdict on one of the queries, and its goal; None where it is none, or none does."""
     query = next((query for query in queries if f"query.{query.name}" == verdict.name), None)
-    asked = None if query is None else as_goal(query)
-    if asked is None:
-        return None
-    formula, wanted = asked
-    note = f"here ({format_formula(formula)}) holds"
-    return Question(verdict.name, verdict.statement), (Goal(formula, lambda _: ((), note), wanted),)
+    goal = None if query is None else as_goal(query.formula)
+    return None if goal is None else (Question(verdict.name, verdict.statement), (_goal(*goal),))
+
+
+def _goal(formula: Formula, wanted: bool) -> Goal:
+    return Goal(formula, lambda _: ((), f"here ({format_formula(formula)}) holds"), wanted)
 
 
 def _never(bad: Formula, told: Callable[[Marking], Told]) -> tuple[Goal, ...]:

@@ -3,7 +3,8 @@
 Each kind is one temporal pattern over state formulas, with its own method and its own counterexample: `never` and
 `always` by looking at every marking, `reachable` by finding one, `always_possible` (AG EF p) by the backward closure
 of p, `leads_to` by fair components (`firable.analysis.verdicts.leads_to`). The shortest firing sequence to a marking
-that violates the property is the evidence; for `reachable` the sequence is the proof.
+that violates the property is the evidence; for `reachable` the sequence is the proof. What no pattern says is a formula
+of CTL or LTL (`firable.analysis.temporal`).
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ from typing import Any
 
 from firable.analysis.question import Answer, Question, no, yes
 from firable.analysis.spaces.space import StateSpace
+from firable.analysis.temporal.queries import decide_temporal
 from firable.analysis.verdicts.leads_to import leads_to
 from firable.nets.formula import Not, format_formula
-from firable.nets.net import Fairness, Property, PropertyKind
+from firable.nets.net import Fairness, Property, PropertyKind, TemporalProperty
 from firable.nets.verdict import Verdict
 
 _FAIRNESS = {
@@ -67,7 +69,10 @@ def decide_property(space: StateSpace[Any], of: Property) -> Verdict:
 
 def decide_properties(space: StateSpace[Any]) -> tuple[Verdict, ...]:
     """The verdicts on all properties of the net, in the order of the file."""
-    return tuple(decide_property(space, of) for of in space.net.properties)
+    return tuple(
+        decide_temporal(space, of) if isinstance(of, TemporalProperty) else decide_property(space, of)
+        for of in space.net.properties
+    )
 
 
 def _invariant(space: StateSpace[Any], of: Property, *, violating: bool) -> Answer:

@@ -12,11 +12,16 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.temporal.automaton import TimeEndedError, TooLargeError, automaton_of, positive
 from firable.analysis.temporal.queries import answer, as_goal, upper_bound
-from firable.nets.catalogue import catalogue_net
-from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
+from firable.analysis.verdicts.goals import goals_of
+from firable.analysis.verdicts.properties import decide_properties
+from firable.decompose import split
+from firable.nets.catalogue import catalogue_net, catalogue_path
+from firable.nets.net import ExternalGate, Net, Place, Signal, TemporalProperty, Transition
 from firable.nets.queries import parse_query
-from firable.nets.temporal import parse_temporal
-from firable.nets.verdict import Status, Verdict
+from firable.nets.right_to_run import required_verdicts
+from firable.nets.temporal import Logic, parse_temporal
+from firable.nets.text import parse_net
+from firable.nets.verdict import Status, Verdict, Weight
 
 CELL = catalogue_net("one_robot")
 LATE = catalogue_net("one_robot_mc_late")
@@ -130,12 +135,12 @@ def test_one_marking_decides_what_one_marking_can() -> None:
 
 @pytest.mark.parametrize("text", ["EF p", "AG not p", "G p"])
 def test_a_goal_decides_what_it_can(text: str) -> None:
-    assert as_goal(parse_query(text)) is not None
-    assert as_goal(parse_query(f"{text} and X p" if text == "G p" else f"{text} and EX p")) is None
+    assert as_goal(parse_temporal(text)) is not None
+    assert as_goal(parse_temporal(f"{text} and X p" if text == "G p" else f"{text} and EX p")) is None
 
 
 def test_the_time_ends_a_search_for_a_run() -> None:
-    verdict = answer(explore(CELL), parse_query("G F X start"), Deadline.after(0))
+    verdict = answer(explore(CELL).until(Deadline.after(0)), parse_query("G F X start"))
     assert (verdict.status, verdict.code) == (Status.UNKNOWN, "F3004")
 
 
@@ -147,3 +152,33 @@ def test_an_automaton_that_is_too_large_is_not_made() -> None:
         automaton_of(formula, states_max=5)
     with pytest.raises(TimeEndedError):
         automaton_of(formula, deadline=Deadline.after(0))
+
+
+def test_a_net_states_properties_in_both_logics() -> None:
+    text = catalogue_path("one_robot_mc_late").read_text("utf-8").rstrip()
+    added = "  back: {ctl: AG EF start}\n  once: {ltl: G F start}\n"
+    added += "  never_two: {ltl: G not deadlock}\n  some: {ctl: EF deadlock}\n"
+    assert "\nproperties:\n" in text
+    net = parse_net(f"{text}\n{added}")
+    verdicts = {verdict.name: verdict for verdict in decide_properties(explore(net))}
+    for name in ("back", "once", "never_two"):
+        verdict = verdicts[f"property.{name}"]
+        assert (verdict.status, verdict.weight) == (Status.VIOLATED, Weight.REQUIRED)
+        assert verdict.witness is not None
+    assert verdicts["property.some"].status is Status.PROVED
+    assert {"property.back", "property.some"} <= set(required_verdicts(split(net)))
+
+
+@pytest.mark.parametrize(("name", "wanted"), [("never_two", False), ("some", True)])
+def test_a_property_that_is_a_goal_is_one(name: str, wanted: bool) -> None:
+    formulas = {"never_two": ("ltl", "G not deadlock"), "some": ("ctl", "EF deadlock")}
+    logic, text = formulas[name]
+    net = Net("n", properties=(TemporalProperty(name, Logic(logic), parse_temporal(text)),))
+    found = goals_of(net, f"property.{name}")
+    assert found is not None
+    question, (goal,) = found
+    assert question.name == f"property.{name}"
+    assert goal.wanted is wanted
+    assert NaiveSpace(net).satisfying(goal.formula) == {0}
+    other = Net("n", properties=(TemporalProperty(name, Logic.CTL, parse_temporal("AG EF start")),))
+    assert goals_of(other, f"property.{name}") is None

@@ -6,6 +6,7 @@ from firable.analysis.spaces.reachability import explore
 from firable.decompose import split
 from firable.nets.catalogue import FAMILIES, catalogue_net, family_net
 from firable.nets.catalogue.families import Family
+from firable.nets.net import Property
 from firable.nets.printing import format_net
 from firable.nets.text import parse_net
 
@@ -58,6 +59,7 @@ def test_a_net_of_a_family_is_contact_free_and_its_property_holds(name: str) -> 
     for t in range(len(net.transitions)):
         assert not graph.in_contact(t).any()
     for prop in net.properties:
+        assert isinstance(prop, Property)
         assert not graph.satisfying(prop.formula).any()
 
 

@@ -95,6 +95,9 @@ def test_a_missing_or_unknown_key_is_refused(path: tuple[Any, ...]) -> None:
         assert {problem.code for problem in refused.value.diagnostics} == {"F1015"}
 
 
+TEMPORAL = {"name": "x", "kind": "ctl", "formula": "EF start", "then": None, "fairness": "none"}
+
+
 @pytest.mark.parametrize(
     ("path", "value", "code"),
     [
@@ -103,6 +106,10 @@ def test_a_missing_or_unknown_key_is_refused(path: tuple[Any, ...]) -> None:
         (("transitions", 0, "number"), True, "F1015"),
         (("properties", 0, "formula"), "a and", "F1012"),
         (("properties", 0, "kind"), "leads_to", "F1015"),
+        (("properties", 0, "kind"), "ctl", "F1015"),
+        (("properties", 0), {**TEMPORAL, "formula": "AG"}, "F1012"),
+        (("properties", 0), {**TEMPORAL, "kind": "ltl"}, "F1012"),
+        (("properties", 0), {**TEMPORAL, "formula": "EF nowhere"}, "F2002"),
         (("properties", 0, "kind"), "sometimes", "F1015"),
         (("transitions", 0, "inputs"), ["nowhere"], "F2002"),
         (("transitions", 1, "external"), [], "F1015"),

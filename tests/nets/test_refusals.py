@@ -110,6 +110,9 @@ TABLE = (
     # formulas
     net("formula that ends too early", "places: {a: }\nproperties: {p: {never: a and}}\n", "F1012 4:30",
         "write places joined"),
+    net("CTL in LTL", "places: {a: }\nproperties: {p: {ltl: AG a}}\n", "F1012 4:23", "LTL has X, F, G"),
+    net("half a formula of CTL", "places: {a: }\nproperties: {p: {ctl: AG EF}}\n", "F1012 4:28", "CTL has EX"),
+    net("unknown event", "places: {a: }\nproperties: {p: {ltl: G fires(t)}}\n", "F2004 4:31", "Declare it first"),
     net("formula in quotes", "places: {a: }\nproperties: {p: {never: 'a or )'}}\n", "F1012 4:31",
         "write places joined"),
     net("formula in leads_to", "places: {a: }\nproperties: {p: {leads_to: [a, not]}}\n", "F1012 4:35",

@@ -51,6 +51,7 @@ HEAD = "firable: 1\ncell: c\n"
         "properties: {p: {leads_to: [a, b]}}\nplaces: {a: , b: }\n",
         "properties: {p: {leads_to: {from: a, to: b, fairness: none}}}\nplaces: {a: , b: }\n",
         "properties: {p: {always: true}}\n",
+        "properties: {p: {ctl: true}, q: {ltl: 'G F start'}}\n",
         "transitions: {t: {number: 3}}\n",
     ],
 )
@@ -73,6 +74,7 @@ def test_what_the_reader_takes_validates(body: str) -> None:
         "arbiters: {a: }\n",
         "properties: {p: {}}\n",
         "properties: {p: {never: a, always: b}}\n",
+        "properties: {p: {ctl: a, ltl: b}}\n",
         "properties: {p: {leads_to: [a]}}\n",
         'places: {"": }\n',
     ],

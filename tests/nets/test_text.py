@@ -13,9 +13,12 @@ from firable.nets.net import (
     Fairness,
     Net,
     Place,
+    Property,
     PropertyKind,
     SignalKind,
+    TemporalProperty,
 )
+from firable.nets.temporal import Logic, format_temporal
 from firable.nets.text import parse_net
 
 HEAD = "firable: 1\ncell: c\n"
@@ -85,12 +88,30 @@ def test_properties_are_patterns_over_formulas() -> None:
         "places: {a: , b: }\nproperties:\n  p: {leads_to: [a, b]}\n"
         "  q: {leads_to: {from: a, to: b, fairness: none}}\n  r: {always_possible: start}\n"
     ).properties
-    assert [(p.kind, p.formula, p.then) for p in found] == [
+    patterns = [p for p in found if isinstance(p, Property)]
+    assert [(p.kind, p.formula, p.then) for p in patterns] == [
         (PropertyKind.LEADS_TO, Holds("a"), Holds("b")),
         (PropertyKind.LEADS_TO, Holds("a"), Holds("b")),
         (PropertyKind.ALWAYS_POSSIBLE, Start(), None),
     ]
-    assert [p.fairness for p in found[:2]] == [Fairness.WEAK, Fairness.NONE]
+    assert [p.fairness for p in patterns[:2]] == [Fairness.WEAK, Fairness.NONE]
+
+
+def test_a_property_is_a_formula_of_one_of_two_logics() -> None:
+    found = net(
+        "places: {a: , A: }\nproperties:\n  p: {ctl: 'E[a U AG \"A\"]'}\n"
+        "  q:\n    ltl: G (a -> F tokens(a, A) = 0)\n  r: {ltl: a}\n"
+    ).properties
+    assert [(p.name, p.logic) for p in found if isinstance(p, TemporalProperty)] == [
+        ("p", Logic.CTL),
+        ("q", Logic.LTL),
+        ("r", Logic.LTL),
+    ]
+    assert [format_temporal(p.formula) for p in found] == [
+        'E[a U AG "A"]',
+        "G (not a or F tokens(a, A) = 0)",
+        "a",
+    ]
 
 
 def test_an_arbiter_is_by_priority_unless_it_says_otherwise() -> None:

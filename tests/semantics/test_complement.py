@@ -5,8 +5,9 @@ from hypothesis import given
 from support.dense_nets import dense_nets
 
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import parse_formula
-from firable.nets.net import Command, Net, Place, Property, PropertyKind, Transition
+from firable.nets.formula import Not, parse_formula
+from firable.nets.net import Command, Net, Place, Property, PropertyKind, TemporalProperty, Transition
+from firable.nets.temporal import Globally, Logic, Next, TemporalAnd
 from firable.semantics.algebra import BOOL
 from firable.semantics.complement import complement
 from firable.semantics.formulas import evaluate
@@ -34,11 +35,17 @@ def test_the_complement_of_the_complement_is_the_net(net: Net) -> None:
 def test_a_property_says_of_the_complement_what_it_said_of_the_place() -> None:
     formula = parse_formula("(p -> q) and tokens(p, q) + 1 <= tokens(r, p, p) and not tokens(q, p) < 1")
     places = tuple(map(Place, "pqr"))
-    net = Net("n", places, properties=(Property("x", PropertyKind.NEVER, formula),))
+    asked = Property("x", PropertyKind.NEVER, formula)
+    temporal = TemporalProperty("y", Logic.LTL, Globally(TemporalAnd((formula, Next(Not(formula))))))
+    net = Net("n", places, (Transition("t"),), properties=(asked, temporal))
     other = complement(net, "p")
+    changed, changed_too = other.properties
+    assert isinstance(changed, Property)
     for marking in range(8):
-        changed = evaluate(BOOL, other, other.properties[0].formula, holds_in(marking ^ 1))
-        assert changed is evaluate(BOOL, net, formula, holds_in(marking))
+        value = evaluate(BOOL, other, changed.formula, holds_in(marking ^ 1))
+        assert value is evaluate(BOOL, net, formula, holds_in(marking))
+    new = changed.formula
+    assert changed_too.formula == Globally(TemporalAnd((new, Next(Not(new)))))
 
 
 def test_a_place_that_sends_a_command_has_no_complement() -> None:

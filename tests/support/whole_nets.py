@@ -1,6 +1,7 @@
 """Hypothesis strategy: nets with all that the net file can say, for round trips."""
 
 from hypothesis import strategies as st
+from support.temporal_formulas import ctl_formulas, ltl_formulas
 
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start
 from firable.nets.net import (
@@ -16,8 +17,10 @@ from firable.nets.net import (
     PropertyKind,
     Signal,
     SignalKind,
+    TemporalProperty,
     Transition,
 )
+from firable.nets.temporal import Logic
 
 _WORDS = st.sampled_from(
     ["free", "run", "on", "no", "1", "007", "1e3", "y", "x-1", "a.b", "Förderer", "null", "true", "-", "="]
@@ -106,13 +109,16 @@ def whole_nets(draw: st.DrawFn) -> Net:
     arbiters = []
     if len(names) > 1 and draw(st.booleans()):
         arbiters.append(Arbiter("next", tuple(names[:2]), draw(st.sampled_from(ArbitrationRule))))
-    properties = []
+    properties: list[Property | TemporalProperty] = []
     if "true" not in places:  # a place of this name cannot be named in a formula
         for i, kind in enumerate(draw(st.lists(st.sampled_from(PropertyKind), max_size=3))):
             some = formulas(list(places), names)
             then = draw(some) if kind is PropertyKind.LEADS_TO else None
             fairness = draw(st.sampled_from(Fairness)) if then is not None else Fairness.WEAK
             properties.append(Property(f"p{i}", kind, draw(some), then, fairness))
+        for i, logic in enumerate(draw(st.lists(st.sampled_from(Logic), max_size=1))):
+            some_of = {Logic.CTL: ctl_formulas, Logic.LTL: ltl_formulas}[logic]
+            properties.append(TemporalProperty(f"l{i}", logic, draw(some_of(list(places), names))))
     return Net(
         draw(_TEXTS),
         tuple(places.values()),
