@@ -1,0 +1,154 @@
+"""Which pairs of literals are never true together: facts that the rules of this folder rest on.
+
+A net whose every marking respects "never both a and b" is understood far better by looking at its arcs: that an output
+place is empty when the inputs are marked, that a gate is implied by an input, that a transition can never fire. All
+one-token invariants have this form (of the positions of one robot, no two hold), and so have their complements and
+what gates enforce.
+
+Method: the strongest set of such pairs that is inductive, by propagation of its complement. At first, the pairs of
+literals that are true together in M0 are possible. A move whose needs are possible pairwise may be made; after it,
+what it made is true together with what it read, and with each literal that was possible together with all of its
+needs. The least fixpoint contains all pairs that are true together in a reachable marking (Haslum and Geffner 2000,
+"Admissible heuristics for optimal planning": h²; in nets the concurrency relation of Kovalyov 1992, made exact for
+the arcs of both signs). What was known before the draft changed stays true, by the contract, and bounds what may
+become possible.
+
+Rejected: P-invariants, which know nothing of gates and contact and of which there may be exponentially many. Also
+rejected: one-token units (`firable.analysis.structure.cover`) as a first, cheaper source of facts; it took as long.
+
+A fixpoint that was not reached is no fact at all, so past the work allowed or the deadline there are none.
+
+Cost: a matrix of literals by literals in bytes; each move is looked at again when a pair of its needs has changed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.reduction.draft import Draft, Literal, Move, literal
+
+MATRIX_BYTES_MAX: Final = 256 * 2**20
+WORK_MAX: Final = 20_000_000_000
+"""Bytes of the matrix that are read, at most: some seconds."""
+_LOOK: Final = 20_000  # what looking at a move costs besides, in the same unit
+_POLL: Final = 256
+
+Matrix = npt.NDArray[np.bool_]
+
+
+class Facts(Protocol):
+    """What is known of pairs of literals."""
+
+    def exclude(self, one: Literal, other: Literal) -> bool:
+        """Whether the two are never true together."""
+        ...
+
+
+def forbids(facts: Facts, one: Literal, move: Move) -> bool:
+    """Whether the move can never be made while the literal is true."""
+    return any(facts.exclude(one, need) for need in move.literals)
+
+
+@dataclass(frozen=True, slots=True)
+class NoFacts:
+    """What is known of any net: a place is not both marked and empty."""
+
+    def exclude(self, one: Literal, other: Literal) -> bool:
+        """Whether the two are never true together."""
+        return one == other ^ 1
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """The pairs of literals that may be true together in a reachable marking; all others never are.
+
+    `numbers` are the rows of the matrix by literal; a literal of a place that was not in the draft has none.
+    """
+
+    numbers: dict[Literal, int]
+    together: Matrix
+    cells: bytes
+
+    def exclude(self, one: Literal, other: Literal) -> bool:
+        """Whether the two are never true together."""
+        return not self.cells[self.numbers[one] * len(self.numbers) + self.numbers[other]]
+
+    def dead(self, move: Move) -> bool:
+        """Whether the move can never be made."""
+        rows = [self.numbers[need] for need in move.literals]
+        return not bool(self.together[np.ix_(rows, rows)].all())
+
+
+def pairs(draft: Draft, known: Pairs | None, deadline: Deadline) -> Pairs | None:
+    """The facts on the draft as it is, at least those `known`; None past the work allowed or the deadline."""
+    order = sorted(draft.places)
+    numbers = {literal(place, value): 2 * i + value for i, place in enumerate(order) for value in (False, True)}
+    size = len(numbers)
+    if size * size > MATRIX_BYTES_MAX or deadline.over:
+        return None
+    bound = np.ones((size, size), dtype=np.bool_)
+    if known is not None:
+        rows = np.array([known.numbers[one] for one in numbers], dtype=np.intp)
+        bound = known.together[np.ix_(rows, rows)]
+    initial = np.zeros(size, dtype=np.bool_)
+    initial[[numbers[literal(place, draft.values[place])] for place in order]] = True
+    together = np.outer(initial, initial)
+    if not _propagate(draft, numbers, together, bound, deadline):
+        return None
+    return Pairs(numbers, together, together.tobytes())
+
+
+def _propagate(draft: Draft, numbers: dict[Literal, int], together: Matrix, bound: Matrix, deadline: Deadline) -> bool:
+    """Close `together` under the moves, within `bound`; False where that ended early."""
+    size, work, looked = len(numbers), 0, 0
+    changed = np.ones(size, dtype=np.int64)  # when the row of a literal changed last
+    moves = [_Rows(move, numbers) for move in draft.moves.values()]
+    now = 1
+    again = True
+    while again:
+        again = False
+        for move in moves:
+            looked += 1
+            work += _LOOK
+            if looked % _POLL == 0 and (work > WORK_MAX or deadline.over):
+                return False
+            if len(move.needs) and changed[move.needs].max() <= move.looked:
+                continue
+            if not len(move.needs) and move.looked:
+                continue
+            move.looked = now
+            work += size * (len(move.needs) + 2 * len(move.made))
+            possible: Matrix = np.logical_and.reduce(together[move.needs])
+            if not possible[move.needs].all():
+                continue
+            possible[move.own] = False
+            possible[move.after] = True
+            now += 1
+            for made in move.made:
+                new = possible & ~together[made] & bound[made]
+                if new.any():
+                    together[made] |= new
+                    together[:, made] |= new
+                    changed[new] = now
+                    changed[made] = now
+                    again = True
+    return True
+
+
+class _Rows:
+    """A move in the numbers of the matrix, and when it was looked at last."""
+
+    __slots__ = ("after", "looked", "made", "needs", "own")
+
+    def __init__(self, move: Move, numbers: dict[Literal, int]) -> None:
+        self.needs = np.array([numbers[need] for need in move.literals], dtype=np.intp)
+        self.made = [numbers[one] for one in move.made]
+        self.own = np.concatenate([self.needs, self.needs ^ 1])
+        kept = [numbers[literal(place, move.needs[place])] for place in move.reads]
+        self.after = np.array([*self.made, *kept], dtype=np.intp)
+        self.looked = 0

@@ -1,0 +1,205 @@
+"""Reduce a net until no rule applies, and lift what was found in the small net back to the given one.
+
+Rules that read the arcs alone come first, because they are cheap and make everything after them cheaper. Then facts
+are proved of the pairs of literals, which show what is implied and what may be agglomerated. Facts stay true while
+the draft changes; only when nothing more follows from them are they proved anew, of what the net has become. Each
+rule removes a transition or a place, or fires a transition early (each once), so this ends.
+
+Whatever the deadline interrupts, between two applications of a rule the draft keeps the contract (see `draft`), so
+there is always a result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Limits
+from firable.analysis.reduction.agglomeration import agglomerate
+from firable.analysis.reduction.constants import remove_constants
+from firable.analysis.reduction.copies import merge_places, remove_subsumed
+from firable.analysis.reduction.draft import Draft, Move, Origin, Tail, flat
+from firable.analysis.reduction.early import fire_early
+from firable.analysis.reduction.goals import Goal, goal_of
+from firable.analysis.reduction.implied import remove_dead, remove_implied_gates, remove_implied_places
+from firable.analysis.reduction.pairs import NoFacts, Pairs, pairs
+from firable.analysis.reduction.relevance import remove_irrelevant
+from firable.analysis.spaces.space import WitnessError, Witnesses
+from firable.nets.formula import Constant, Deadlock, Formula
+from firable.nets.net import Marking, Net
+from firable.nets.verdict import Witness
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import holds_in
+from firable.semantics.trace import Discipline
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """A smaller net in which the goal is reachable if and only if it is in the `original`, and the way back.
+
+    Under interleaving, external gates free. `original_goal` and `goal` say the same of either net. `applied` counts the
+    applications of each rule.
+    """
+
+    original: Net
+    original_goal: Formula
+    net: Net
+    goal: Formula
+    applied: Mapping[str, int]
+    first: tuple[Origin, ...]
+    moves: Mapping[str, Move]
+    tails: tuple[Tail, ...]
+
+    @property
+    def summary(self) -> str:
+        """What was reduced to what, by which rules: for the method of a verdict."""
+        before = f"{len(self.original.places)}/{len(self.original.transitions)}"
+        after = f"{len(self.net.places)}/{len(self.net.transitions)}"
+        rules = ", ".join(f"{rule} {times}" for rule, times in sorted(self.applied.items()))
+        return f"reduction from {before} to {after} places/transitions by {rules or 'no rule'}"
+
+    def lift(self, firings: Iterable[str], note: str = "") -> Witness:
+        """The firing sequence of the original net that a sequence of the reduced one into its goal stands for.
+
+        It is replayed by the reference player and must end in the original goal; raises `WitnessError` otherwise.
+        """
+        found = [t for origin in self.first for t in flat(origin)]
+        for name in firings:
+            found += flat(self.moves[name].origin)
+        marking = self._played(self.original.initial_marking, found)
+        for tail in reversed(self.tails):
+            for move in tail.moves:
+                if all(bool(marking >> place & 1) == value for place, value in move.needs.items()):
+                    more = flat(move.origin)
+                    marking = self._played(marking, more)
+                    found += more
+                    break
+        witnesses = Witnesses(self.original, Discipline.INTERLEAVING)
+        witness = witnesses.replayed([(t,) for t in found], marking, note)
+        if not evaluate(BOOL, self.original, self.original_goal, holds_in(marking)):
+            raise WitnessError("the lifted firing sequence does not end in the goal")
+        return witness
+
+    def _played(self, marking: Marking, firings: Iterable[int]) -> Marking:
+        """Where a firing sequence leads if it can be fired, which the reference player sees to afterwards."""
+        for t in firings:
+            masks = self.original.masks[t]
+            marking = marking & ~masks.inputs | masks.outputs
+        return marking
+
+
+@dataclass(frozen=True)
+class ReducedTransitions:
+    """A smaller net in which the transitions fire as in the `original` one, whatever has fired before.
+
+    `transitions` says which transition of the small net each one of the original fires with: None for those that never
+    fire. One is live, or fires at least once, exactly if its image is and does.
+    """
+
+    original: Net
+    net: Net
+    applied: Mapping[str, int]
+    transitions: Mapping[str, str | None]
+
+
+def reduce_for_goal(net: Net, goal: Formula, limits: Limits | None = None) -> Reduced:
+    """Reduce a net, preserving whether a state formula is reachable under interleaving.
+
+    A goal that is `deadlock`, alone or in conjunction, keeps what deadlocks there are; any other goal lets go of all
+    that does not lead to it. Cost: linear in the arcs but for the facts on pairs, which are bounded; stops at the
+    deadline with what it has by then.
+
+    >>> from firable.nets.formula import parse_formula
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> from firable.nets.net import Net, Place, Transition
+    >>> ring = Net("ring", (Place("a", marked=True), Place("b"), Place("c")), (
+    ...     Transition("t", ("a",), ("b",)), Transition("u", ("b",), ("c",)), Transition("v", ("c",), ("a",))))
+    >>> reduced = reduce_for_goal(ring, parse_formula("c"))
+    >>> len(reduced.net.places), reduced.lift([]).firings
+    (0, (('t',), ('u',)))
+    """
+    wanted = goal_of(net, goal)
+    draft = Draft(net, wanted)
+    _reduce(draft, (limits or Limits()).deadline)
+    small, numbers = draft.as_net()
+    assert draft.goal is not None
+    moves = {name: draft.moves[number] for name, number in numbers.items()}
+    return Reduced(
+        net, goal, small, draft.goal.as_formula(), draft.applied, tuple(draft.first), moves, tuple(draft.tails)
+    )
+
+
+def reduce_for_deadlock(net: Net, limits: Limits | None = None) -> Reduced:
+    """Reduce a net, preserving whether a deadlock is reachable under interleaving."""
+    return reduce_for_goal(net, Deadlock(), limits)
+
+
+def reduce_for_liveness(net: Net, limits: Limits | None = None) -> ReducedTransitions:
+    """Reduce a net, preserving for each transition whether it is live and whether it ever fires, under interleaving.
+
+    Only by the rules that leave the graph of markings as it is, but for places that follow from others or that nobody
+    needs: each marking enables the same transitions as its image. Whether there is a deadlock is preserved too. How
+    many markings there are is not, nor whether M0 can be reached again: two of them may have one image.
+    """
+    draft = Draft(net, None)
+    _reduce(draft, (limits or Limits()).deadline)
+    small, numbers = draft.as_net()
+    names = {number: name for name, number in numbers.items()}
+    images: dict[str, str | None] = {}
+    for t, transition in enumerate(net.transitions):
+        number = draft.number_of.get(t)
+        while number in draft.same_as:
+            number = draft.same_as[number]
+        images[transition.name] = None if number is None else names.get(number)
+    return ReducedTransitions(net, small, draft.applied, images)
+
+
+def _reduce(draft: Draft, deadline: Deadline) -> None:
+    """Apply all rules until none applies, or the deadline comes."""
+    fired: set[int] = set()
+    facts: Pairs | None = None
+    fresh = False
+    while not deadline.over:
+        changed = facts is not None and _by_facts(draft, facts, deadline)
+        if fresh and not changed:
+            return
+        _by_arcs(draft, fired, deadline)
+        fresh = not changed
+        if fresh:
+            facts = pairs(draft, facts, deadline)
+            draft.touch_all()
+            if facts is None:
+                if agglomerate(draft, NoFacts(), deadline):
+                    _by_arcs(draft, fired, deadline)
+                return
+
+
+def _by_arcs(draft: Draft, fired: set[int], deadline: Deadline) -> None:
+    """Apply the rules that read the arcs alone until none applies."""
+    changed = True
+    while changed and not deadline.over:
+        changed = remove_constants(draft)
+        _settle(draft)
+        changed = remove_irrelevant(draft) or changed
+        changed = merge_places(draft) or changed
+        changed = remove_subsumed(draft) or changed
+        changed = (draft.goal is not None and fire_early(draft, fired)) or changed
+
+
+def _settle(draft: Draft) -> None:
+    """Let go of deadlocks where there can be none, because a move needs nothing or the goal is false."""
+    if draft.goal is not None and draft.goal.deadlock:
+        if any(not move.needs for move in draft.moves.values()):
+            draft.settle(Goal(Constant(value=False)))
+        elif draft.goal.formula == Constant(value=False):
+            draft.settle(Goal(draft.goal.formula))
+
+
+def _by_facts(draft: Draft, facts: Pairs, deadline: Deadline) -> bool:
+    """Apply the rules that rest on facts, each once; whether something changed."""
+    changed = remove_dead(draft, facts, deadline)
+    changed = remove_implied_gates(draft, facts, deadline) or changed
+    changed = remove_implied_places(draft, facts, deadline) or changed
+    return agglomerate(draft, facts, deadline) or changed
