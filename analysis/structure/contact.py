@@ -1,16 +1,17 @@
 """Contact excluded by invariants: a full output place where the inputs are there would be a token too many.
 
 At a contact the inputs and permissive gate places of a transition hold tokens, and so does one of its output places
-besides. If a unit with one token contains two of these places, that cannot be: one token is not in two places. A unit
-that contains the output place contains an input too, since units are balanced. So if every place that gets tokens is
-in a unit with at most one, the net is contact-free: it is 1-safe as an ordinary net. This is how an engineer knows it,
-and what cells, protocols and processes are made of; it takes a second for ten thousand places.
+besides. A *draining* set of places (`firable.analysis.structure.cover`) with one token excludes that if it contains two
+of these places: its tokens never get more, and one token is not in two places. One that contains the output place
+contains an input too, since who puts a token into it takes one from it. So if every place that gets tokens is in such a
+set, the net is contact-free: it is 1-safe as an ordinary net. Most are units, sets that lose no token either, as the
+positions of a robot. This is how an engineer knows it, and what cells, protocols and processes are made of; it takes a
+second for ten thousand places.
 
-Where no such unit is found for a place, an inequality is looked for that excludes the contact
-(`firable.analysis.structure.inequalities`): it may be weighted, or use that some transitions only ever fire in one
-direction. The first contact that neither excludes ends the search, for then nothing is proved; that it is reachable
-is not said. The rejected alternative, to list the minimal invariants first, waits for exponentially many of which a few
-are needed.
+Where there is no draining set, an inequality is looked for that excludes the contact
+(`firable.analysis.structure.inequalities`), which may be weighted, of either sign. The first contact that
+nothing excludes ends the search, for then nothing is proved; that it is reachable is not said. The rejected
+alternative, to list the minimal invariants first, waits for exponentially many of which a few are needed.
 """
 
 from __future__ import annotations
@@ -24,20 +25,21 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Clause, Equation, InductiveInvariant
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.structure.cover import UnitSearch
-from firable.analysis.structure.inequalities import AtLeast, Refuter
+from firable.analysis.structure.inequalities import AtLeast, Refuter, never_more
 from firable.analysis.structure.invariants import columns
-from firable.analysis.structure.ordinary import Ordinary, markable, ordinary
+from firable.analysis.structure.ordinary import markable, ordinary
 from firable.nets.net import Net
 from firable.nets.verdict import Cost
 
-METHOD = "units with one token"
+METHOD = "sets of places with one token, which never gain one"
 
 
 @dataclass(frozen=True, slots=True)
 class ContactProof:
     """What excludes contact. `whole`: at every transition; `behaves`: at every one that does not contradict itself.
 
-    `units` and `inequalities` are what was used, `undecided` says of an unfinished proof where it ended.
+    `units` and `inequalities` are what was used (of a draining set that is no unit, that it never gains a token);
+    `undecided` says of an unfinished proof where it ended.
     """
 
     whole: bool
@@ -91,14 +93,14 @@ def _contacts(net: Net, fires: set[int], *, late: bool) -> Iterator[tuple[int, i
 
 
 class _Search:
-    """The units found so far, by their places, and what they leave to inequalities."""
+    """The draining sets found so far, by their places, and what they leave to inequalities."""
 
     def __init__(self, net: Net, deadline: Deadline) -> None:
         self.net, self.deadline, self.of = net, deadline, ordinary(net)
         self.may_be_marked = markable(self.of)
         self.changes = columns(net)
-        self.search = UnitSearch(self.changes, self.of.n_places, self.of.marked, 1)
-        self.units: list[tuple[frozenset[int], int]] = []
+        self.search = UnitSearch(self.changes, self.of.n_places, self.of.marked, 1, draining=True)
+        self.drains: list[tuple[frozenset[int], int]] = []  # each with its tokens
         self.at: dict[int, list[int]] = {}
         self.used: dict[int, None] = {}
         self.tried: set[int] = set()
@@ -111,24 +113,24 @@ class _Search:
         empty = {index[name] for name in transition.inhibitive}
         if full & empty or not full <= self.may_be_marked:
             return True
-        if self._by_unit(full, full) or self._by_inequality(full, empty):
+        if self._by_drain(full, full) or self._by_inequality(full, empty):
             return True
         if place not in self.tried and place not in self.at:
             self.tried.add(place)
-            unit = self.search.unit(place, deadline=self.deadline)
-            if unit:
-                self._add(unit)
-                return self._by_unit(full, {place})
+            if drain := self.search.unit(place, deadline=self.deadline):
+                self._add(drain)
+                if self._by_drain(full, {place}):
+                    return True
         found = self._refuter.inequality(full, empty, self.deadline)
         if found is not None:
             self.inequalities.append(found)
         return found is not None
 
-    def _by_unit(self, full: set[int], places: set[int]) -> bool:
+    def _by_drain(self, full: set[int], places: set[int]) -> bool:
         for place in places:
             for k in self.at.get(place, ()):
-                unit, tokens = self.units[k]
-                if len(full & unit) > tokens:
+                drain, tokens = self.drains[k]
+                if len(full & drain) > tokens:
                     self.used[k] = None
                     return True
         return False
@@ -139,10 +141,10 @@ class _Search:
             for found in self.inequalities
         )
 
-    def _add(self, unit: tuple[int, ...]) -> None:
-        self.units.append((frozenset(unit), len(self.of.marked.intersection(unit))))
-        for place in unit:
-            self.at.setdefault(place, []).append(len(self.units) - 1)
+    def _add(self, drain: tuple[int, ...]) -> None:
+        for place in drain:
+            self.at.setdefault(place, []).append(len(self.drains))
+        self.drains.append((frozenset(drain), len(self.of.marked.intersection(drain))))
 
     @cached_property
     def _refuter(self) -> Refuter:
@@ -152,12 +154,9 @@ class _Search:
 
     def proof(self, *, whole: bool, behaves: bool, undecided: str) -> ContactProof:
         """What was found, with the units that were needed."""
-        units = tuple(tuple(sorted(self.units[k][0])) for k in self.used)
+        used = [(tuple(sorted(self.drains[k][0])), self.drains[k][1]) for k in self.used]
+        lossless = self.search.lossless([places for places, _ in used])
+        units = tuple(places for (places, _), unit in zip(used, lossless, strict=True) if unit)
+        sums = (never_more(*drain) for drain, unit in zip(used, lossless, strict=True) if not unit)
         told = "the time was over" if undecided and self.deadline.over else undecided
-        return ContactProof(whole, behaves, units, tuple(self.inequalities), told)
-
-
-def covered(of: Ordinary, proof: ContactProof) -> bool:
-    """Whether every place of the net is in a unit of the proof: it has a positive P-invariant."""
-    within = {p for unit in proof.units for p in unit}
-    return within.issuperset(of.places)
+        return ContactProof(whole, behaves, units, (*sums, *self.inequalities), told)

@@ -12,6 +12,9 @@ the other, with a bound on the tries for each start. So a unit costs what it tou
 programming, which finds weighted invariants too but a thousand places at a time, and asking a SAT solver for a unit
 through each place, which builds the whole net for each question.
 
+A *draining* set asks for less: who puts a token into it, one at most, takes one from it, and tokens may get lost. Its
+number of tokens never rises, which excludes two where there was one, and it is found in the same way, going back only.
+
 The equations may be those of transitions too: a unit is then a set of transitions of which each place touched has one
 producer and one consumer, a cycle of firings that may fork and join but never chooses.
 """
@@ -80,7 +83,8 @@ Side = tuple[int, bool]
 class UnitSearch:
     """Looks for units one by one; what is in one that was found is `covered`.
 
-    Holds the equations by their two sides, and the choice as it stands, with the order in which it is taken back.
+    Holds the equations by their two sides, and the choice as it stands. For `draining` sets the equations are columns
+    of the incidence matrix, whose sign tells inputs from outputs.
     """
 
     def __init__(
@@ -89,8 +93,11 @@ class UnitSearch:
         n_variables: int,
         marked: frozenset[int] = frozenset(),
         tokens_max: int | None = None,
+        *,
+        draining: bool = False,
     ) -> None:
-        kept = distinct(equations)
+        kept = list(equations) if draining else distinct(equations)
+        self.draining = draining
         self.marked = marked
         self.tokens_max = n_variables if tokens_max is None else tokens_max
         self.covered = set[int]()
@@ -102,7 +109,7 @@ class UnitSearch:
                 self.standing[variable].append((number, coefficient > 0))
         self.chosen = set[int]()
         self.barred: dict[int, int] = {}
-        self.holder: dict[Side, int] = {}
+        self.held: dict[Side, int] = {}  # how many are chosen on each side
         self.open: dict[Side, None] = {}
         self.tokens = 0
 
@@ -137,6 +144,17 @@ class UnitSearch:
             self._back(undo, done)
             alive = self._choose(others.pop(), undo)
 
+    def lossless(self, drains: Iterable[Iterable[int]]) -> list[bool]:
+        """Of draining sets, whether each loses no token either: then its places with weight 1 are an invariant."""
+        found = []
+        for drain in drains:
+            balance: dict[int, int] = {}
+            for variable in drain:
+                for number, positive in self.standing[variable]:
+                    balance[number] = balance.get(number, 0) + (1 if positive else -1)
+            found.append(not any(balance.values()))
+        return found
+
     def _candidates(self) -> list[int]:
         """What may be taken for the open side that leaves the least choice, among the last few."""
         best: list[int] | None = None
@@ -157,29 +175,35 @@ class UnitSearch:
         self.tokens += variable in self.marked
         undo.append(variable)
         for side in self.standing[variable]:
-            self.holder[side] = variable
-            for other in self.sides[side[0]][side[1]]:
-                if other != variable:
-                    self.barred[other] = self.barred.get(other, 0) + 1
-            across = (side[0], not side[1])
-            if across not in self.holder:
-                self.open[across] = None
+            self.held[side] = self.held.get(side, 0) + 1
             self.open.pop(side, None)
+            if self._needs_across(side):
+                for other in self.sides[side[0]][side[1]]:
+                    if other != variable:
+                        self.barred[other] = self.barred.get(other, 0) + 1
+                across = (side[0], not side[1])
+                if not self.held.get(across):
+                    self.open[across] = None
         return True
+
+    def _needs_across(self, side: Side) -> bool:
+        """Whether what is chosen on a side is alone there and needs one on the other side."""
+        return side[1] or not self.draining
 
     def _unchoose(self, variable: int) -> None:
         self.chosen.discard(variable)
         self.tokens -= variable in self.marked
         for side in reversed(self.standing[variable]):
-            del self.holder[side]
-            for other in self.sides[side[0]][side[1]]:
-                if other != variable:
-                    self.barred[other] -= 1
-                    if not self.barred[other]:
-                        del self.barred[other]
+            self.held[side] -= 1
             across = (side[0], not side[1])
-            self.open.pop(across, None)
-            if across in self.holder:
+            if self._needs_across(side):
+                for other in self.sides[side[0]][side[1]]:
+                    if other != variable:
+                        self.barred[other] -= 1
+                        if not self.barred[other]:
+                            del self.barred[other]
+                self.open.pop(across, None)
+            if not self.held[side] and self.held.get(across) and self._needs_across(across):
                 self.open[side] = None
 
     def _back(self, undo: list[int], done: int) -> None:

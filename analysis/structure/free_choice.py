@@ -23,19 +23,15 @@ from collections.abc import Iterable
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.structure.commoner import Commoner, commoner
-from firable.analysis.structure.contact import ContactProof, covered
 from firable.analysis.structure.cover import cover
 from firable.analysis.structure.linear import eliminate
 from firable.analysis.structure.ordinary import Ordinary, markable
 from firable.analysis.structure.siphons import trap_rules
 
 
-def live_and_safe(of: Ordinary, proof: ContactProof, deadline: Deadline) -> Commoner:
-    """Whether a free-choice net that was proved 1-safe is live; every place of it has an arc.
-
-    `proof` is that of safety; if its units cover all places, they are the positive P-invariant.
-    """
-    if len(markable(of)) == of.n_places and covered(of, proof) and _rank_theorem(of, deadline):
+def live_and_safe(of: Ordinary, deadline: Deadline) -> Commoner:
+    """Whether a free-choice net that was proved 1-safe is live; every place of it has an arc."""
+    if len(markable(of)) == of.n_places and _rank_theorem(of, deadline):
         return Commoner(holds=True)
     return commoner(of, deadline=deadline)
 
@@ -46,14 +42,15 @@ def empty_trap(of: Ordinary) -> frozenset[int]:
 
 
 def _rank_theorem(of: Ordinary, deadline: Deadline) -> bool:
-    """Whether each connected part has a positive T-invariant and the rank is the number of clusters less one."""
+    """Whether each connected part has positive invariants and the rank is the number of clusters less one."""
     columns = [_column(inputs, outputs) for inputs, outputs in zip(of.inputs, of.outputs, strict=True)]
     rows: list[dict[int, int]] = [{} for _ in range(of.n_places)]
     for k, column in enumerate(columns):
         for p, change in column.items():
             rows[p][k] = change
-    if cover(rows, len(columns), deadline=deadline).uncovered:
-        return False
+    for equations_of, size in ((columns, of.n_places), (rows, len(columns))):
+        if cover(equations_of, size, deadline=deadline).uncovered:
+            return False
     n = of.n_places
     parts = _Classes(n + len(columns))
     clusters = _Classes(n + len(columns))

@@ -41,6 +41,11 @@ class AtLeast:
         return Inequality(tuple((net.places[p].name, weight) for p, weight in self.weights), self.tokens)
 
 
+def never_more(places: Iterable[int], tokens: int) -> AtLeast:
+    """That the places hold at most so many tokens."""
+    return AtLeast(tuple((p, -1) for p in places), -tokens)
+
+
 class Refuter:
     """Finds inequalities of one net; `columns` are those of its transitions that can fire, `marked` is M0."""
 

@@ -13,7 +13,8 @@ constraint is added; if neither does, the goal is undecided. So what remains is 
 certificate that needs neither the solver's word nor the counts of firings. The rejected alternative, one integer
 programme over markings and counts of firings, decides as much in one call, and its "unsatisfiable" is all it tells.
 
-At the start the list holds the units that cover the net, which are the invariants an engineer would name.
+At the start the list holds draining sets that cover the net (`firable.analysis.structure.cover`): most are units, the
+invariants an engineer would name.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Clause, Equation, InductiveInvariant
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.structure.asking import answer, solver_of
-from firable.analysis.structure.cover import cover
-from firable.analysis.structure.inequalities import AtLeast, Refuter
+from firable.analysis.structure.cover import UnitSearch
+from firable.analysis.structure.inequalities import AtLeast, Refuter, never_more
 from firable.analysis.structure.invariants import columns
 from firable.analysis.structure.ordinary import markable, ordinary
 from firable.analysis.structure.siphons import trap_rules
@@ -100,8 +101,18 @@ def _refuted(net: Net, goal: Formula, deadline: Deadline) -> tuple[Constraints |
     effects = [changes[t] for t in fires]
     traps = trap_rules(of)
     known = Constraints(net, tuple(p for p in range(of.n_places) if p not in may_be_marked))
-    # Units of all transitions, so that each is an invariant whatever else is known.
-    known.units += (unit for unit in cover(changes, of.n_places, marked=of.marked, deadline=deadline).units)
+    # Those of all transitions, so that each holds whatever else is known; with one token, or else with some.
+    covered = set[int]()
+    for tokens_max in (1, None):
+        drains = UnitSearch(changes, of.n_places, of.marked, tokens_max, draining=True)
+        for place in range(of.n_places):
+            if place in covered or place in drains.covered or not (drain := drains.unit(place, deadline=deadline)):
+                continue
+            if drains.lossless([drain])[0]:
+                known.units.append(drain)
+            else:
+                known.inequalities.append(never_more(drain, len(of.marked.intersection(drain))))
+        covered |= drains.covered
     if deadline.over:
         return None, _OUT_OF_TIME
     search = _Search(net, goal, known)
@@ -162,6 +173,8 @@ class _Search:
             self._assert(z3.Not(self.places[p]), ("empty", k))
         for k, unit in enumerate(known.units):
             self._assert(z3.PbEq([(self.places[p], 1) for p in unit], known.tokens(unit)), ("unit", k))
+        for k, inequality in enumerate(known.inequalities):
+            self._assert(self._term(inequality), ("inequality", k))
 
     def _assert(self, term: z3.BoolRef, made: tuple[str, int]) -> None:
         name = z3.Bool(f"c{len(self.names)}", self.context)

@@ -34,6 +34,7 @@ from dataclasses import dataclass, replace
 from firable.analysis.goal import Limits
 from firable.analysis.question import Answer, listed, no, yes
 from firable.analysis.structure.commoner import Commoner, commoner
+from firable.analysis.structure.contact import METHOD as ONE_TOKEN
 from firable.analysis.structure.contact import contact_proof
 from firable.analysis.structure.free_choice import empty_trap, live_and_safe
 from firable.analysis.structure.net_class import asymmetric_choice, extended_free_choice
@@ -42,7 +43,6 @@ from firable.analysis.structure.state_machines import METHOD as STATE_MACHINES
 from firable.analysis.structure.state_machines import decide_state_machines
 from firable.nets.net import Net
 
-UNITS = "units with one token"
 MARKABLE = "places that no token can come to"
 MARKED_GRAPH = "theorem on marked graphs (every circuit holds a token)"
 FREE_CHOICE = "theorem of Commoner and Hack on free-choice nets"
@@ -92,7 +92,7 @@ def _dead(net: Net, of: Ordinary) -> dict[str, Known]:
 
 def _of_contact_free(net: Net, of: Ordinary, limits: Limits) -> dict[str, Known]:
     proof = contact_proof(net, limits.deadline)
-    found = {"contact-free": Known(yes(), UNITS)} if proof.whole else {}
+    found = {"contact-free": Known(yes(), ONE_TOKEN)} if proof.whole else {}
     if not proof.behaves or of.inhibited:
         return found
     of = _without_bare_places(of)
@@ -103,7 +103,7 @@ def _of_contact_free(net: Net, of: Ordinary, limits: Limits) -> dict[str, Known]
             found |= {name: Known(yes(), MARKED_GRAPH) for name in ("reversible", "home-markings")}
         return found
     if extended_free_choice(of.inputs, of.consumers):
-        property_ = live_and_safe(of, proof, limits.deadline)
+        property_ = live_and_safe(of, limits.deadline)
         if property_.holds:
             found |= _live(FREE_CHOICE, every=every) | {"home-markings": Known(yes(), HOME)}
             trap = empty_trap(of)

@@ -11,7 +11,7 @@ from support.reference import load_net
 from support.ring_nets import ring_nets
 
 from firable.analysis.deadline import Deadline
-from firable.analysis.structure.cover import cover
+from firable.analysis.structure.cover import UnitSearch, cover
 from firable.analysis.structure.invariants import columns, rows
 from firable.analysis.structure.linear import Sparse, eliminate, solutions
 from firable.analysis.structure.semiflows import minimal_semiflows
@@ -54,6 +54,30 @@ def test_a_bound_on_tokens_leaves_out_the_units_that_hold_more(net: Net) -> None
     found = cover(columns(net), len(net.places), marked=marked, tokens_max=1, tries_max=10_000)
     assert {frozenset(unit) for unit in found.units} <= set(units)
     assert set(found.uncovered) == set(range(len(net.places))) - set().union(*units)
+
+
+@settings(max_examples=120)
+@given(NETS)
+def test_a_draining_set_never_gains_tokens_and_takes_one_from_itself_where_it_gains(net: Net) -> None:
+    changes, n = columns(net), len(net.places)
+    search = UnitSearch(changes, n, draining=True)
+    for start in range(n):
+        drain = set(search.unit(start, 10_000) or ())
+        assert not drain or start in drain
+        for change in changes:
+            put = {p for p in drain if change.get(p, 0) > 0}
+            assert len(put) <= len({p for p in drain if change.get(p, 0) < 0} or ())
+            assert len(put) <= 1
+    small = [frozenset(s) for k in range(1, n + 1) for s in combinations(range(n), k)]
+    draining = [
+        s
+        for s in small
+        if all(
+            not (gained := [p for p in s if c.get(p, 0) > 0]) or (len(gained) == 1 and any(c.get(p, 0) < 0 for p in s))
+            for c in changes
+        )
+    ]
+    assert {start for start in range(n) if search.unit(start, 10_000)} == set().union(*draining)
 
 
 def test_the_cell_is_covered_by_units_with_one_token_each() -> None:
