@@ -36,8 +36,8 @@ CONTACT_FREE: Final = Question(
     "contact-free",
     "no transition is held back only by a full output place",
     hint=(
-        "an ordinary net would put a second token there: it is not 1-safe, and here the transition waits instead; take a "
-        "place that is free when the output place is empty as an input, or check the arcs"
+        "an ordinary net would put a second token there: it is not 1-safe, and here the transition waits instead; "
+        "take a place that is free when the output place is empty as an input, or check the arcs"
     ),
 )
 DEADLOCK_FREE: Final = Question(
