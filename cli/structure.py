@@ -23,29 +23,36 @@ _SHOWN_MAX = 8
 def structure_json(net: Net, *, contact_free: bool | None, seconds: float | None) -> dict[str, Any]:
     """Net class, invariants, siphons and traps as JSON data; `contact_free` is what is known of that verdict.
 
-    The lists take `seconds` together, by default 30. Where that is too short, or at Ctrl-C, `ended_early` says so and
-    those not finished are not `complete`.
+    Where it is not known, invariants may prove it. All together take `seconds`, by default 30, each a fair part of what
+    is left. Where that is too short, or at Ctrl-C, `ended_early` says so and the lists not finished are not `complete`.
     """
     from firable.analysis.deadline import Deadline
     from firable.analysis.structure.commoner import DeadlockTrap, deadlock_trap
+    from firable.analysis.structure.contact import contact_proof
     from firable.analysis.structure.invariants import Invariants, p_invariants, t_invariants
     from firable.analysis.structure.net_class import net_class
     from firable.analysis.structure.siphons import PlaceSets, minimal_traps
 
-    deadline, ended_early = Deadline.after(SECONDS_DEFAULT if seconds is None else seconds), ""
+    deadline, ended_early, to_come = Deadline.after(SECONDS_DEFAULT if seconds is None else seconds), "", 5
 
     def found(technique: Callable[[Deadline], T], nothing: T) -> T:
-        nonlocal ended_early
-        if not ended_early:
-            try:
-                result = technique(deadline)
-            except KeyboardInterrupt:
-                ended_early = "interrupted"
-            else:
-                ended_early = "time" if deadline.over else ""
-                return result
-        return nothing
+        nonlocal ended_early, to_come
+        if ended_early == "interrupted":
+            return nothing
+        until = Deadline.after((deadline.left_seconds or 0.0) / to_come)
+        to_come -= 1
+        try:
+            result = technique(until)
+        except KeyboardInterrupt:
+            ended_early = "interrupted"
+            return nothing
+        ended_early = "time" if until.over else ended_early
+        return result
 
+    def proved_contact_free(until: Deadline) -> bool | None:
+        return contact_free if contact_free is not None else (contact_proof(net, until).whole or None)
+
+    contact_free = found(proved_contact_free, contact_free)
     kind = net_class(net, contact_free=contact_free)
     no_vectors, no_sets = Invariants((), None, complete=False), PlaceSets((), complete=False)
     of_places = found(lambda until: p_invariants(net, deadline=until), no_vectors)
@@ -100,7 +107,7 @@ def structure_lines(structure: Mapping[str, Any]) -> Iterator[str]:
     held = ""
     if bare:
         held = f"; {len(bare)} without a marked trap, as {_some(bare[0])}"
-    elif siphons["complete"]:
+    elif siphons["complete"] or structure["siphons_exclude_deadlock"]:
         held = "; each contains a marked trap"
     proof = ", which proves that there is no deadlock" if structure["siphons_exclude_deadlock"] else ""
     yield f"siphons       {_count(siphons)}{held}{proof}"

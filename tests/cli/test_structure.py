@@ -5,11 +5,17 @@ from __future__ import annotations
 import json
 from importlib.resources import files
 from typing import Any
+from unittest.mock import ANY
 
 import jsonschema
 import pytest
 
+from firable.analysis.deadline import Deadline
+from firable.analysis.structure.invariants import Invariants
 from firable.cli.main import main
+from firable.cli.structure import structure_json
+from firable.nets.catalogue import catalogue_net
+from firable.nets.net import Net
 
 SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
 
@@ -58,3 +64,29 @@ def test_the_graph_of_arcs_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert (structure["pure"], structure["connected"], structure["strongly_connected"]) == (True, True, True)
     main(["check", "catalogue:one_robot", "--structure"])
     assert "graph         strongly connected\n" in capsys.readouterr().out
+
+
+def test_contact_freeness_that_exploration_left_open_is_proved_by_invariants(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    part = report_of(capsys, "--max-markings", "3", "--method", "explicit")
+    assert next(v for v in part["verdicts"] if v["name"] == "contact-free")["status"] == "unknown"
+    structure = part["figures"]["structure"]
+    assert structure["siphons_exclude_deadlock"]
+    assert structure["outside_of_its_theorems"] == ["it has external gates, on which choices depend"]
+
+
+def test_a_list_that_takes_long_leaves_time_to_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[float] = []
+
+    def gives_up(net: Net, *, deadline: Deadline) -> Invariants:
+        given.append(deadline.left_seconds or 0.0)
+        return Invariants((), None, complete=False)
+
+    monkeypatch.setattr("firable.analysis.structure.invariants.p_invariants", gives_up)
+    monkeypatch.setattr("firable.analysis.structure.invariants.t_invariants", gives_up)
+    found = structure_json(catalogue_net("one_robot"), contact_free=True, seconds=1e6)
+    assert 2.0e5 < given[0] <= 2.5e5 < given[1] <= 3.4e5  # a quarter, and a third of what was hardly used
+    assert found["p_invariants"] == {"minimal": [], "dimension": None, "complete": False, "uncovered": ANY}
+    assert found["siphons"]["complete"]
+    assert found["ended_early"] == ""
