@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,9 @@ from firable.cli.structure import structure_json, structure_lines
 if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
     from firable.cli.cache import Kept
+    from firable.nets.loading import Loaded
     from firable.nets.net import Net
+    from firable.nets.queries import Query
     from firable.nets.verdict import Verdict
 
 
@@ -32,15 +34,20 @@ class _Asked:
     trace_dir: str | None
     structure: bool
     cached: bool
+    query_file: str | None
+    query_texts: tuple[str, ...]
 
-    def of_the_net(self) -> dict[str, Any]:
+    def of_the_net(self, queries: Iterable[Query]) -> dict[str, Any]:
         """What the answer depends on besides the net, as JSON values."""
+        from firable.nets.queries import format_query
+
         allowed = (self.budget.markings, self.budget.memory_bytes, self.budget.seconds)
         return {
             "discipline": self.discipline,
             "method": self.method,
             "structure": self.structure,
             "budget": allowed,
+            "queries": [(query.name, format_query(query)) for query in queries],
         }
 
 
@@ -65,6 +72,10 @@ class _Asked:
 @click.option(
     "--structure", is_flag=True, help="Also net class, invariants, siphons, traps; in --max-seconds more, or 30."
 )
+@click.option("--queries", "query_file", metavar="FILE", help="Answer the queries of a file, text or property XML.")
+@click.option(
+    "--query", "query_texts", metavar="QUERY", multiple=True, help="Answer a query, such as 'AG EF start'; repeatable."
+)
 @click.option(
     "--no-cache", is_flag=True, help="Decide anew what was decided before of the same net; see FIRABLE_CACHE."
 )
@@ -76,6 +87,8 @@ def check(
     method: str,
     trace_dir: str | None,
     structure: bool,
+    query_file: str | None,
+    query_texts: tuple[str, ...],
     no_cache: bool,
     verbose: bool,
     format_: str,
@@ -83,11 +96,11 @@ def check(
 ) -> int:
     """Check nets, external gates free, by exploring their markings or by whichever other technique is first.
 
-    Deadlock, contact, dead and live transitions, conflicts, gate races, commands, and the properties that the file
-    itself states. Each verdict is proved, violated (with a shortest firing sequence) or unknown (with the bound
-    reached); Ctrl-C ends the exploration and shows what is known so far.
+    Deadlock, contact, dead and live transitions, conflicts, gate races, commands, the properties that the file itself
+    states, and queries in CTL, LTL and more (docs/queries.md). Each verdict is proved, violated (with a shortest firing
+    sequence) or unknown (with the bound reached); Ctrl-C ends the exploration and shows what is known so far.
     """
-    asked = _Asked(discipline, method, budget(**limits), trace_dir, structure, cached=not no_cache)
+    asked = _Asked(discipline, method, budget(**limits), trace_dir, structure, not no_cache, query_file, query_texts)
     makers = [partial(_report, net, asked, many=len(nets) > 1) for net in nets]
     return answer_all("check", format_, makers, partial(_show, verbose=verbose))
 
@@ -97,13 +110,14 @@ def _report(argument: str, asked: _Asked, *, many: bool) -> Report:
 
     loaded = load_net(argument)
     net = loaded.net
+    queries = _queries(loaded, asked)
     cache = opened_cache() if asked.cached else None
-    key = key_of(net, asked.of_the_net()) if cache is not None else ""
+    key = key_of(net, asked.of_the_net(queries)) if cache is not None else ""
     kept = cache.read(key) if cache is not None else None
     again = kept is not None
     if kept is None:
         with loaded.placing():
-            kept = _found(net, asked)
+            kept = _found(net, asked, queries)
         if cache is not None:
             cache.write(key, kept)
     files: tuple[str, ...] = ()
@@ -128,12 +142,25 @@ def _report(argument: str, asked: _Asked, *, many: bool) -> Report:
     )
 
 
-def _found(net: Net, asked: _Asked) -> Kept:
+def _queries(loaded: Loaded, asked: _Asked) -> tuple[Query, ...]:
+    """The queries of the file, and those that are arguments, under the names query-1, query-2, ..."""
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.queries import query_named, read_queries
+
+    found = () if asked.query_file is None else read_queries(asked.query_file, loaded.net, loaded.renamed)
+    single = tuple(query_named(text, loaded.net, f"query-{n}") for n, text in enumerate(asked.query_texts, 1))
+    if both := {query.name for query in found} & {query.name for query in single}:
+        message = f"'{min(both)}' names a query of the file and is the name of a --query"
+        raise InputError([Diagnostic("F2001", message, "rename the one in the file")])
+    return found + single
+
+
+def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> Kept:
     """What the techniques find of a net."""
     from firable.analysis.check import check as check_net
     from firable.cli.cache import Kept
 
-    found = check_net(net, asked.discipline, asked.budget, method=asked.method)
+    found = check_net(net, asked.discipline, asked.budget, method=asked.method, queries=queries)
     figures = found.figures.to_json()
     if asked.structure:
         contacts = found.figures.contacts
