@@ -25,7 +25,7 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Clause, Equation, InductiveInvariant
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.structure.cover import UnitSearch
-from firable.analysis.structure.inequalities import AtLeast, Refuter, never_more
+from firable.analysis.structure.inequalities import AtLeast, Refuter, kept_by_all, never_more
 from firable.analysis.structure.invariants import columns
 from firable.analysis.structure.ordinary import markable, ordinary
 from firable.nets.net import Net
@@ -61,6 +61,8 @@ def decide_contact_by_invariants(net: Net, limits: Limits) -> Finding:
     cost = Cost(seconds=perf_counter() - start)
     if not proof.whole:
         return Finding(None, METHOD, bound=proof.undecided, cost=cost)
+    if not kept_by_all(net, proof.inequalities):
+        return Finding(reachable=False, method=METHOD, cost=cost)
     names = [place.name for place in net.places]
     of = ordinary(net)
     certificate = InductiveInvariant(

@@ -41,6 +41,25 @@ class AtLeast:
         return Inequality(tuple((net.places[p].name, weight) for p, weight in self.weights), self.tokens)
 
 
+def kept_by_all(net: Net, inequalities: Iterable[AtLeast]) -> bool:
+    """Whether no transition lowers a sum, those included that can never fire for other reasons than a self-loop.
+
+    A certificate must show it of each sum for itself, without what is known of places that stay empty.
+    """
+    index, of_place = net.place_index, dict[int, list[int]]()
+    for t, transition in enumerate(net.transitions):
+        if not transition.self_loops:
+            for name in (*transition.inputs, *transition.outputs):
+                of_place.setdefault(index[name], []).append(t)
+    for inequality in inequalities:
+        weights = dict(inequality.weights)
+        for t in {t for p in weights for t in of_place.get(p, ())}:
+            put = sum(weights.get(index[name], 0) for name in net.transitions[t].outputs)
+            if put < sum(weights.get(index[name], 0) for name in net.transitions[t].inputs):
+                return False
+    return True
+
+
 def never_more(places: Iterable[int], tokens: int) -> AtLeast:
     """That the places hold at most so many tokens."""
     return AtLeast(tuple((p, -1) for p in places), -tokens)

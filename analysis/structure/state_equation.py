@@ -30,7 +30,7 @@ from firable.analysis.evidence.certificate import Clause, Equation, InductiveInv
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.structure.asking import answer, solver_of
 from firable.analysis.structure.cover import UnitSearch
-from firable.analysis.structure.inequalities import AtLeast, Refuter, never_more
+from firable.analysis.structure.inequalities import AtLeast, Refuter, kept_by_all, never_more
 from firable.analysis.structure.invariants import columns
 from firable.analysis.structure.ordinary import markable, ordinary
 from firable.analysis.structure.siphons import trap_rules
@@ -56,8 +56,10 @@ class Constraints:
         """How many tokens a unit holds, in M0 and for ever."""
         return sum(self.net.places[p].marked for p in unit)
 
-    def certificate(self) -> InductiveInvariant:
-        """Their conjunction, which every firing keeps."""
+    def certificate(self) -> InductiveInvariant | None:
+        """Their conjunction, which every firing keeps; None where a sum is kept only because transitions are dead."""
+        if not kept_by_all(self.net, self.inequalities):
+            return None
         names = [place.name for place in self.net.places]
         return InductiveInvariant(
             tuple(Equation(tuple((names[p], 1) for p in unit), self.tokens(unit)) for unit in self.units),

@@ -2,6 +2,7 @@
 
 from firable.analysis.evidence.certificate import Certificate, InductiveInvariant
 from firable.analysis.goal import Finding
+from firable.analysis.structure.ordinary import markable, ordinary
 from firable.nets.formula import Formula
 from firable.nets.net import Net
 from firable.semantics.algebra import BOOL
@@ -33,8 +34,37 @@ def check_finding(net: Net, goal: Formula, found: Finding) -> None:
         return
     player = Player(net)
     assert not any(holds(net, goal, marking) for marking in player.reachable())
+    if found.certificate is None:
+        assert len(dead_by_themselves(net)) > 0
+        return
+    assert isinstance(found.certificate, InductiveInvariant)
+    for equation in found.certificate.equations:
+        assert set(changes(net, equation.weights)) <= {0}
+    for inequality in found.certificate.inequalities:
+        assert min(changes(net, inequality.weights), default=0) >= 0
     assert certified(net, found.certificate, net.initial_marking)
     for marking in range(1 << len(net.places)):
         if certified(net, found.certificate, marking):
             assert not holds(net, goal, marking)
             assert all(certified(net, found.certificate, after) for _, after in player.successors(marking))
+
+
+def changes(net: Net, weights: tuple[tuple[str, int], ...]) -> list[int]:
+    """By how much each transition without a self-loop changes a sum of tokens."""
+    of = dict(weights)
+    return [
+        sum(of.get(p, 0) for p in t.outputs) - sum(of.get(p, 0) for p in t.inputs)
+        for t in net.transitions
+        if not t.self_loops
+    ]
+
+
+def dead_by_themselves(net: Net) -> set[str]:
+    """Transitions that contradict themselves, or wait for a place that cannot be marked."""
+    reachable = markable(ordinary(net))
+    fires = {
+        net.transitions[t].name
+        for t, inputs in zip(ordinary(net).transitions, ordinary(net).inputs, strict=True)
+        if set(inputs) <= reachable
+    }
+    return {t.name for t in net.transitions} - fires
