@@ -61,6 +61,11 @@ impl Memory {
         self.used.load(Ordering::Relaxed)
     }
 
+    /// Bytes allowed.
+    pub fn limit(&self) -> usize {
+        self.limit
+    }
+
     /// Takes bytes, or says that they are not there.
     pub fn claim(&self, bytes: usize) -> Result<(), Stop> {
         let fits = |used: usize| used.checked_add(bytes).filter(|&used| used <= self.limit);

@@ -32,6 +32,8 @@ pub mod net;
 #[forbid(unsafe_code)]
 pub mod paths;
 #[forbid(unsafe_code)]
+pub mod region;
+#[forbid(unsafe_code)]
 pub mod scc;
 #[forbid(unsafe_code)]
 pub mod step;

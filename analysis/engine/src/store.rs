@@ -1,33 +1,34 @@
 //! The append-only array of markings: at once the set, the breadth-first queue and the numbering of markings.
 //!
-//! It grows by chunks, so nothing is copied and memory is what is stated. One vector that doubles was rejected: while it
-//! moves, both copies exist, and after that half of it may be unused.
+//! A small one doubles. From a mebibyte on it reserves all that the budget allows and takes (and claims) it piece by
+//! piece, so that nothing is copied any more and memory is what is stated. An array of chunks was rejected: it cost each
+//! comparison of a marking two more look-ups.
 
 use crate::budget::{Memory, Stop};
 use crate::marking::Width;
+use crate::region::{MAP_BYTES, Region};
 
-/// Bytes of a full chunk of the array, about.
-const CHUNK_BYTES_LOG2: u32 = 21;
+/// Bytes that are claimed at once: a huge page.
+const PIECE_BYTES: usize = 1 << 21;
 
 /// The append-only array of markings.
 #[derive(Debug)]
 pub struct Store {
     words: usize,
-    chunk_log2: u32,
-    chunks: Vec<Vec<u64>>,
+    region: Region<u64>,
     len: usize,
-    /// How many more markings the last chunk takes.
-    room: usize,
+    /// How many markings the bytes claimed hold.
+    claimed: usize,
 }
 
 impl Store {
     /// An empty array of markings of so many words.
     pub fn new(words: usize) -> Self {
-        let chunk_log2 = (CHUNK_BYTES_LOG2 - 3).saturating_sub(words.next_power_of_two().trailing_zeros()).max(4);
-        Store { words, chunk_log2, chunks: Vec::new(), len: 0, room: 0 }
+        Store { words, region: Region::Heap(Vec::new()), len: 0, claimed: 0 }
     }
 
     /// How many markings there are.
+    #[inline(always)]
     pub fn len(&self) -> usize {
         self.len
     }
@@ -37,57 +38,62 @@ impl Store {
         self.len == 0
     }
 
+    /// The words of all markings, end to end, and some that are not yet written.
+    #[inline(always)]
+    pub fn all(&self) -> &[u64] {
+        self.region.all()
+    }
+
     /// The marking of an index.
     #[inline(always)]
     pub fn get<W: Width>(&self, width: W, index: usize) -> &[u64] {
-        let chunk = &self.chunks[index >> self.chunk_log2];
-        let start = (index & ((1 << self.chunk_log2) - 1)) * width.words();
-        &chunk[start..start + width.words()]
+        &self.all()[index * width.words()..(index + 1) * width.words()]
     }
 
     /// Appends the markings of a range of indexes to `into`.
+    #[inline(always)]
     pub fn copy_range(&self, start: usize, end: usize, into: &mut Vec<u64>) {
-        let mut index = start;
-        while index < end {
-            let chunk = index >> self.chunk_log2;
-            let stop = end.min((chunk + 1) << self.chunk_log2);
-            let base = chunk << self.chunk_log2;
-            into.extend_from_slice(&self.chunks[chunk][(index - base) * self.words..(stop - base) * self.words]);
-            index = stop;
-        }
+        into.extend_from_slice(&self.all()[start * self.words..end * self.words]);
     }
 
-    /// Appends a marking.
+    /// Appends a marking; `most` is how many there may ever be.
     #[inline(always)]
-    pub fn push(&mut self, marking: &[u64], memory: &Memory) -> Result<(), Stop> {
-        if self.room == 0 {
-            self.make_room(memory)?;
+    pub fn push<W: Width>(&mut self, width: W, marking: &[u64], most: usize, memory: &Memory) -> Result<(), Stop> {
+        if self.len == self.claimed {
+            self.make_room(most, memory)?;
         }
-        let last = self.chunks.len() - 1;
-        self.chunks[last].extend_from_slice(&marking[..self.words]);
-        self.room -= 1;
+        let words = width.words();
+        self.region.all_mut()[self.len * words..(self.len + 1) * words].copy_from_slice(&marking[..words]);
         self.len += 1;
         Ok(())
     }
 
-    /// Enlarges the last chunk, which small nets never fill, or begins another.
     #[cold]
-    fn make_room(&mut self, memory: &Memory) -> Result<(), Stop> {
-        let whole = self.words << self.chunk_log2;
-        if self.chunks.last().is_none_or(|chunk| chunk.len() == whole) {
-            self.chunks.push(Vec::new());
+    fn make_room(&mut self, most: usize, memory: &Memory) -> Result<(), Stop> {
+        let marking_bytes = 8 * self.words;
+        let held = self.region.all().len() / self.words;
+        if self.claimed < held {
+            let more = (PIECE_BYTES / marking_bytes).max(16).min(held - self.claimed);
+            memory.claim(more * marking_bytes)?;
+            self.claimed += more;
+            return Ok(());
         }
-        let first = self.chunks.len() == 1;
-        let Some(chunk) = self.chunks.last_mut() else { return Err(Stop::Memory) };
-        let old = chunk.len();
-        let new = if first { (2 * old).clamp(16 * self.words, whole) } else { whole };
-        memory.claim(8 * new)?;
-        if chunk.try_reserve_exact(new - chunk.len()).is_err() {
-            memory.release(8 * new);
-            return Err(Stop::Memory);
-        }
-        memory.release(8 * old);
-        self.room = (new - chunk.len()) / self.words;
+        let small = 2 * held * marking_bytes <= MAP_BYTES;
+        let room = if small { (2 * held).max(16) } else { most.min(memory.limit() / marking_bytes) };
+        let room = room.max(2 * held);
+        let region = match Region::zeroed(room * self.words) {
+            Some(region) => region,
+            // All at once is refused; twice as much may not be.
+            None => Region::zeroed(2 * held * self.words).ok_or(Stop::Memory)?,
+        };
+        // Both copies exist for a moment. What a map was not written to is not there yet.
+        let claimed = if small { room } else { held + (PIECE_BYTES / marking_bytes).max(16) };
+        let claimed = claimed.min(region.all().len() / self.words);
+        memory.claim(claimed * marking_bytes)?;
+        let old = std::mem::replace(&mut self.region, region);
+        self.region.all_mut()[..old.all().len()].copy_from_slice(old.all());
+        memory.release(self.claimed * marking_bytes);
+        self.claimed = claimed;
         Ok(())
     }
 }

@@ -1,57 +1,72 @@
 //! The set of markings: an append-only array of them (`store.rs`), and a hash table of 32-bit indexes into it.
 //!
-//! The table holds 4 bytes a slot, open addressing with linear probing. A slot
-//! of a table of 2^b slots keeps the index in its low b bits and, in the bits that are left, a tag of the hash: most
-//! probes of another marking end at the tag without touching the array (at 2^24 slots one in 256 does).
+//! The table holds 4 bytes a slot, open addressing with linear probing. A slot of a table of 2^b slots keeps the index
+//! plus one in its low b bits and, in the bits that are left, a tag of the hash: most probes of another marking end at
+//! the tag without touching the array (at 2^24 slots one in 256 does).
+//!
+//! Look-ups come in batches, in passes without branches that depend on the data: first all slots of a batch are read,
+//! then the candidates are sorted into those whose tag fits and those whose does not, then the markings of the first are
+//! compared. So cache misses overlap without any prefetch instruction, the processor seldom guesses wrong, and the usual
+//! case, a known marking in its first slot, never enters the probing loop. Only what is left is inserted one by one.
 //!
 //! Rejected: the standard hash set (a copy of each marking, no index, 58-173 ns an edge in a prototype); markings
 //! inline in the table (one cache miss less on a hit at one word, but 8 bytes a slot more, and no index for the graph
-//! methods). Look-ups come in batches: first all slots of a batch are read, then the markings they point to are
-//! compared, and only what that leaves open is inserted, in order: the cache misses overlap without any prefetch
-//! instruction, and the usual case, a known marking in its first slot, never enters the probing loop.
+//! methods); buckets that grow one by one (each look-up would ask which ones have).
 
 use crate::budget::{Memory, Stop};
 use crate::marking::{Width, linear_hash, mix};
+use crate::region::Region;
 use crate::store::Store;
 
-/// A batch of markings on their way into the table.
-#[derive(Debug, Default)]
-pub struct Candidates {
-    /// Linear hashes.
-    hashes: Vec<u64>,
-    /// Markings, end to end.
-    markings: Vec<u64>,
-    /// The first slot of each, as it was when the batch began.
-    slots: Vec<u32>,
-    /// The candidates not found in their first slot.
-    open: Vec<u32>,
-}
-
-/// Stands for "no marking" where an index is stored.
+/// Stands for "no marking" where an index is stored. So there are at most 2^32 - 1 markings.
 pub const NONE: u32 = u32::MAX;
 
-/// Candidates that wait before they are inserted together.
+/// Candidates that wait before they are looked up together. Fewer than the arrays hold, whose length is that of a
+/// byte, so that no index into them needs a check.
 const BATCH: usize = 128;
+const ROOM: usize = 256;
+
+/// A batch of markings on their way into the table.
+#[derive(Debug)]
+pub struct Candidates {
+    count: usize,
+    /// The mixed hash of each.
+    mixed: [u64; ROOM],
+    /// Markings, end to end.
+    markings: Box<[u64]>,
+    /// The first slot of each, as it was when the batch began.
+    slots: [u32; ROOM],
+    /// Those whose first slot has their tag.
+    tagged: [u8; ROOM],
+    /// Those not found in their first slot.
+    open: [u8; ROOM],
+}
 
 impl Candidates {
     /// Room for one batch.
     pub fn new(words: usize) -> Self {
         Candidates {
-            hashes: Vec::with_capacity(BATCH),
-            markings: Vec::with_capacity(BATCH * words),
-            slots: Vec::with_capacity(BATCH),
-            open: Vec::with_capacity(BATCH),
+            count: 0,
+            mixed: [0; ROOM],
+            markings: vec![0; ROOM * words].into_boxed_slice(),
+            slots: [0; ROOM],
+            tagged: [0; ROOM],
+            open: [0; ROOM],
         }
     }
 
-    /// Adds `from ^ flip`; true when the batch should be inserted.
+    /// Adds `from ^ flip`; true when the batch should be looked up. The bound is soft: 64 more do no harm.
     #[inline(always)]
     pub fn push<W: Width>(&mut self, width: W, from: &[u64], flip: &[u64], hash: u64) -> bool {
-        self.hashes.push(hash);
-        for k in 0..width.words() {
-            self.markings.push(from[k] ^ flip[k]);
+        let c = self.count % ROOM;
+        let words = width.words();
+        self.mixed[c] = mix(hash);
+        let to = &mut self.markings[c * words..(c + 1) * words];
+        for k in 0..words {
+            to[k] = from[k] ^ flip[k];
         }
-        self.hashes.len() >= BATCH
+        self.count = c + 1;
+        self.count >= BATCH
     }
 }
 
@@ -60,52 +75,66 @@ impl Candidates {
 pub struct Table {
     /// The markings, by index.
     pub store: Store,
-    slots: Vec<u32>,
+    slots: Region<u32>,
     /// The table has 2^log2 slots.
     log2: u32,
+}
+
+/// Where hashes go in a table of 2^log2 slots.
+#[derive(Clone, Copy)]
+struct Shape {
+    shift: u32,
+    log2: u32,
+    index: u32,
+}
+
+impl Shape {
+    #[inline(always)]
+    fn home(self, mixed: u64) -> usize {
+        (mixed >> self.shift) as usize
+    }
+
+    /// The tag of a hash, in the place where a slot keeps it.
+    #[inline(always)]
+    fn tag(self, mixed: u64) -> u32 {
+        (mixed << self.log2) as u32
+    }
 }
 
 impl Table {
     /// An empty set of markings of so many words.
     pub fn new(words: usize, memory: &Memory) -> Result<Self, Stop> {
         const FIRST_LOG2: u32 = 6;
-        Ok(Table { store: Store::new(words), slots: memory.filled(0, 1 << FIRST_LOG2)?, log2: FIRST_LOG2 })
+        memory.claim(4 << FIRST_LOG2)?;
+        let slots = Region::zeroed(1 << FIRST_LOG2).ok_or(Stop::Memory)?;
+        Ok(Table { store: Store::new(words), slots, log2: FIRST_LOG2 })
     }
 
     #[inline(always)]
-    fn home(&self, mixed: u64) -> usize {
-        (mixed >> (64 - self.log2)) as usize
-    }
-
-    #[inline(always)]
-    fn index_mask(&self) -> u64 {
-        (1 << self.log2) - 1
-    }
-
-    /// The tag of a hash, in the place where a slot keeps it.
-    #[inline(always)]
-    fn tag(&self, mixed: u64) -> u64 {
-        (mixed << self.log2) & 0xffff_ffff
+    fn shape(&self) -> Shape {
+        Shape { shift: 64 - self.log2, log2: self.log2, index: ((1_u64 << self.log2) - 1) as u32 }
     }
 
     /// The index of a marking, or the slot where it belongs.
     #[inline(always)]
     fn probe<W: Width>(&self, width: W, marking: &[u64], mixed: u64) -> Result<u32, usize> {
-        let marking = &marking[..width.words()];
-        let tag = self.tag(mixed);
-        let mut at = self.home(mixed);
+        let words = width.words();
+        let marking = &marking[..words];
+        let (shape, slots, all) = (self.shape(), self.slots.all(), self.store.all());
+        let tag = shape.tag(mixed);
+        let mut at = shape.home(mixed);
         loop {
-            let slot = u64::from(self.slots[at]);
+            let slot = slots[at];
             if slot == 0 {
                 return Err(at);
             }
-            if slot & !self.index_mask() == tag {
-                let index = (slot & self.index_mask()) as usize - 1;
-                if self.store.get(width, index) == marking {
+            if (slot ^ tag) & !shape.index == 0 {
+                let index = ((slot & shape.index) - 1) as usize;
+                if &all[index * words..(index + 1) * words] == marking {
                     return Ok(index as u32);
                 }
             }
-            at = (at + 1) & (self.slots.len() - 1);
+            at = (at + 1) & (slots.len() - 1);
         }
     }
 
@@ -125,26 +154,56 @@ impl Table {
         max: usize,
         memory: &Memory,
     ) -> Result<bool, Stop> {
-        let mixed = mix(hash);
+        self.insert_mixed(width, marking, mix(hash), max, memory)
+    }
+
+    #[inline(always)]
+    fn insert_mixed<W: Width>(
+        &mut self,
+        width: W,
+        marking: &[u64],
+        mixed: u64,
+        max: usize,
+        memory: &Memory,
+    ) -> Result<bool, Stop> {
         let Err(mut at) = self.probe(width, marking, mixed) else { return Ok(false) };
         let index = self.store.len();
         if index >= max {
             return Err(Stop::Markings);
         }
         // At most three quarters full: the index plus one then always fits below the tag.
-        if 4 * (index + 1) > 3 * self.slots.len() {
+        if index >= 3 << (self.log2 - 2) {
             self.grow(width, memory)?;
             at = match self.probe(width, marking, mixed) {
                 Err(at) => at,
                 Ok(_) => return Ok(false),
             };
         }
-        self.store.push(marking, memory)?;
-        self.slots[at] = (self.tag(mixed) | (index as u64 + 1)) as u32;
+        self.store.push(width, marking, max, memory)?;
+        let shape = self.shape();
+        self.slots.all_mut()[at] = (shape.tag(mixed) & !shape.index) | (index as u32 + 1);
         Ok(true)
     }
 
-    /// Inserts a batch in its order and empties it.
+    /// Reads the first slots of a batch and sorts the candidates; how many are tagged and how many open.
+    #[inline(always)]
+    fn sort(&self, batch: &mut Candidates) -> (usize, usize) {
+        let (shape, slots) = (self.shape(), self.slots.all());
+        for (slot, &mixed) in batch.slots.iter_mut().zip(&batch.mixed[..batch.count]) {
+            *slot = slots[shape.home(mixed)];
+        }
+        let (mut tagged, mut open) = (0_u8, 0_u8);
+        for (c, (&slot, &mixed)) in batch.slots.iter().zip(&batch.mixed[..batch.count]).enumerate() {
+            let fits = ((slot ^ shape.tag(mixed)) & !shape.index == 0) & (slot != 0);
+            batch.tagged[usize::from(tagged)] = c as u8;
+            batch.open[usize::from(open)] = c as u8;
+            tagged = tagged.wrapping_add(u8::from(fits));
+            open = open.wrapping_add(u8::from(!fits));
+        }
+        (usize::from(tagged), usize::from(open))
+    }
+
+    /// Inserts a batch and empties it.
     #[inline(always)]
     pub fn insert_batch<W: Width>(
         &mut self,
@@ -153,87 +212,74 @@ impl Table {
         max: usize,
         memory: &Memory,
     ) -> Result<(), Stop> {
-        let Candidates { hashes, markings, slots, open } = batch;
-        slots.clear();
-        for &hash in hashes.iter() {
-            slots.push(self.slots[self.home(mix(hash))]);
+        let words = width.words();
+        let (tagged, mut open) = self.sort(batch);
+        let (shape, all) = (self.shape(), self.store.all());
+        for k in 0..tagged {
+            let c = batch.tagged[k % ROOM];
+            let index = ((batch.slots[usize::from(c)] & shape.index) - 1) as usize;
+            let marking = &batch.markings[usize::from(c) * words..(usize::from(c) + 1) * words];
+            batch.open[open % ROOM] = c;
+            open += usize::from(&all[index * words..(index + 1) * words] != marking);
         }
-        // Most markings are known and stand in their first slot: they end here, without a branch to mispredict.
-        let mut count = 0;
-        open.resize(slots.len(), 0);
-        for (c, (&slot, &hash)) in slots.iter().zip(hashes.iter()).enumerate() {
-            let slot = u64::from(slot);
-            let known = if slot & !self.index_mask() == self.tag(mix(hash)) && slot != 0 {
-                let index = (slot & self.index_mask()) as usize - 1;
-                let words = width.words();
-                self.store.get(width, index) == &markings[c * words..(c + 1) * words]
-            } else {
-                false
-            };
-            open[count] = c as u32;
-            count += usize::from(!known);
+        for k in 0..open {
+            let c = usize::from(batch.open[k % ROOM]);
+            let marking = &batch.markings[c * words..(c + 1) * words];
+            self.insert_mixed(width, marking, batch.mixed[c], max, memory)?;
         }
-        for &c in &open[..count] {
-            let (c, words) = (c as usize, width.words());
-            self.insert(width, &markings[c * words..(c + 1) * words], hashes[c], max, memory)?;
-        }
-        hashes.clear();
-        markings.clear();
+        batch.count = 0;
         Ok(())
     }
 
     /// The indexes of a batch in its order, `NONE` for those not in the set; empties the batch.
     #[inline(always)]
     pub fn find_batch<W: Width>(&self, width: W, batch: &mut Candidates, found: &mut Vec<u32>) {
-        let Candidates { hashes, markings, slots, open } = batch;
         let words = width.words();
-        slots.clear();
-        for &hash in hashes.iter() {
-            slots.push(self.slots[self.home(mix(hash))]);
-        }
-        let mut count = 0;
-        open.resize(slots.len(), 0);
+        let (tagged, mut open) = self.sort(batch);
+        let (shape, all) = (self.shape(), self.store.all());
         found.clear();
-        for (c, (&slot, &hash)) in slots.iter().zip(hashes.iter()).enumerate() {
-            let slot = u64::from(slot);
-            let index = (slot & self.index_mask()).wrapping_sub(1) as u32;
-            let known = slot & !self.index_mask() == self.tag(mix(hash))
-                && slot != 0
-                && self.store.get(width, index as usize) == &markings[c * words..(c + 1) * words];
-            found.push(if known { index } else { NONE });
-            open[count] = c as u32;
-            count += usize::from(!known && slot != 0);
+        found.resize(batch.count, NONE);
+        for k in 0..tagged {
+            let c = batch.tagged[k % ROOM];
+            let index = (batch.slots[usize::from(c)] & shape.index) - 1;
+            let marking = &batch.markings[usize::from(c) * words..(usize::from(c) + 1) * words];
+            found[usize::from(c)] = index;
+            batch.open[open % ROOM] = c;
+            open += usize::from(&all[index as usize * words..(index as usize + 1) * words] != marking);
         }
-        for &c in &open[..count] {
-            let c = c as usize;
-            if let Some(index) = self.find(width, &markings[c * words..(c + 1) * words], hashes[c]) {
-                found[c] = index;
-            }
+        for k in 0..open {
+            let c = usize::from(batch.open[k % ROOM]);
+            let marking = &batch.markings[c * words..(c + 1) * words];
+            found[c] = self.probe(width, marking, batch.mixed[c]).unwrap_or(NONE);
         }
-        hashes.clear();
-        markings.clear();
+        batch.count = 0;
     }
 
     /// Doubles the slots and files every marking again.
     #[cold]
     fn grow<W: Width>(&mut self, width: W, memory: &Memory) -> Result<(), Stop> {
         if self.log2 == 32 {
-            return Err(Stop::Memory);
+            return Err(Stop::Markings);
         }
-        let old = self.slots.len();
-        let slots = memory.filled(0, 2 * old)?;
-        self.slots = slots;
-        memory.release(4 * old);
+        let old = 1_usize << self.log2;
+        memory.claim(8 * old)?;
+        let Some(mut region) = Region::zeroed(2 * old) else {
+            memory.release(8 * old);
+            return Err(Stop::Memory);
+        };
         self.log2 += 1;
-        let mask = self.slots.len() - 1;
+        let (shape, slots) = (self.shape(), region.all_mut());
+        let mask = slots.len() - 1;
         for index in 0..self.store.len() {
             let mixed = mix(linear_hash(width, self.store.get(width, index)));
-            let mut at = self.home(mixed);
-            while self.slots[at] != 0 {
+            let mut at = shape.home(mixed);
+            while slots[at] != 0 {
                 at = (at + 1) & mask;
             }
-            self.slots[at] = (self.tag(mixed) | (index as u64 + 1)) as u32;
+            slots[at] = (shape.tag(mixed) & !shape.index) | (index as u32 + 1);
         }
+        self.slots = region;
+        memory.release(4 * old);
         Ok(())
     }
 }
@@ -295,6 +341,31 @@ mod tests {
         assert_eq!(table.insert(Fixed::<1>, &[1], 1, 1, &memory), Ok(false));
         assert_eq!(table.insert(Fixed::<1>, &[2], 2, 1, &memory), Err(Stop::Markings));
         assert_eq!(table.store.len(), 1);
+    }
+
+    #[test]
+    fn a_table_that_indexes_cannot_count_is_an_end_and_no_wrong_answer() {
+        let memory = Memory::new(usize::MAX);
+        let mut table = Table::new(1, &memory).expect("fits");
+        table.log2 = 32;
+        assert_eq!(table.grow(Fixed::<1>, &memory), Err(Stop::Markings));
+        // The fullest table of 2^32 slots: its last index plus one is an index still, and none is `NONE`.
+        assert!((3_u64 << 30) < u64::from(NONE));
+    }
+
+    #[test]
+    fn a_store_keeps_its_markings_where_it_begins_to_reserve_and_where_it_claims_more() {
+        for words in [1, 3] {
+            let memory = Memory::new(40 << 20);
+            let mut store = Store::new(words);
+            let count = (8 << 20) / (8 * words);
+            for i in 0..count {
+                let marking: Vec<u64> = (0..words).map(|k| (i * words + k) as u64).collect();
+                store.push(Dynamic(words), &marking, usize::MAX, &memory).expect("fits");
+            }
+            assert!(store.all()[..count * words].iter().enumerate().all(|(i, &word)| word == i as u64));
+            assert!(memory.used() >= 8 << 20 && memory.used() < 11 << 20);
+        }
     }
 
     #[test]

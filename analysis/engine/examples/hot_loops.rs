@@ -1,0 +1,88 @@
+//! The engine's hot loops on nets of a fixed size: what `benchmarks/instructions.py` counts instructions of.
+//!
+//! `hot_loops NET WORK [ROUNDS]`: a net by its name and size (`philosophers 10`, `interlocked 9 60`, the second number
+//! being places that never change), and what is done after exploring it: `explore` (nothing), `bottoms`, `edges`,
+//! `backward`, `endless`. Prints markings, edges, and the CPU seconds of the exploration and of the work, best of the
+//! rounds.
+
+use std::time::Duration;
+
+use firable_engine::bottoms::Bottoms;
+use firable_engine::budget::{Watch, unwatched};
+use firable_engine::csr::Csr;
+use firable_engine::explore::{Limits, Space};
+use firable_engine::fixpoints::{backward, endless};
+use firable_engine::net::{Net, Transition};
+
+/// Dining philosophers of four places: fork, thinking, holding the left fork, eating.
+fn philosophers(count: u32) -> Net {
+    let mut transitions = Vec::new();
+    for i in 0..count {
+        let [fork, think, left, eat] = [0, 1, 2, 3].map(|k| 4 * i + k);
+        let other = 4 * ((i + 1) % count);
+        transitions.push(Transition::new(&[think, fork], &[left], &[], &[], &[]));
+        transitions.push(Transition::new(&[left, other], &[eat], &[], &[], &[]));
+        transitions.push(Transition::new(&[eat], &[think, fork, other], &[], &[], &[]));
+    }
+    let initial: Vec<u32> = (0..count).flat_map(|i| [4 * i, 4 * i + 1]).collect();
+    Net::new(4 * count as usize, transitions, &initial).expect("well formed")
+}
+
+/// Machines with internal gates to their neighbours, among places that never change.
+fn interlocked(count: u32, spare: u32) -> Net {
+    let mut transitions = Vec::new();
+    for i in 0..count {
+        let [idle, busy, done] = [0, 1, 2].map(|k| 3 * i + k);
+        let after = 3 * ((i + 1) % count);
+        transitions.push(Transition::new(&[idle], &[busy], &[], &[after + 1], &[]));
+        transitions.push(Transition::new(&[busy], &[done], &[], &[], &[]));
+        transitions.push(Transition::new(&[done], &[idle], &[], &[after + 2], &[]));
+    }
+    let initial: Vec<u32> = (0..count).map(|i| 3 * i).collect();
+    Net::new((3 * count + spare) as usize, transitions, &initial).expect("well formed")
+}
+
+/// CPU seconds of this process.
+fn cpu_seconds() -> f64 {
+    let schedstat = std::fs::read_to_string("/proc/self/schedstat").expect("Linux");
+    let nanoseconds: u64 = schedstat.split(' ').next().and_then(|n| n.parse().ok()).expect("a number");
+    Duration::from_nanos(nanoseconds).as_secs_f64()
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [name, work, rounds @ ..] = arguments.as_slice() else { panic!("hot_loops NET WORK [ROUNDS]") };
+    let rounds: usize = rounds.first().map_or(1, |rounds| rounds.parse().expect("a number of rounds"));
+    let parts: Vec<&str> = name.split(' ').collect();
+    let size = |at: usize| parts.get(at).map_or(0, |size| size.parse().expect("a size"));
+    let (mut best, mut best_work) = (f64::MAX, f64::MAX);
+    let mut found = (0, 0);
+    for _ in 0..rounds {
+        let net = match parts[0] {
+            "philosophers" => philosophers(size(1)),
+            "interlocked" => interlocked(size(1), size(2)),
+            other => panic!("no net {other}"),
+        };
+        let limits = Limits { step: false, markings: 1 << 31, memory_bytes: 3 << 30, time: None };
+        let start = cpu_seconds();
+        let space = Space::explore(net, limits, &mut unwatched).expect("the net fits");
+        let explored = cpu_seconds();
+        assert!(space.stop.is_none());
+        let mut poll = unwatched;
+        let mut watch = Watch::new(None, &mut poll);
+        let mut initial = vec![0; space.len()];
+        initial[0] = 1;
+        match work.as_str() {
+            "explore" => {}
+            "bottoms" => drop(Bottoms::new(&space, &mut watch).expect("fits")),
+            "edges" => drop(Csr::new(&space, None, &space.memory.clone(), &mut watch).expect("fits")),
+            "backward" => drop(backward(&space, &initial, None, &mut watch).expect("fits")),
+            "endless" => drop(endless(&space, Some(&initial), &mut watch).expect("fits")),
+            other => panic!("no work {other}"),
+        }
+        found = (space.len(), space.edges);
+        best = best.min(explored - start);
+        best_work = best_work.min(cpu_seconds() - explored);
+    }
+    println!("{} {} {best:.6} {best_work:.6}", found.0, found.1);
+}
