@@ -66,8 +66,8 @@ fmt: $(MADE)/develop $(MADE)/rust-tools ## format all code, and repair what the 
 	$(BIN)/ruff format .
 	cargo fmt --manifest-path $(CRATE)/Cargo.toml
 
-bench: $(MADE)/develop ## measure; prints ratios against a reference in the same run
-	@for file in $(sort $(wildcard benchmarks/*.py)); do $(BIN)/python $$file || exit 1; done
+bench: $(MADE)/develop ## measure, as ratios to yardsticks in the same run; writes benchmarks/RESULTS.md
+	$(BIN)/python benchmarks/run.py
 
 clean: ## remove what was built
 	rm -rf $(VENV) out build dist src/*.egg-info $(CRATE)/target .mypy_cache .ruff_cache .pytest_cache

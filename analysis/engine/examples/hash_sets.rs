@@ -1,10 +1,11 @@
-//! The plain way, for benchmarks: the same exploration with a mask scan and the standard hash set.
+//! The plain way, for benchmarks: the same exploration with a mask scan and a general hash set.
 //!
-//! Reads a net from standard input (first line: places, then the marked ones; then a line for each transition:
+//! The argument names the set: `std`, the standard one, safe against chosen keys, or `hashbrown`, the same table with a
+//! quick hash. Reads a net from standard input (first line: places, then the marked ones; then a line for each transition:
 //! inputs; outputs; permissive; inhibitive) and prints markings, edges and seconds. It shares no code with the engine, so
 //! the counts are a check as well as a yardstick. At most 256 places.
 
-use std::collections::HashSet;
+use std::hash::Hash;
 use std::io::Read;
 use std::time::Instant;
 
@@ -25,8 +26,29 @@ fn mask<const N: usize>(text: &str) -> Mask<N> {
     mask
 }
 
-fn explore<const N: usize>(initial: Mask<N>, transitions: &[Transition<N>]) -> (usize, u64) {
-    let mut seen = HashSet::from([initial]);
+/// A set that says whether a key is new to it.
+trait Seen<K> {
+    fn insert(&mut self, key: K) -> bool;
+}
+
+impl<K: Eq + Hash> Seen<K> for std::collections::HashSet<K> {
+    fn insert(&mut self, key: K) -> bool {
+        self.insert(key)
+    }
+}
+
+impl<K: Eq + Hash> Seen<K> for hashbrown::HashSet<K> {
+    fn insert(&mut self, key: K) -> bool {
+        self.insert(key)
+    }
+}
+
+fn explore<const N: usize>(
+    mut seen: impl Seen<Mask<N>>,
+    initial: Mask<N>,
+    transitions: &[Transition<N>],
+) -> (usize, u64) {
+    seen.insert(initial);
     let mut queue = vec![initial];
     let mut edges = 0;
     let mut next = 0;
@@ -63,7 +85,11 @@ fn run<const N: usize>(text: &str) {
         })
         .collect();
     let start = Instant::now();
-    let (markings, edges) = explore(initial, &transitions);
+    let (markings, edges) = match std::env::args().nth(1).as_deref() {
+        Some("std") => explore(std::collections::HashSet::new(), initial, &transitions),
+        Some("hashbrown") => explore(hashbrown::HashSet::new(), initial, &transitions),
+        _ => panic!("say which set: std or hashbrown"),
+    };
     println!("{markings} {edges} {}", start.elapsed().as_secs_f64());
 }
 

@@ -1,0 +1,71 @@
+"""Run all benchmarks and write `benchmarks/RESULTS.md`.
+
+    python benchmarks/run.py [--repeat 3] [--only explicit] [--output FILE]
+
+The goals that stand beside the figures were set before the engine was written; one that is missed stays in the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Final
+
+import explicit
+import reading
+import whole_spaces
+from measuring import REPOSITORY, build_examples, machine
+
+BENCHMARKS: Final = {
+    "explicit": explicit.tables,
+    "whole_spaces": whole_spaces.tables,
+    "reading": reading.tables,
+}
+
+OTHER_TOOLS: Final = """## Other tools
+
+None of them is measured by this script. The figures below were measured before, elsewhere, on a machine of the same
+class, in processor seconds; they are no ratio to anything in this file.
+
+| net | tool | seconds |
+|---|---|---|
+| philosophers-16, 1,331,714 markings, explicit | verifypn (TAPAAL) | 6.5 |
+| | LTSmin | 7.0 |
+| | LoLA | 13 |
+| philosophers, n = 1,000 and 2,000, symbolic | LTSmin with Sylvan | 3.3 and 9.3 |
+| | ITS-tools | 35 and over 60 |
+| vehicles that share zones, 4e11 markings, symbolic | LTSmin | 7 |
+| | pnmc | 17 |
+| | ITS-tools | 25 |
+"""
+
+
+def main() -> None:
+    """Measure, and write the results."""
+    parser = argparse.ArgumentParser(description="measure firable")
+    parser.add_argument("--repeat", type=int, default=3, help="runs of each thing")
+    parser.add_argument("--only", choices=BENCHMARKS, action="append", help="these benchmarks alone, to the terminal")
+    parser.add_argument("--output", type=Path, default=REPOSITORY / "benchmarks" / "RESULTS.md")
+    options = parser.parse_args()
+    if options.repeat < 1:
+        parser.error("--repeat must be at least 1")
+    head = machine()
+    build_examples()
+    parts = []
+    for name in options.only or BENCHMARKS:
+        for table in BENCHMARKS[name](options.repeat):
+            print(table.markdown(), flush=True)
+            parts.append(table.markdown())
+    if options.only:
+        return
+    about = (
+        f"# Results\n\nWritten by `make bench`; do not edit. {head}.\n\n"
+        "Each figure is a ratio to something measured in the same run, from the smallest of "
+        f"{options.repeat} processor times; beside a goal stands whether it is met.\n"
+    )
+    options.output.write_text("\n".join([about, *parts, OTHER_TOOLS]))
+    print(f"written to {options.output}")
+
+
+if __name__ == "__main__":
+    main()
