@@ -222,3 +222,102 @@ class Components:
         """One byte for each component: 1 where no edge (within the set) leaves it."""
     def trivial(self) -> bytes:
         """One byte for each component: 1 where it has no edge inside, so no run can stay in it."""
+
+def explore_symbolically(
+    n_places: int,
+    transitions: list[tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]],
+    initial: list[int],
+    *,
+    max_memory_bytes: int,
+    max_seconds: float | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    orders: list[list[int]] | None = None,
+) -> Diagram:
+    """Find the markings reachable under interleaving as a zero-suppressed decision diagram, by saturation.
+
+    The arguments are those of `explore`. Several orders of the places race each other, `orders` in the place of the
+    engine's own candidates, each a permutation of the places from the lowest level to the highest. What ends the
+    search ends later work in the diagram too, until `Diagram.limit` says otherwise.
+
+    Raises `BudgetExceeded` where memory or time ends before all markings are found, `ValueError` for a place out of
+    range or what is no order.
+
+    >>> diagram = explore_symbolically(2, [([0], [1], [], [], [])], [0], max_memory_bytes=1_000_000)
+    >>> diagram.reach().count(), diagram.reach().edges()
+    (2, 1)
+    """
+
+@final
+class Diagram:
+    """All reachable markings of a net, and the questions to them; a set of markings is a `MarkingSet`.
+
+    Whatever takes long raises `BudgetExceeded` where memory or time ends.
+    """
+
+    @property
+    def seconds(self) -> float:
+        """How long the search took."""
+    @property
+    def n_nodes(self) -> int:
+        """How many nodes the diagram had when the search ended, those no longer used included."""
+    @property
+    def memory_bytes(self) -> int:
+        """Bytes held: nodes, remembered results, stacks and the compiled net."""
+    @property
+    def order(self) -> list[int]:
+        """The places from the lowest level to the highest."""
+    def limit(self, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None) -> None:
+        """What ends work in the diagram from now on."""
+    def reach(self) -> MarkingSet:
+        """All reachable markings."""
+    def initial(self) -> MarkingSet:
+        """M0 alone."""
+    def empty(self) -> MarkingSet:
+        """No marking."""
+    def single(self, marked: list[int]) -> MarkingSet:
+        """The marking in which exactly these places hold a token, if it is reachable."""
+    def having(self, markings: MarkingSet, full: list[int], empty: list[int]) -> MarkingSet:
+        """The markings of a set in which some places hold a token and others do not."""
+    def which(self, markings: MarkingSet, tests: list[tuple[list[int], list[int]]]) -> list[bool]:
+        """For each test (`full`, `empty`), whether `having` would find a marking; all in one pass."""
+    def firable(self, markings: MarkingSet) -> MarkingSet:
+        """The markings of a set in which some transition is firable and openable."""
+    def in_contact(self, markings: MarkingSet) -> MarkingSet:
+        """The markings of a set in contact at some transition."""
+    def before(self, targets: MarkingSet, by: list[int] | None = None) -> MarkingSet:
+        """The markings with an edge into the targets (EX); with `by`, an edge that fires one of these transitions."""
+    def backward(self, targets: MarkingSet, within: MarkingSet | None = None) -> MarkingSet:
+        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets])."""
+    def forward(self, sources: MarkingSet) -> MarkingSet:
+        """The markings that can be reached from a set."""
+    def endless(self, within: MarkingSet) -> MarkingSet:
+        """The markings from which a run can go on for ever inside a set (EG over infinite runs)."""
+    def path_to(self, targets: MarkingSet) -> tuple[list[int], list[int], bool] | None:
+        """A firing sequence from M0 into a set, the places marked in its end, and whether it is known to be shortest.
+
+        None where the set is empty, or where the search for a way was given up.
+        """
+
+@final
+class MarkingSet:
+    """A set of reachable markings of one `Diagram`: immutable, and equal to whatever holds the same markings.
+
+    `TypeError` where sets of two diagrams meet, or are to be ordered.
+    """
+
+    def __and__(self, other: MarkingSet) -> MarkingSet: ...
+    def __or__(self, other: MarkingSet) -> MarkingSet: ...
+    def __xor__(self, other: MarkingSet) -> MarkingSet: ...
+    def __sub__(self, other: MarkingSet) -> MarkingSet: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __bool__(self) -> bool:
+        """Whether there is a marking in the set."""
+    def count(self) -> int:
+        """How many markings, exactly."""
+    def edges(self) -> int:
+        """How many pairs of a marking of the set and a transition that may fire in it, exactly."""
+    def contains(self, marked: list[int]) -> bool:
+        """Whether the marking in which exactly these places hold a token is in the set."""
+    def any(self) -> list[int] | None:
+        """The places that hold a token in some marking of the set, the same one every time; None where it is empty."""

@@ -31,6 +31,7 @@ class Method(StrEnum):
     AUTO = "auto"
     EXPLICIT = "explicit"
     STRUCTURE = "structure"
+    SYMBOLIC = "symbolic"
     STATE_EQUATION = "state-equation"
 
 
@@ -78,7 +79,9 @@ def _loaded(at: str) -> Any:
     return getattr(import_module(module), name)
 
 
-SPACES: Final[dict[Method, SpaceMethod]] = {}
+SPACES: Final[dict[Method, SpaceMethod]] = {
+    Method.SYMBOLIC: SpaceMethod("decision diagram", "firable.analysis.spaces.symbolic:explore_symbolically"),
+}
 
 KNOWERS: Final[dict[Method, KnowingMethod]] = {
     Method.STRUCTURE: KnowingMethod("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),

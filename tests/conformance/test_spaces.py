@@ -14,6 +14,7 @@ from support.ring_nets import ring_nets
 
 from firable.analysis.spaces.reachability import explore
 from firable.analysis.spaces.space import StateSpace
+from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.nets.net import Marking, Net
 from firable.semantics.algebra import BooleanAlgebra
 from firable.semantics.firing import Valuation
@@ -22,6 +23,7 @@ from firable.semantics.trace import Discipline
 SPACES: dict[str, Callable[[Net], StateSpace[Any]]] = {
     "reachability graph, interleaving": lambda net: explore(net),
     "reachability graph, steps": lambda net: explore(net, Discipline.STEP),
+    "decision diagram, interleaving": lambda net: explore_symbolically(net),
 }
 
 

@@ -56,6 +56,11 @@ impl Memory {
         Memory { used: AtomicUsize::new(0), limit }
     }
 
+    /// Allows another number of bytes from now on.
+    pub fn allow(&mut self, limit: usize) {
+        self.limit = limit;
+    }
+
     /// Bytes held now.
     pub fn used(&self) -> usize {
         self.used.load(Ordering::Relaxed)

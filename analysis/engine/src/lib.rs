@@ -40,6 +40,8 @@ pub mod step;
 #[forbid(unsafe_code)]
 pub mod store;
 #[forbid(unsafe_code)]
+pub mod symbolic;
+#[forbid(unsafe_code)]
 pub mod table;
 
 #[cfg(feature = "extension-module")]
@@ -53,6 +55,12 @@ mod extension {
 
     #[pymodule_export]
     use crate::python::components::Components;
+    #[pymodule_export]
+    use crate::python::diagram::Diagram;
+    #[pymodule_export]
+    use crate::python::diagram::MarkingSet;
+    #[pymodule_export]
+    use crate::python::diagram::explore_symbolically;
     #[pymodule_export]
     use crate::python::explore::explore;
     #[pymodule_export]

@@ -6,6 +6,7 @@
 //! raises, `KeyboardInterrupt` or what a handler raised where a signal came, else `BudgetExceeded`.
 
 pub(crate) mod components;
+pub(crate) mod diagram;
 pub(crate) mod explore;
 pub(crate) mod graph;
 

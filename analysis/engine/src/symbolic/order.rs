@@ -1,0 +1,306 @@
+//! Orders of places: which place gets which level.
+//!
+//! The size of a diagram depends on the order as on nothing else. A good order keeps together the places that a
+//! transition joins, so that little has to be remembered from one level to the next. Finding the best is intractable;
+//! what works on nets (Rudell's sifting costs more than the search itself) is to make the arcs short:
+//!
+//! - *Sloan* numbers the graph of places and transitions from one end to the other, holding the front small (Sloan 1986);
+//!   *reverse Cuthill-McKee* does so by distance from one end alone, and wins on some nets.
+//! - *FORCE* then moves each place to the middle of its transitions, again and again (Aloul, Markov, Sakallah 2003), as
+//!   long as the sum of the spans falls and some tens of times at most: it converges slowly and at its end hardly at all.
+//!
+//! The order that the net came in is a candidate too, since who wrote or generated a net often kept together what
+//! belongs together. Every order has two directions, which cost the same by any measure of spans and differ by orders
+//! of magnitude in the search; so both are given, and the search races them.
+
+use std::collections::{BinaryHeap, VecDeque};
+
+use crate::net::Transition;
+
+const FORCE_ROUNDS: usize = 40;
+/// The arcs that all rounds of FORCE together may visit.
+const FORCE_WORK: usize = 40_000_000;
+
+/// An order: the places from the lowest level to the highest.
+pub type Order = Vec<u32>;
+
+/// The graph of places (first) and transitions, joined by arcs and gates.
+struct Graph {
+    places: usize,
+    offsets: Vec<u32>,
+    ends: Vec<u32>,
+}
+
+fn joined(transition: &Transition) -> impl Iterator<Item = u32> + '_ {
+    [&transition.inputs, &transition.outputs, &transition.permissive, &transition.inhibitive]
+        .into_iter()
+        .flatten()
+        .copied()
+}
+
+impl Graph {
+    fn new(places: usize, transitions: &[Transition]) -> Self {
+        let vertices = places + transitions.len();
+        let edges = || {
+            transitions
+                .iter()
+                .enumerate()
+                .flat_map(|(t, transition)| joined(transition).map(move |place| (place as usize, places + t)))
+        };
+        let mut offsets = vec![0; vertices + 1];
+        for (place, t) in edges() {
+            offsets[place + 1] += 1;
+            offsets[t + 1] += 1;
+        }
+        for at in 0..vertices {
+            offsets[at + 1] += offsets[at];
+        }
+        let mut ends = vec![0; offsets[vertices] as usize];
+        let mut next = offsets.clone();
+        for (place, t) in edges() {
+            for (from, to) in [(place, t), (t, place)] {
+                ends[next[from] as usize] = to as u32;
+                next[from] += 1;
+            }
+        }
+        Graph { places, offsets, ends }
+    }
+
+    fn vertices(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    fn next_to(&self, vertex: u32) -> &[u32] {
+        &self.ends[self.offsets[vertex as usize] as usize..self.offsets[vertex as usize + 1] as usize]
+    }
+
+    fn degree(&self, vertex: u32) -> usize {
+        self.next_to(vertex).len()
+    }
+
+    /// The vertices that can be reached, by distance; `distance` of those was `u32::MAX` and is set.
+    fn by_distance(&self, from: u32, distance: &mut [u32]) -> Vec<u32> {
+        let mut found = vec![from];
+        distance[from as usize] = 0;
+        let mut at = 0;
+        while at < found.len() {
+            let vertex = found[at];
+            at += 1;
+            for &next in self.next_to(vertex) {
+                if distance[next as usize] == u32::MAX {
+                    distance[next as usize] = distance[vertex as usize] + 1;
+                    found.push(next);
+                }
+            }
+        }
+        found
+    }
+
+    /// One of two vertices of a component that are far from each other, and all of the component; leaves the distances
+    /// from the other one.
+    fn end_of(&self, from: u32, distance: &mut [u32]) -> (u32, Vec<u32>) {
+        let mut start = from;
+        let mut far = 0;
+        for _ in 0..4 {
+            let found = self.by_distance(start, distance);
+            let last = found[found.len() - 1];
+            let reach = distance[last as usize];
+            let end = found
+                .iter()
+                .rev()
+                .take_while(|&&vertex| distance[vertex as usize] == reach)
+                .copied()
+                .min_by_key(|&vertex| self.degree(vertex))
+                .unwrap_or(last);
+            found.iter().for_each(|&vertex| distance[vertex as usize] = u32::MAX);
+            if reach <= far && far > 0 {
+                break;
+            }
+            far = reach;
+            start = end;
+        }
+        let found = self.by_distance(start, distance);
+        let end = found[found.len() - 1];
+        found.iter().for_each(|&vertex| distance[vertex as usize] = u32::MAX);
+        (start, self.by_distance(end, distance))
+    }
+
+    fn only_places(&self, vertices: Vec<u32>) -> Order {
+        vertices.into_iter().filter(|&vertex| (vertex as usize) < self.places).collect()
+    }
+
+    fn sloan(&self) -> Order {
+        const DEGREE: i64 = 2;
+        const DISTANCE: i64 = 1;
+        #[derive(Clone, Copy, PartialEq)]
+        enum Status {
+            Inactive,
+            Preactive,
+            Active,
+            Numbered,
+        }
+        let count = self.vertices();
+        let (mut distance, mut status) = (vec![u32::MAX; count], vec![Status::Inactive; count]);
+        let mut priority = vec![0_i64; count];
+        let mut numbered = Vec::with_capacity(count);
+        let mut queue: BinaryHeap<(i64, std::cmp::Reverse<u32>)> = BinaryHeap::new();
+        for seed in 0..self.places as u32 {
+            if status[seed as usize] != Status::Inactive {
+                continue;
+            }
+            let (start, component) = self.end_of(seed, &mut distance);
+            for &vertex in &component {
+                let far = i64::from(distance[vertex as usize]);
+                priority[vertex as usize] = DISTANCE * far - DEGREE * (self.degree(vertex) as i64 + 1);
+            }
+            status[start as usize] = Status::Preactive;
+            queue.push((priority[start as usize], std::cmp::Reverse(start)));
+            while let Some((value, std::cmp::Reverse(vertex))) = queue.pop() {
+                if status[vertex as usize] == Status::Numbered || value != priority[vertex as usize] {
+                    continue; // an older entry of a vertex whose priority rose
+                }
+                let mut raise = |at: u32, status: &mut [Status]| {
+                    priority[at as usize] += DEGREE;
+                    if status[at as usize] == Status::Inactive {
+                        status[at as usize] = Status::Preactive;
+                    }
+                    queue.push((priority[at as usize], std::cmp::Reverse(at)));
+                };
+                if status[vertex as usize] == Status::Preactive {
+                    for &next in self.next_to(vertex) {
+                        if status[next as usize] != Status::Numbered {
+                            raise(next, &mut status);
+                        }
+                    }
+                }
+                status[vertex as usize] = Status::Numbered;
+                numbered.push(vertex);
+                for &next in self.next_to(vertex) {
+                    if status[next as usize] == Status::Preactive {
+                        raise(next, &mut status);
+                        status[next as usize] = Status::Active;
+                        for &beyond in self.next_to(next) {
+                            if status[beyond as usize] != Status::Numbered {
+                                raise(beyond, &mut status);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        self.only_places(numbered)
+    }
+
+    fn cuthill_mckee(&self) -> Order {
+        let count = self.vertices();
+        let mut distance = vec![u32::MAX; count];
+        let mut seen = vec![false; count];
+        let mut numbered = Vec::with_capacity(count);
+        for seed in 0..self.places as u32 {
+            if seen[seed as usize] {
+                continue;
+            }
+            let (start, _) = self.end_of(seed, &mut distance);
+            let mut queue = VecDeque::from([start]);
+            seen[start as usize] = true;
+            while let Some(vertex) = queue.pop_front() {
+                numbered.push(vertex);
+                let mut next: Vec<u32> =
+                    self.next_to(vertex).iter().copied().filter(|&next| !seen[next as usize]).collect();
+                next.sort_by_key(|&next| self.degree(next));
+                for next in next {
+                    if !std::mem::replace(&mut seen[next as usize], true) {
+                        queue.push_back(next);
+                    }
+                }
+            }
+        }
+        numbered.reverse();
+        self.only_places(numbered)
+    }
+
+    /// The sum over the transitions of how far apart their places lie.
+    fn span(&self, order: &[u32]) -> u64 {
+        let mut level = vec![0_u32; self.places];
+        order.iter().enumerate().for_each(|(at, &place)| level[place as usize] = at as u32);
+        let of = |t: usize| {
+            let levels = self.next_to(t as u32).iter().map(|&place| level[place as usize]);
+            levels.clone().max().map_or(0, |top| u64::from(top - levels.min().unwrap_or(top)))
+        };
+        (self.places..self.vertices()).map(of).sum()
+    }
+
+    fn force(&self, order: Order) -> Order {
+        let mut position: Vec<f64> = vec![0.0; self.vertices()];
+        let rounds = (FORCE_WORK / (self.ends.len() + self.vertices() + 1)).clamp(2, FORCE_ROUNDS);
+        let (mut best_span, mut best, mut current) = (self.span(&order), order.clone(), order);
+        let mut worse = 0;
+        for _ in 0..rounds {
+            current.iter().enumerate().for_each(|(at, &place)| position[place as usize] = at as f64);
+            let middle = |position: &[f64], vertex: usize| {
+                let ends = self.next_to(vertex as u32);
+                ends.iter().map(|&end| position[end as usize]).sum::<f64>() / ends.len() as f64
+            };
+            for t in self.places..self.vertices() {
+                position[t] = middle(&position, t);
+            }
+            for place in (0..self.places).filter(|&place| self.degree(place as u32) > 0) {
+                position[place] = middle(&position, place);
+            }
+            current.sort_by(|&a, &b| position[a as usize].total_cmp(&position[b as usize]));
+            let span = self.span(&current);
+            if span < best_span {
+                (best_span, worse) = (span, 0);
+                best.clone_from(&current);
+            } else {
+                worse += 1;
+                if worse == 3 {
+                    break;
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Orders worth trying, those with the shorter arcs first, each followed by its reverse.
+pub fn candidates(places: usize, transitions: &[Transition]) -> Vec<Order> {
+    let graph = Graph::new(places, transitions);
+    let as_given: Order = (0..places as u32).collect();
+    let mut found = vec![graph.force(graph.sloan()), graph.force(graph.cuthill_mckee()), as_given];
+    found.sort_by_key(|order| graph.span(order));
+    found.dedup();
+    found.into_iter().flat_map(|order| [order.clone(), order.into_iter().rev().collect()]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ring(n: u32) -> Vec<Transition> {
+        // Places far apart in number are neighbours in the ring.
+        let place = |at: u32| at % n * 7 % n;
+        (0..n).map(|at| Transition::new(&[place(at)], &[place(at + 1)], &[], &[], &[])).collect()
+    }
+
+    #[test]
+    fn every_candidate_is_a_permutation() {
+        let mut transitions = ring(20);
+        transitions.push(Transition::default());
+        for order in candidates(25, &transitions) {
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, (0..25).collect::<Vec<u32>>());
+        }
+        assert_eq!(candidates(0, &[]), vec![Vec::<u32>::new(); 2]);
+    }
+
+    #[test]
+    fn a_shuffled_ring_is_laid_out_along_itself() {
+        let (n, transitions) = (1000, ring(1000));
+        let graph = Graph::new(n, &transitions);
+        let given: Order = (0..n as u32).collect();
+        assert!(graph.span(&candidates(n, &transitions)[0]) <= 2 * n as u64);
+        assert!(graph.span(&given) > 10 * n as u64);
+    }
+}

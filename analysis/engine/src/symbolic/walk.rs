@@ -1,0 +1,311 @@
+//! Firing sequences: how a marking of a set is reached, one transition after another.
+//!
+//! Saturation adds markings in no order that a run could follow, so it leaves no way behind. Three are tried:
+//!
+//! 1. layers of a breadth-first search from M0, each found by one image of all transitions, until one meets the targets; then
+//!    back through the layers. The sequence is a shortest one. The work spent on it is bounded, because five thousand
+//!    philosophers need as many layers to starve;
+//! 2. downhill: of all targets the one that differs from M0 in the fewest places is aimed at, and fired is what makes the
+//!    difference smaller without leaving the markings from which the target can be reached. So the walk never goes
+//!    astray for good; where nothing makes the difference smaller, a bounded search by the smallest difference looks for
+//!    a marking that is nearer;
+//! 3. the layers again, with no bound but memory and time.
+//!
+//! The rejected alternative, to keep in every node how far it is from M0 (edge-valued diagrams), gives shortest sequences by
+//! saturation, at a multiple of the nodes for every net that no sequence is asked of.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap, HashSet};
+
+use super::algebra::Binary;
+use super::cache::ANY;
+use super::events::{Kind, Sense, literals};
+use super::space::{Events, Symbolic};
+use super::zdd::{EMPTY, Node, Store, TERMINAL};
+use crate::budget::{Stop, Watch};
+
+/// The results that the first search for layers may compute.
+const LAYERS_WORK: u64 = 20_000_000;
+/// The markings that one search for a way out of a hollow may look at.
+const HOLLOW_MAX: usize = 20_000;
+
+/// A firing sequence from M0, by the indexes of transitions, and the places that hold a token after it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Walk {
+    /// What fires, in turn.
+    pub firings: Vec<u32>,
+    /// The places that hold a token in the end, ascending.
+    pub reached: Vec<u32>,
+    /// Whether no other sequence into the targets is shorter.
+    pub shortest: bool,
+}
+
+/// A marking: for each level from 1 whether its place holds a token.
+type Marking = Vec<bool>;
+
+fn holds(store: &Store, set: Node, marking: &Marking, tokens: usize) -> bool {
+    let (mut node, mut met) = (set, 0);
+    while store.level(node) != TERMINAL {
+        if marking[store.level(node) as usize] {
+            met += 1;
+            node = store.hi(node);
+        } else {
+            node = store.lo(node);
+        }
+    }
+    node != EMPTY && met == tokens
+}
+
+fn tokens(marking: &Marking) -> usize {
+    marking.iter().filter(|&&token| token).count()
+}
+
+/// The moves of a net by level; a transition that never fires has none.
+struct Moves(Vec<Option<Vec<(u32, Kind)>>>);
+
+impl Moves {
+    fn fires(&self, t: usize, marking: &Marking) -> bool {
+        self.0[t].as_ref().is_some_and(|all| all.iter().all(|&(level, kind)| marking[level as usize] == kind.wants()))
+    }
+
+    fn fired(&self, t: usize, marking: &Marking) -> bool {
+        self.0[t].as_ref().is_some_and(|all| all.iter().all(|&(level, kind)| marking[level as usize] == kind.leaves()))
+    }
+
+    /// Fires a transition, or takes a firing back: both are the same exclusive or.
+    fn flip(&self, t: usize, marking: &mut Marking) {
+        let all = self.0[t].iter().flatten();
+        all.filter(|(_, kind)| kind.wants() != kind.leaves()).for_each(|&(level, _)| marking[level as usize] ^= true);
+    }
+
+    /// By how much a firing brings a marking nearer to another.
+    fn gain(&self, t: usize, marking: &Marking, aim: &Marking) -> isize {
+        let all = self.0[t].iter().flatten().filter(|(_, kind)| kind.wants() != kind.leaves());
+        all.map(|&(level, _)| if marking[level as usize] == aim[level as usize] { -1 } else { 1 }).sum()
+    }
+}
+
+impl Symbolic {
+    /// A firing sequence into a set of reachable markings; None where the set is empty.
+    pub fn walk_to(&mut self, roots: &[Node], targets: Node, watch: &mut Watch<'_>) -> Result<Option<Walk>, Stop> {
+        if targets == EMPTY {
+            return Ok(None);
+        }
+        let moves = self.transitions.iter().map(|t| literals(t, self.level_of(), Sense::Forward)).collect();
+        let moves = Moves(moves);
+        if let Some(walk) = self.by_layers(roots, targets, &moves, LAYERS_WORK, watch)? {
+            return Ok(Some(walk));
+        }
+        match self.downhill(roots, targets, &moves, watch)? {
+            Some(walk) => Ok(Some(walk)),
+            None => self.by_layers(roots, targets, &moves, u64::MAX, watch),
+        }
+    }
+
+    fn first(&self) -> Marking {
+        let mut marking = vec![false; self.level_of().len() + 1];
+        self.initial.iter().for_each(|&place| marking[self.level_of()[place as usize] as usize] = true);
+        marking
+    }
+
+    fn walk(&self, firings: Vec<u32>, end: &Marking, shortest: bool) -> Walk {
+        let marked = (1..end.len()).filter(|&level| end[level]);
+        let mut reached: Vec<u32> = marked.map(|level| self.place_at()[level]).collect();
+        reached.sort_unstable();
+        Walk { firings, reached, shortest }
+    }
+
+    fn by_layers(
+        &mut self,
+        roots: &[Node],
+        targets: Node,
+        moves: &Moves,
+        work: u64,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Walk>, Stop> {
+        let end = self.diagram().cache.work.saturating_add(work);
+        let (mut layers, mut seen) = (vec![self.start], self.start);
+        loop {
+            let last = layers[layers.len() - 1];
+            let held = [roots, &layers, &[seen, targets]].concat();
+            let met = self.binary(&held, Binary::Intersection, last, targets, watch)?;
+            if let Some(levels) = self.diagram().any(met) {
+                return self.back_through(&layers, &levels, moves).map(Some);
+            }
+            if self.diagram().cache.work >= end {
+                return Ok(None);
+            }
+            let after = self.all(&held, last, Events::Forward, watch)?;
+            let held = [held, vec![after]].concat();
+            let fresh = self.binary(&held, Binary::Difference, after, seen, watch)?;
+            if fresh == EMPTY {
+                return Ok(None); // the targets are not reachable, which the caller has excluded
+            }
+            let held = [held, vec![fresh]].concat();
+            seen = self.binary(&held, Binary::Union, seen, fresh, watch)?;
+            layers.push(fresh);
+        }
+    }
+
+    fn back_through(&mut self, layers: &[Node], levels: &[u32], moves: &Moves) -> Result<Walk, Stop> {
+        let mut marking: Marking = vec![false; self.level_of().len() + 1];
+        levels.iter().for_each(|&level| marking[level as usize] = true);
+        let walk_end = marking.clone();
+        let mut firings = Vec::with_capacity(layers.len());
+        for &layer in layers.iter().rev().skip(1) {
+            let store = &self.diagram().store;
+            let step = (0..moves.0.len()).find(|&t| {
+                moves.fired(t, &marking) && {
+                    moves.flip(t, &mut marking);
+                    let found = holds(store, layer, &marking, tokens(&marking));
+                    if !found {
+                        moves.flip(t, &mut marking);
+                    }
+                    found
+                }
+            });
+            // A layer is made of the successors of the one before.
+            firings.push(step.ok_or(Stop::Interrupted)? as u32);
+        }
+        firings.reverse();
+        Ok(self.walk(firings, &walk_end, true))
+    }
+
+    fn downhill(
+        &mut self,
+        roots: &[Node],
+        targets: Node,
+        moves: &Moves,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Walk>, Stop> {
+        let mut marking = self.first();
+        let aim = self.nearest(targets, &marking, watch)?;
+        let places: Vec<u32> = (1..aim.len()).filter(|&level| aim[level]).map(|level| self.place_at()[level]).collect();
+        let held = [roots, &[targets]].concat();
+        let aimed = self.single(&held, &places)?;
+        let held = [held, vec![aimed]].concat();
+        let leading = self.closure(&held, aimed, self.reach, true, watch)?;
+        debug_assert!(leading != EMPTY && self.reach != ANY);
+        let mut firings = Vec::new();
+        loop {
+            let before = firings.len();
+            for t in 0..moves.0.len() {
+                watch.tick(1)?;
+                if moves.fires(t, &marking) && moves.gain(t, &marking, &aim) > 0 {
+                    moves.flip(t, &mut marking);
+                    watch.tick(marking.len() / 8)?;
+                    if holds(&self.diagram().store, leading, &marking, tokens(&marking)) {
+                        firings.push(t as u32);
+                    } else {
+                        moves.flip(t, &mut marking);
+                    }
+                }
+            }
+            if marking == aim {
+                return Ok(Some(self.walk(firings, &aim, false)));
+            }
+            if firings.len() == before {
+                let Some(way) = self.out_of_hollow(&marking, &aim, leading, moves, watch)? else { return Ok(None) };
+                for &t in &way {
+                    moves.flip(t as usize, &mut marking);
+                }
+                firings.extend(way);
+            }
+        }
+    }
+
+    /// A sequence to a marking that differs less from the aim; None where the search for it is given up.
+    fn out_of_hollow(
+        &mut self,
+        from: &Marking,
+        aim: &Marking,
+        leading: Node,
+        moves: &Moves,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Vec<u32>>, Stop> {
+        let differ = |marking: &Marking| marking.iter().zip(aim).filter(|(a, b)| a != b).count();
+        let (start, mut found) = (differ(from), vec![(from.clone(), 0, 0)]);
+        let mut seen = HashSet::from([from.clone()]);
+        let mut queue = BinaryHeap::from([(Reverse(start), Reverse(0))]);
+        while let Some((_, Reverse(at))) = queue.pop() {
+            for t in 0..moves.0.len() {
+                watch.tick(1)?;
+                let mut marking: Marking = found[at].0.clone();
+                if !moves.fires(t, &marking) {
+                    continue;
+                }
+                moves.flip(t, &mut marking);
+                watch.tick(marking.len() / 4)?;
+                if seen.contains(&marking) || !holds(&self.diagram().store, leading, &marking, tokens(&marking)) {
+                    continue;
+                }
+                let distance = differ(&marking);
+                seen.insert(marking.clone());
+                found.push((marking, at, t as u32));
+                if distance < start {
+                    let (mut way, mut at) = (Vec::new(), found.len() - 1);
+                    while at != 0 {
+                        way.push(found[at].2);
+                        at = found[at].1;
+                    }
+                    way.reverse();
+                    return Ok(Some(way));
+                }
+                if found.len() == HOLLOW_MAX {
+                    return Ok(None);
+                }
+                queue.push((Reverse(distance), Reverse(found.len() - 1)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// A marking of a set that differs from another in the fewest places.
+    fn nearest(&mut self, set: Node, from: &Marking, watch: &mut Watch<'_>) -> Result<Marking, Stop> {
+        let mut below = vec![0_u64; from.len()]; // tokens up to a level
+        for level in 1..from.len() {
+            below[level] = below[level - 1] + u64::from(from[level]);
+        }
+        let store = &self.diagram().store;
+        // What a child costs from the level below its parent: itself, and the tokens passed over.
+        let from_above = |costs: &HashMap<Node, u64>, child: Node, top: u32| {
+            costs.get(&child).map(|cost| cost + below[top as usize] - below[store.level(child) as usize])
+        };
+        let mut costs: HashMap<Node, u64> = HashMap::from([(EMPTY, u64::from(u32::MAX)), (super::zdd::UNIT, 0)]);
+        let mut todo = vec![set];
+        while let Some(&node) = todo.last() {
+            watch.tick(1)?;
+            if costs.contains_key(&node) {
+                todo.pop();
+                continue;
+            }
+            let (level, lo, hi) = (store.level(node), store.lo(node), store.hi(node));
+            match (from_above(&costs, lo, level - 1), from_above(&costs, hi, level - 1)) {
+                (Some(without), Some(with)) => {
+                    let token = from[level as usize];
+                    costs.insert(node, (without + u64::from(token)).min(with + u64::from(!token)));
+                    todo.pop();
+                }
+                (without, with) => {
+                    todo.extend(
+                        [(without, lo), (with, hi)].into_iter().filter(|(cost, _)| cost.is_none()).map(|at| at.1),
+                    );
+                }
+            }
+        }
+        let mut marking = vec![false; from.len()];
+        let mut node = set;
+        while store.level(node) != TERMINAL {
+            let (level, lo, hi) = (store.level(node), store.lo(node), store.hi(node));
+            let cost = |child| from_above(&costs, child, level - 1).unwrap_or(u64::MAX / 2);
+            let token = from[level as usize];
+            if cost(hi) + u64::from(!token) < cost(lo) + u64::from(token) {
+                marking[level as usize] = true;
+                node = hi;
+            } else {
+                node = lo;
+            }
+        }
+        Ok(marking)
+    }
+}

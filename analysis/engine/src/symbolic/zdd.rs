@@ -1,0 +1,236 @@
+//! Sets of markings as zero-suppressed decision diagrams: the store of nodes.
+//!
+//! A node (level, lo, hi) is the set of markings of `lo`, in which the place of this level is empty, and of those of `hi`
+//! with a token put on it; a level that is passed over is empty. So a set of markings with few tokens is a small diagram
+//! (Minato, *Zero-suppressed BDDs*, 1993), where the ordinary reduction would store every empty place. Each node is
+//! stored once, found again by a hash table chained through the nodes themselves: equal sets are equal numbers.
+//!
+//! Nodes are 16 bytes in one flat array and are named by `u32`; what is no longer used is found by marking from the
+//! roots and threaded into a list of free cells, so that numbers stay valid. The rejected alternative, counting the
+//! references of every node, writes to two children for each node made, and nearly all of them die within the operation.
+
+use crate::budget::{Memory, Stop};
+
+/// A set of markings: the number of its node.
+pub type Node = u32;
+
+/// The empty set.
+pub const EMPTY: Node = 0;
+/// The set of the empty marking alone.
+pub const UNIT: Node = 1;
+
+/// The level of the two terminal nodes; places have levels from 1, the top is the highest.
+pub const TERMINAL: u32 = 0;
+const FREE: u32 = u32::MAX;
+const NIL: u32 = u32::MAX;
+const NODES_MAX: usize = (1 << 31) - 1;
+/// Below this number of nodes nothing is collected.
+const COLLECT_FROM: usize = 1 << 20;
+
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    level: u32,
+    lo: Node,
+    hi: Node,
+    next: u32,
+}
+
+/// All nodes of one order of places.
+#[derive(Debug)]
+pub struct Store {
+    cells: Vec<Cell>,
+    buckets: Vec<u32>,
+    free: u32,
+    used: usize,
+    collect_at: usize,
+    /// The bytes that the diagram holds and may hold, stacks and cache included.
+    pub memory: Memory,
+}
+
+/// Which nodes are in use: one bit for each.
+#[derive(Debug)]
+pub struct Marks(Vec<u64>);
+
+impl Marks {
+    /// Whether the node is in use; terminals always are.
+    #[inline]
+    pub fn has(&self, node: Node) -> bool {
+        self.0[node as usize / 64] >> (node % 64) & 1 != 0
+    }
+
+    fn set(&mut self, node: Node) -> bool {
+        let (word, bit) = (&mut self.0[node as usize / 64], 1 << (node % 64));
+        let fresh = *word & bit == 0;
+        *word |= bit;
+        fresh
+    }
+}
+
+#[inline]
+fn hash(level: u32, lo: Node, hi: Node) -> u64 {
+    let mixed = (u64::from(lo) << 32 | u64::from(hi)) ^ u64::from(level).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mixed = (mixed ^ mixed >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93);
+    mixed ^ mixed >> 32
+}
+
+impl Store {
+    /// The two terminals alone.
+    pub fn new(memory: Memory) -> Result<Self, Stop> {
+        let mut store = Store {
+            cells: Vec::new(),
+            buckets: memory.filled(NIL, 1 << 10)?,
+            free: NIL,
+            used: 2,
+            collect_at: COLLECT_FROM,
+            memory,
+        };
+        for _ in 0..2 {
+            let terminal = Cell { level: TERMINAL, lo: EMPTY, hi: EMPTY, next: NIL };
+            store.memory.push(&mut store.cells, terminal)?;
+        }
+        Ok(store)
+    }
+
+    /// The level of a node, 0 for a terminal.
+    #[inline(always)]
+    pub fn level(&self, node: Node) -> u32 {
+        self.cells[node as usize].level
+    }
+
+    /// The markings in which the place of the node's level is empty.
+    #[inline(always)]
+    pub fn lo(&self, node: Node) -> Node {
+        self.cells[node as usize].lo
+    }
+
+    /// The markings in which the place of the node's level is full, the token on it taken away.
+    #[inline(always)]
+    pub fn hi(&self, node: Node) -> Node {
+        self.cells[node as usize].hi
+    }
+
+    /// Both parts of a set at a level that is not below its own.
+    #[inline(always)]
+    pub fn split(&self, node: Node, level: u32) -> (Node, Node) {
+        let cell = &self.cells[node as usize];
+        debug_assert!(cell.level <= level);
+        if cell.level == level && level != TERMINAL { (cell.lo, cell.hi) } else { (node, EMPTY) }
+    }
+
+    /// How many nodes are stored, dead ones included.
+    pub fn used(&self) -> usize {
+        self.used
+    }
+
+    /// Whether enough nodes were made since the last collection to make another one pay.
+    #[inline]
+    pub fn due(&self) -> bool {
+        self.used >= self.collect_at
+    }
+
+    /// The node of these parts at this level, which lies above both.
+    #[inline]
+    pub fn node(&mut self, level: u32, lo: Node, hi: Node) -> Result<Node, Stop> {
+        if hi == EMPTY {
+            return Ok(lo);
+        }
+        debug_assert!(self.level(lo) < level && self.level(hi) < level);
+        let bucket = hash(level, lo, hi) as usize & (self.buckets.len() - 1);
+        let mut at = self.buckets[bucket];
+        while at != NIL {
+            let cell = &self.cells[at as usize];
+            if cell.lo == lo && cell.hi == hi && cell.level == level {
+                return Ok(at);
+            }
+            at = cell.next;
+        }
+        self.insert(bucket, level, lo, hi)
+    }
+
+    fn insert(&mut self, bucket: usize, level: u32, lo: Node, hi: Node) -> Result<Node, Stop> {
+        let cell = Cell { level, lo, hi, next: self.buckets[bucket] };
+        let at = if self.free != NIL {
+            let at = self.free;
+            self.free = self.cells[at as usize].next;
+            self.cells[at as usize] = cell;
+            at
+        } else {
+            if self.cells.len() >= NODES_MAX {
+                return Err(Stop::Memory);
+            }
+            self.memory.push(&mut self.cells, cell)?;
+            self.cells.len() as u32 - 1
+        };
+        self.used += 1;
+        self.buckets[bucket] = at;
+        if self.used > self.buckets.len() {
+            self.rehash(self.buckets.len() * 2)?;
+        }
+        Ok(at)
+    }
+
+    fn rehash(&mut self, size: usize) -> Result<(), Stop> {
+        let buckets = self.memory.filled(NIL, size)?;
+        self.memory.release(self.buckets.len() * size_of::<u32>());
+        self.buckets = buckets;
+        self.chain();
+        Ok(())
+    }
+
+    fn chain(&mut self) {
+        let mask = self.buckets.len() - 1;
+        for (at, cell) in self.cells.iter_mut().enumerate().skip(2).filter(|(_, cell)| cell.level != FREE) {
+            let bucket = hash(cell.level, cell.lo, cell.hi) as usize & mask;
+            cell.next = self.buckets[bucket];
+            self.buckets[bucket] = at as u32;
+        }
+    }
+
+    /// Frees every node that no root leads to, and says which ones are still in use.
+    ///
+    /// The marks are the caller's to look at and to hand back to `done`.
+    pub fn collect(&mut self, roots: impl Iterator<Item = Node>) -> Result<Marks, Stop> {
+        let mut marks = Marks(self.memory.filled(0, self.cells.len().div_ceil(64))?);
+        let mut todo: Vec<Node> = Vec::new();
+        marks.set(EMPTY);
+        marks.set(UNIT);
+        let marking = || {
+            for root in roots {
+                self.memory.push(&mut todo, root)?;
+                while let Some(mut node) = todo.pop() {
+                    while marks.set(node) {
+                        let cell = self.cells[node as usize];
+                        self.memory.push(&mut todo, cell.lo)?;
+                        node = cell.hi;
+                    }
+                }
+            }
+            Ok(())
+        };
+        let marked = marking();
+        self.memory.drop_vec(todo);
+        if let Err(stop) = marked {
+            self.done(marks);
+            return Err(stop);
+        }
+        self.buckets.fill(NIL);
+        self.free = NIL;
+        self.used = 2;
+        for (at, cell) in self.cells.iter_mut().enumerate().skip(2).rev() {
+            if marks.has(at as u32) {
+                self.used += 1;
+            } else {
+                *cell = Cell { level: FREE, lo: EMPTY, hi: EMPTY, next: self.free };
+                self.free = at as u32;
+            }
+        }
+        self.chain();
+        self.collect_at = COLLECT_FROM.max(2 * self.used);
+        Ok(marks)
+    }
+
+    /// Gives the marks of a collection back.
+    pub fn done(&self, marks: Marks) {
+        self.memory.release(marks.0.len() * size_of::<u64>());
+    }
+}

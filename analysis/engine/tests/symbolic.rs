@@ -1,0 +1,273 @@
+//! The diagram against sets of masks: every operation, on nets small enough to hold all their markings in a list.
+
+use std::collections::BTreeSet;
+
+use firable_engine::budget::{Stop, Watch, unwatched};
+use firable_engine::net::Transition;
+use firable_engine::symbolic::algebra::Binary;
+use firable_engine::symbolic::cache::ANY;
+use firable_engine::symbolic::space::{Events, Symbolic};
+use firable_engine::symbolic::zdd::{EMPTY, Node};
+
+type Set = BTreeSet<u32>;
+
+/// Numbers that look random and are the same in every run (Marsaglia's xorshift).
+struct Numbers(u64);
+
+impl Numbers {
+    fn below(&mut self, bound: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) % bound
+    }
+
+    fn places(&mut self, places: u32, most: u64) -> Vec<u32> {
+        let count = self.below(most + 1);
+        (0..count).map(|_| self.below(u64::from(places)) as u32).collect()
+    }
+}
+
+struct Naive {
+    places: u32,
+    transitions: Vec<Transition>,
+    initial: Vec<u32>,
+}
+
+fn mask(places: &[u32]) -> u32 {
+    places.iter().fold(0, |mask, place| mask | 1 << place)
+}
+
+impl Naive {
+    fn drawn(numbers: &mut Numbers) -> Self {
+        let places = 1 + numbers.below(7) as u32;
+        let transitions = (0..numbers.below(9))
+            .map(|_| {
+                let (inputs, outputs) = (numbers.places(places, 2), numbers.places(places, 2));
+                let gates = |numbers: &mut Numbers| match numbers.below(4) {
+                    0 => numbers.places(places, 1),
+                    _ => Vec::new(),
+                };
+                let (permissive, inhibitive) = (gates(numbers), gates(numbers));
+                let closed = if numbers.below(12) == 0 { vec![(0, true), (0, false)] } else { Vec::new() };
+                Transition::new(&inputs, &outputs, &permissive, &inhibitive, &closed)
+            })
+            .collect();
+        Naive { places, transitions, initial: numbers.places(places, 4) }
+    }
+
+    fn firable(&self, t: usize, marking: u32) -> bool {
+        let Transition { inputs, outputs, permissive, inhibitive, .. } = &self.transitions[t];
+        let (full, empty) = (mask(inputs) | mask(permissive), mask(outputs) | mask(inhibitive));
+        self.transitions[t].openable() && marking & full == full && marking & empty == 0
+    }
+
+    fn contact(&self, t: usize, marking: u32) -> bool {
+        let Transition { inputs, outputs, permissive, inhibitive, .. } = &self.transitions[t];
+        let full = mask(inputs) | mask(permissive);
+        marking & full == full && marking & mask(inhibitive) == 0 && marking & mask(outputs) & !mask(inputs) != 0
+    }
+
+    fn after(&self, t: usize, marking: u32) -> u32 {
+        marking & !mask(&self.transitions[t].inputs) | mask(&self.transitions[t].outputs)
+    }
+
+    fn successors(&self, marking: u32) -> impl Iterator<Item = u32> + '_ {
+        (0..self.transitions.len()).filter(move |&t| self.firable(t, marking)).map(move |t| self.after(t, marking))
+    }
+
+    fn closure(&self, seeds: &Set, within: impl Fn(u32) -> bool) -> Set {
+        let mut found: Set = seeds.iter().copied().filter(|&marking| within(marking)).collect();
+        let mut todo: Vec<u32> = found.iter().copied().collect();
+        while let Some(marking) = todo.pop() {
+            for next in self.successors(marking) {
+                if within(next) && found.insert(next) {
+                    todo.push(next);
+                }
+            }
+        }
+        found
+    }
+
+    fn backward(&self, all: &Set, targets: &Set, within: &Set) -> Set {
+        let mut found = targets.clone();
+        while let Some(&more) = all.iter().find(|&&m| {
+            within.contains(&m) && !found.contains(&m) && self.successors(m).any(|next| found.contains(&next))
+        }) {
+            found.insert(more);
+        }
+        found
+    }
+}
+
+struct Both {
+    naive: Naive,
+    space: Symbolic,
+}
+
+fn watched<T>(work: impl FnOnce(&mut Watch<'_>) -> Result<T, Stop>) -> T {
+    work(&mut Watch::new(None, &mut unwatched)).expect("a small net needs no budget")
+}
+
+impl Both {
+    fn drawn(numbers: &mut Numbers) -> Self {
+        let naive = Naive::drawn(numbers);
+        let mut order: Vec<u32> = (0..naive.places).collect();
+        order.sort_by_key(|_| numbers.below(1 << 20));
+        let (transitions, initial) = (naive.transitions.clone(), naive.initial.clone());
+        let places = naive.places as usize;
+        let space = watched(|watch| Symbolic::explore(places, transitions, initial, 1 << 24, Some(vec![order]), watch));
+        Both { naive, space }
+    }
+
+    fn set(&mut self, markings: &Set) -> Node {
+        let mut all = EMPTY;
+        for &marking in markings {
+            let places: Vec<u32> = (0..self.naive.places).filter(|place| marking >> place & 1 != 0).collect();
+            let one = watched(|_| self.space.single(&[all], &places));
+            all = watched(|watch| self.space.binary(&[], Binary::Union, all, one, watch));
+        }
+        all
+    }
+
+    fn check(&mut self, set: Node, expected: &Set, what: &str) {
+        let node = self.set(expected);
+        assert_eq!(node, set, "{what}: {:?} from {:?}", self.naive.transitions, self.naive.initial);
+        let count = watched(|watch| self.space.count(set, watch));
+        assert_eq!(count.first().copied().unwrap_or(0), expected.len() as u64, "{what}");
+    }
+}
+
+fn some_of(numbers: &mut Numbers, all: &Set) -> Set {
+    let every = 1 + numbers.below(4);
+    all.iter().copied().filter(|_| numbers.below(every) == 0).collect()
+}
+
+#[test]
+fn every_operation_agrees_with_sets_of_masks() {
+    let mut numbers = Numbers(0x1234_5678_9abc_def1);
+    for _ in 0..3000 {
+        let mut both = Both::drawn(&mut numbers);
+        let start: Set = [mask(&both.naive.initial)].into();
+        let reach = both.naive.closure(&start, |_| true);
+        let root = both.space.reach;
+        both.check(root, &reach, "reach");
+
+        let firable =
+            |both: &Both, m: u32| (0..both.naive.transitions.len()).filter(|&t| both.naive.firable(t, m)).count();
+        let edges: usize = reach.iter().map(|&m| firable(&both, m)).sum();
+        assert_eq!(watched(|watch| both.space.edges(root, watch)).first().copied().unwrap_or(0), edges as u64);
+
+        let alive = reach.iter().copied().filter(|&m| firable(&both, m) > 0).collect();
+        let found = watched(|watch| both.space.all(&[], root, Events::Tests, watch));
+        both.check(found, &alive, "alive");
+        let contact = |t: usize, m: u32| both.naive.contact(t, m);
+        let contacts =
+            reach.iter().copied().filter(|&m| (0..both.naive.transitions.len()).any(|t| contact(t, m))).collect();
+        let found = watched(|watch| both.space.all(&[], root, Events::Contacts, watch));
+        both.check(found, &contacts, "contacts");
+
+        let (targets, within) = (some_of(&mut numbers, &reach), some_of(&mut numbers, &reach));
+        let (targets_node, within_node) = (both.set(&targets), both.set(&within));
+        let before =
+            reach.iter().copied().filter(|&m| both.naive.successors(m).any(|next| targets.contains(&next))).collect();
+        let found = watched(|watch| both.space.before(&[], targets_node, watch));
+        both.check(found, &before, "before");
+        let backward = both.naive.backward(&reach, &targets, &reach);
+        let found = watched(|watch| both.space.backward(&[], targets_node, root, watch));
+        both.check(found, &backward, "backward");
+        let backward = both.naive.backward(&reach, &targets, &within);
+        let found = watched(|watch| both.space.backward(&[], targets_node, within_node, watch));
+        both.check(found, &backward, "backward within");
+        let forward = both.naive.closure(&targets, |_| true);
+        let found = watched(|watch| both.space.closure(&[], targets_node, ANY, false, watch));
+        both.check(found, &forward, "forward");
+        let forward = both.naive.closure(&targets, |m| within.contains(&m));
+        let found = watched(|watch| both.space.closure(&[], targets_node, within_node, false, watch));
+        both.check(found, &forward, "forward within");
+
+        for t in 0..both.naive.transitions.len() {
+            let may_fire = reach.iter().copied().filter(|&m| both.naive.firable(t, m)).collect();
+            let found = watched(|watch| both.space.firable(&[], root, t, watch));
+            both.check(found, &may_fire, "firable");
+        }
+    }
+}
+
+#[test]
+fn the_algebra_agrees_with_sets_of_masks_on_every_pair_over_three_places() {
+    let naive = Naive { places: 3, transitions: Vec::new(), initial: Vec::new() };
+    let space = watched(|watch| Symbolic::explore(3, Vec::new(), Vec::new(), 1 << 24, None, watch));
+    let mut both = Both { naive, space };
+    let all: Vec<Set> = (0..256_u32).map(|bits| (0..8).filter(|m| bits >> m & 1 != 0).collect()).collect();
+    let nodes: Vec<Node> = all.iter().map(|set| both.set(set)).collect();
+    for (a, set_a) in all.iter().enumerate() {
+        for (b, set_b) in all.iter().enumerate() {
+            let expected: [(Binary, Set); 4] = [
+                (Binary::Union, set_a | set_b),
+                (Binary::Intersection, set_a & set_b),
+                (Binary::Difference, set_a - set_b),
+                (Binary::Symmetric, set_a ^ set_b),
+            ];
+            for (binary, set) in expected {
+                let found = watched(|watch| both.space.binary(&[], binary, nodes[a], nodes[b], watch));
+                let index = all.iter().position(|other| *other == set).expect("every set is listed");
+                assert_eq!(found, nodes[index], "{binary:?} {set_a:?} {set_b:?}");
+            }
+        }
+    }
+}
+
+fn philosophers(n: u32) -> (usize, Vec<Transition>, Vec<u32>) {
+    let place = |i: u32, what: u32| i % n * 5 + what; // thinking, fork, left, right, eating
+    let transitions = (0..n).flat_map(|i| {
+        let fork = place(i + 1, 1);
+        [
+            Transition::new(&[place(i, 0), place(i, 1)], &[place(i, 2)], &[], &[], &[]),
+            Transition::new(&[place(i, 0), fork], &[place(i, 3)], &[], &[], &[]),
+            Transition::new(&[place(i, 2), fork], &[place(i, 4)], &[], &[], &[]),
+            Transition::new(&[place(i, 3), place(i, 1)], &[place(i, 4)], &[], &[], &[]),
+            Transition::new(&[place(i, 4)], &[place(i, 0), place(i, 1), fork], &[], &[], &[]),
+        ]
+    });
+    (5 * n as usize, transitions.collect(), (0..n).flat_map(|i| [place(i, 0), place(i, 1)]).collect())
+}
+
+fn bits(natural: &[u64]) -> usize {
+    natural.iter().rposition(|&word| word != 0).map_or(0, |at| 64 * at + 64 - natural[at].leading_zeros() as usize)
+}
+
+#[test]
+fn a_thousand_philosophers_have_three_to_the_thousand_markings_and_two_deadlocks() {
+    let (places, transitions, initial) = philosophers(1000);
+    let mut space = watched(|watch| Symbolic::explore(places, transitions, initial, 1 << 28, None, watch));
+    let count = watched(|watch| space.count(space.reach, watch));
+    let mut power = vec![1_u64];
+    for _ in 0..1000 {
+        let mut carry = 0;
+        for word in &mut power {
+            let product = u128::from(*word) * 3 + carry;
+            (*word, carry) = (product as u64, product >> 64);
+        }
+        if carry > 0 {
+            power.push(carry as u64);
+        }
+    }
+    assert_eq!(bits(&count), bits(&power));
+    assert_eq!(count[..power.len()], power);
+    let reach = space.reach;
+    let alive = watched(|watch| space.all(&[], reach, Events::Tests, watch));
+    let deadlocks = watched(|watch| space.binary(&[], Binary::Difference, reach, alive, watch));
+    assert_eq!(watched(|watch| space.count(deadlocks, watch))[0], 2);
+}
+
+#[test]
+fn a_budget_that_is_too_small_is_an_answer() {
+    for bytes in [0, 1 << 10, 1 << 14, 1 << 17] {
+        let (places, transitions, initial) = philosophers(200);
+        let mut poll = unwatched;
+        let watch = &mut Watch::new(None, &mut poll);
+        let stopped = Symbolic::explore(places, transitions, initial, bytes, None, watch);
+        assert_eq!(stopped.err(), Some(Stop::Memory));
+    }
+}

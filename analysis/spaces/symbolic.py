@@ -1,0 +1,293 @@
+"""The symbolic state space: all reachable markings as a decision diagram, however many there are.
+
+A net of independent parts has as many markings as the product of those of its parts, and a diagram as large as their
+sum. So where the explicit graph ends at 10^8 markings, this one goes on to 10^1000, if the net has a good order of
+places; the Rust engine (`analysis/engine/src/symbolic`) looks for one, and gives up within its budget where there is
+none. The search is saturation (Ciardo, Lüttgen, Siminiscu 2001), which finds all markings or none: there is no part of
+a space to draw wrong conclusions from.
+
+Sets of markings are values with `&`, `|` and `^`, so that the one text of the firing rule is evaluated on them as on
+everything else. Only what is asked of all transitions at once goes to the engine's own copy of the rule, since a set
+for each of them would be quadratic in the length of the net.
+
+Interleaving only: a maximal step is a choice of a set of transitions, and the relation "one after the other" that
+saturation lives on does not hold of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from firable.analysis import _engine
+from firable.analysis._engine import BudgetExceeded, MarkingSet
+from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.spaces.space import Derived, Witnesses
+from firable.nets.formula import And, Deadlock, Firable, Formula, Not, Or, Start
+from firable.nets.net import Marking, Net
+from firable.nets.verdict import Cost, Witness
+from firable.semantics.algebra import Bitwise, BooleanAlgebra
+from firable.semantics.firing import Valuation, in_contact
+from firable.semantics.formulas import evaluate
+from firable.semantics.trace import Discipline
+
+METHOD = "decision diagram, interleaving"
+
+
+@dataclass(frozen=True)
+class SymbolicSpace(Derived):
+    """The markings reachable from M0 under interleaving, all of them, as a decision diagram.
+
+    What is not done when the `deadline` comes, or memory ends, raises `BudgetExceeded`.
+    """
+
+    net: Net
+    engine: _engine.Diagram
+    discipline: Discipline = Discipline.INTERLEAVING
+    method: str = METHOD
+    complete: bool = True
+    bound: str = ""
+
+    def until(self, deadline: Deadline) -> SymbolicSpace:
+        """The same space, for questions that end with another deadline; so do those to this one from now on."""
+        self.engine.limit(**_ending(deadline))
+        return replace(self)
+
+    def require_complete(self) -> None:
+        """It always is: an incomplete search makes no space."""
+
+    @cached_property
+    def reach(self) -> MarkingSet:
+        """All reachable markings."""
+        return self.engine.reach()
+
+    @cached_property
+    def none(self) -> MarkingSet:
+        """The empty set of markings."""
+        return self.engine.empty()
+
+    @cached_property
+    def algebra(self) -> Bitwise[MarkingSet]:
+        """The sets of markings as a Boolean algebra; true is all of them."""
+        return Bitwise(true=self.reach, false=self.none)
+
+    @cached_property
+    def n_markings(self) -> int:
+        """How many markings, exactly."""
+        return self.reach.count()
+
+    @cached_property
+    def n_edges(self) -> int:
+        """How many pairs of a marking and a transition that may fire in it, exactly."""
+        return self.reach.edges()
+
+    @property
+    def cost(self) -> Cost:
+        """What finding the markings took."""
+        return Cost(self.n_markings, self.n_edges, self.engine.seconds)
+
+    @cached_property
+    def initial(self) -> MarkingSet:
+        """The set of M0 alone."""
+        return self.engine.initial()
+
+    @cached_property
+    def deadlocks(self) -> MarkingSet:
+        """The markings where no transition is firable and openable."""
+        return self.reach - self.engine.firable(self.reach)
+
+    @cached_property
+    def witnesses(self) -> Witnesses:
+        """What replays every witness."""
+        return Witnesses(self.net, self.discipline)
+
+    @cached_property
+    def _holding(self) -> dict[int, MarkingSet]:
+        return {}
+
+    def marked(self, place: int) -> MarkingSet:
+        """The markings in which a place holds a token."""
+        if place not in self._holding:
+            self._holding[place] = self.engine.having(self.reach, [place], [])
+        return self._holding[place]
+
+    def where(self, term: Callable[[BooleanAlgebra[Any], Valuation[Any]], Any]) -> MarkingSet:
+        """The markings in which a Boolean term holds; `term` gets the algebra and the reader of places."""
+        found: MarkingSet = term(self.algebra, self.marked)
+        return found
+
+    def satisfying(self, formula: Formula) -> MarkingSet:
+        """The markings in which a state formula holds."""
+        match formula:
+            case Deadlock():
+                return self.deadlocks
+            case Start():
+                return self.initial
+            case Firable(name):
+                return self.may_fire(self.net.transition_index[name])
+            case Not(operand):
+                return self.algebra.negation(self.satisfying(operand))
+            case And(operands):
+                return self.algebra.conjunction(map(self.satisfying, operands))
+            case Or(operands):
+                return self.algebra.disjunction(map(self.satisfying, operands))
+        return self.where(lambda algebra, holds: evaluate(algebra, self.net, formula, holds))
+
+    def contains(self, markings: MarkingSet, marking: Marking) -> bool:
+        """Whether a marking is in a set; False for one that is not reachable."""
+        return markings.contains([i for i in range(len(self.net.places)) if marking >> i & 1])
+
+    def count(self, markings: MarkingSet) -> int:
+        """How many markings a set holds, exactly."""
+        return markings.count()
+
+    def before(self, targets: MarkingSet, by: Iterable[int] | None = None) -> MarkingSet:
+        """The markings with an edge into the targets (EX); with `by`, an edge that fires one of these transitions."""
+        return self.engine.before(targets, None if by is None else sorted(set(by)))
+
+    def backward(self, targets: MarkingSet, within: MarkingSet | None = None) -> MarkingSet:
+        """The markings from which a target can be reached (EF), going only through `within` (E[within U targets])."""
+        return self.engine.backward(targets, within)
+
+    def endless(self, within: MarkingSet | None = None) -> MarkingSet:
+        """The markings from which a run can go on for ever inside `within` (EG over infinite runs only)."""
+        return self.engine.endless(self.reach if within is None else within)
+
+    def bottom(self) -> MarkingSet:
+        """The markings of one bottom component; a deadlock where there is one."""
+        return self._bottom_after(self.deadlocks or self.initial)
+
+    def _bottom_after(self, markings: MarkingSet) -> MarkingSet:
+        """The markings of a bottom component that can be reached from some marking of a set that is not empty."""
+        while True:
+            one = self.engine.single(markings.any() or [])
+            after = self.engine.forward(one)
+            back = self.backward(one, after)
+            if back == after:
+                return after
+            markings = after - back  # from none of them can that one be reached again, so this ends
+
+    def reversible(self) -> bool:
+        """Whether M0 can be reached from every marking."""
+        return self.backward(self.initial) == self.reach
+
+    def home(self) -> MarkingSet:
+        """The home markings: those that can be reached from every reachable marking."""
+        if self.reversible():
+            return self.reach
+        bottom = self.bottom()
+        return bottom if self.backward(bottom) == self.reach else self.none
+
+    def live(self) -> Sequence[bool]:
+        """For each transition, whether from every marking one can be reached in which it may fire.
+
+        That is so where it may fire in each bottom component, as every run can be led into one of them.
+        """
+        if self.deadlocks:
+            return (False,) * len(self.net.transitions)
+        live = [True] * len(self.net.transitions)
+        left = self.reach
+        while left and any(live):
+            bottom = self._bottom_after(self.initial & left or left)
+            live = [before and here for before, here in zip(live, self._fire_in(bottom), strict=True)]
+            left -= self.backward(bottom)
+        return live
+
+    def may_fire(self, t: int) -> MarkingSet:
+        """The markings in which a transition is firable and some valuation opens its external gates."""
+        return self.engine.having(self.reach, *self._test(t)) if self.net.transitions[t].openable else self.none
+
+    def fired(self) -> Sequence[int]:
+        """For each transition, 1 where it may fire in some marking."""
+        return tuple(map(int, self._fire_in(self.reach)))
+
+    def _fire_in(self, markings: MarkingSet) -> list[bool]:
+        fires = self.engine.which(markings, [self._test(t) for t in range(len(self.net.transitions))])
+        return [fires[t] and transition.openable for t, transition in enumerate(self.net.transitions)]
+
+    def _test(self, t: int) -> tuple[list[int], list[int]]:
+        """Eq. (1) of a transition: the places that must be full, and those that must be empty."""
+        transition, index = self.net.transitions[t], self.net.place_index
+        full = [index[place] for place in (*transition.inputs, *transition.permissive)]
+        return full, [index[place] for place in (*transition.outputs, *transition.inhibitive)]
+
+    def contacts(self) -> Sequence[int]:
+        """For each transition, in how many markings it is in contact."""
+        inside = self.engine.in_contact(self.reach)
+        if not inside:
+            return (0,) * len(self.net.transitions)
+        algebra = Bitwise(true=inside, false=self.none)
+
+        def holds(place: int) -> MarkingSet:
+            return self.engine.having(inside, [place], [])
+
+        return tuple(in_contact(algebra, self.net, t, holds).count() for t in range(len(self.net.transitions)))
+
+    def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
+        """For each pair of transitions, whether some marking makes both firable by Eq. (1)."""
+        tests = [self._test(t) for t in range(len(self.net.transitions))]
+        both = [([*tests[t][0], *tests[u][0]], [*tests[t][1], *tests[u][1]]) for t, u in pairs]
+        return self.engine.which(self.reach, both)
+
+    def witness(self, targets: MarkingSet, note: str = "") -> Witness | None:
+        """A firing sequence from M0 into a set, replayed; a shortest one where few layers of a search lead there.
+
+        Raises `WitnessError` where it does not replay, `BudgetExceeded` where none is found of a set that is not empty.
+        """
+        found = self.engine.path_to(targets)
+        if found is None:
+            if targets:
+                raise BudgetExceeded("the search for a firing sequence was given up")
+            return None
+        firings, marked, _ = found
+        return self.witnesses.replayed([(t,) for t in firings], sum(1 << place for place in marked), note)
+
+
+def explore_symbolically(net: Net, limits: Limits | None = None) -> SymbolicSpace:
+    """All reachable markings of a net under interleaving, external gates free.
+
+    Raises `BudgetExceeded` where the limits of memory or time end the search before it has found all.
+
+    >>> from firable.nets.catalogue.families import family_net
+    >>> space = explore_symbolically(family_net("philosophers_either-100"))
+    >>> space.n_markings == 3**100, space.count(space.deadlocks)
+    (True, 2)
+    """
+    limits = limits or Limits()
+    place, signal = net.place_index, net.signal_index
+    diagram = _engine.explore_symbolically(
+        len(net.places),
+        [
+            (
+                [place[name] for name in transition.inputs],
+                [place[name] for name in transition.outputs],
+                [place[name] for name in transition.permissive],
+                [place[name] for name in transition.inhibitive],
+                [(signal[gate.signal], gate.wanted) for gate in transition.external],
+            )
+            for transition in net.transitions
+        ],
+        [i for i, of in enumerate(net.places) if of.marked],
+        max_memory_bytes=limits.memory_bytes,
+        **_ending(limits.deadline),
+    )
+    return SymbolicSpace(net, diagram)
+
+
+def decide_by_diagram(net: Net, goal: Formula, limits: Limits) -> Finding:
+    """Whether a marking that satisfies the goal is reachable, by looking at all of them."""
+    try:
+        space = explore_symbolically(net, limits)
+        found = space.satisfying(goal)
+        return Finding(bool(found), METHOD, space.witness(found), cost=Cost(space.n_markings))
+    except BudgetExceeded as error:
+        return Finding(None, METHOD, bound=f"the diagram was not finished: {error}")
+
+
+def _ending(deadline: Deadline) -> dict[str, Any]:
+    """A deadline as the engine's functions take it."""
+    flag = deadline.cancelled
+    return {"max_seconds": deadline.left_seconds, "cancelled": None if flag is None else flag.is_set}
