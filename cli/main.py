@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import click
 
 from firable import __version__
-from firable.cli import bundle, check, convert, draw, prove, replay, run, schema
+from firable.cli import bundle, check, convert, draw, prove, replay, run, schema, verify
 from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
@@ -47,6 +47,7 @@ for _command in (
     bundle.bundle,
     run.run,
     replay.replay,
+    verify.verify,
     draw.draw,
     convert.convert,
     schema.schema,

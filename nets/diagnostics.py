@@ -86,6 +86,9 @@ CODES: Final[dict[str, str]] = {
     "F5003": "the plant file does not fit the bundle",
     "F5004": "the trace is not a trace of the net",
     "F5005": "the trace file is malformed",
+    # F6: evidence
+    "F6001": "the evidence is damaged or malformed",
+    "F6002": "the evidence does not show what it claims",
     # F9: our own fault
     "F9001": "internal error",
 }

@@ -72,7 +72,7 @@ NEITHER = And((Not(Holds("a")), Not(Holds("b"))))
 @example(question=(CLOSING, And((Holds("b"), Holds("c")))))
 @example(question=(RACING, NEITHER))
 @example(question=(TORN, NEITHER))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_a_goal_is_found_by_bounded_search_iff_it_is_reachable(
     discipline: Discipline, question: tuple[Net, Formula]
 ) -> None:
@@ -87,7 +87,7 @@ def test_a_goal_is_found_by_bounded_search_iff_it_is_reachable(
 @given(question=questions())
 @example(question=(RACING, NEITHER))
 @example(question=(TORN, NEITHER))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_what_k_induction_decides_is_so(discipline: Discipline, question: tuple[Net, Formula]) -> None:
     net, goal = question
     found = decide_by_k_induction(net, goal, in_time(), discipline=discipline, depth_max=4)
@@ -96,7 +96,7 @@ def test_what_k_induction_decides_is_so(discipline: Discipline, question: tuple[
 
 
 @given(net=dense_nets(signals=True))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_firings_in_parallel_reach_what_interleaving_reaches(net: Net) -> None:
     player, terms = Player(net), Terms()
     relation = parallel_relation(net, terms)
@@ -113,7 +113,7 @@ def test_firings_in_parallel_reach_what_interleaving_reaches(net: Net) -> None:
 
 @given(net=dense_nets(), discipline=st.sampled_from(DISCIPLINES))
 @example(net=RACING, discipline=Discipline.STEP)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_structural_facts_hold_in_every_reachable_marking(net: Net, discipline: Discipline) -> None:
     facts = structural_facts(net, Deadline())
     markings = Player(net).reachable(step=discipline is Discipline.STEP)

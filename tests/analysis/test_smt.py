@@ -2,11 +2,11 @@
 
 import re
 
-import cvc5
 import pytest
 import z3
 from hypothesis import given
 from hypothesis import strategies as st
+from support.second_solver import by_cvc5
 
 from firable.analysis.induction.smt import (
     SEED,
@@ -26,17 +26,6 @@ from firable.nets.net import Net, Place
 
 TERMS = Terms()
 NAMES = ("robot.free", "p", "p'", "fires(t)", "é", "a%b")
-
-
-def by_cvc5(text: str) -> str:
-    """What cvc5 answers to a file."""
-    solver = cvc5.Solver()
-    parser = cvc5.InputParser(solver)
-    parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, text, "test.smt2")
-    answer = ""
-    while not (command := parser.nextCommand()).isNull():
-        answer += command.invoke(solver, parser.getSymbolManager())
-    return answer.strip()
 
 
 terms = st.recursive(

@@ -72,3 +72,15 @@ def test_the_executor_loads_no_prover_at_run_time() -> None:
 def test_the_command_line_starts_without_loading_what_only_commands_need() -> None:
     loaded = loaded_by("import firable.cli.main")
     assert not loaded & (PROVERS | {"pydantic", "yaml", "asyncio"})
+
+
+def test_the_checker_of_evidence_loads_nothing_that_finds_any() -> None:
+    code = (
+        "import firable.analysis.evidence.checker, sys\n"
+        "print(*(n for n in sys.modules if n.startswith('firable.analysis.')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert {name.removeprefix("firable.analysis.") for name in done.stdout.split()} == {
+        *("evidence", "evidence.certificate", "evidence.checker", "evidence.document", "evidence.obligations"),
+        *("induction", "induction.encoding", "induction.smt"),
+    }

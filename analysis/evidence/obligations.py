@@ -1,0 +1,260 @@
+"""What a certificate has to show, as formulas that must have no model: derived from the net and its firing rule alone.
+
+The obligations of an inductive invariant, with E for its equations and inequalities, C for its clauses and R for the
+transition relation of the discipline:
+
+    sums      in M0 the sums are as stated, no firing changes an equation, none lowers an inequality
+    initial   M0 and not C
+    step      E and C and R and not C', of the marking after
+    goal      E and C and the goal; with a depth d: a run of d firings whose markings satisfy E and C, and of which
+              only the last is in the goal
+    base-j    M0, j firings, and the goal, for each j below the depth
+
+A set of markings is an invariant too, "it is one of these", and has the same obligations where it is small enough to be
+written as a formula. Nothing here is taken from the technique that found the certificate; the relation is an evaluation
+of the firing rule. An obligation is SMT-LIB 2 text for any solver, so that nobody needs to trust ours. The sums are
+integers and only multiplied out: their file is in linear arithmetic without a variable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from firable.analysis.evidence.certificate import (
+    Certificate,
+    Clause,
+    Equation,
+    InductiveInvariant,
+    Inequality,
+    MarkingSet,
+)
+from firable.analysis.evidence.document import ClaimKind, Evidence
+from firable.analysis.induction.encoding import Relation, interleaving_relation, step_relation
+from firable.analysis.induction.smt import Operator, Term, Terms, smtlib, subterms
+from firable.nets.net import Net
+from firable.semantics.counting import at_most
+from firable.semantics.firing import Valuation
+from firable.semantics.formulas import evaluate
+from firable.semantics.trace import Discipline
+
+LITERALS_MAX: Final = 20_000  # of a set of markings that is written as a formula
+
+
+@dataclass(frozen=True, slots=True)
+class Obligation:
+    """Terms that must not all be true together; `statement` is what that shows."""
+
+    name: str
+    statement: str
+    asserted: tuple[Term, ...]
+
+    def text(self, evidence: Evidence) -> str:
+        """The SMT-LIB 2 file, whose answer must be `unsat`."""
+        return smtlib(self.asserted, _comments(evidence, self.statement))
+
+
+def _comments(evidence: Evidence, statement: str) -> list[str]:
+    return [
+        f"of '{evidence.net.name}' ({evidence.discipline}): {evidence.claim}",
+        f"To show: {statement}.",
+        "Asserted is that it does not hold, so the answer `unsat` shows it.",
+    ]
+
+
+def obligations(evidence: Evidence) -> tuple[Obligation, ...]:
+    """All obligations in propositional logic; none for a firing sequence, which is played, and for a large set."""
+    match evidence.certificate:
+        case InductiveInvariant() as invariant:
+            return tuple(_of_invariant(evidence, invariant))
+        case MarkingSet(markings, _) as found if len(markings) * len(evidence.net.places) <= LITERALS_MAX:
+            return tuple(_of_markings(evidence, found))
+        case _:
+            return ()
+
+
+def _relation(evidence: Evidence) -> Relation:
+    encode = interleaving_relation if evidence.discipline is Discipline.INTERLEAVING else step_relation
+    return encode(evidence.net, Terms())
+
+
+def _of_invariant(evidence: Evidence, invariant: InductiveInvariant) -> Iterator[Obligation]:
+    net, relation = evidence.net, _relation(evidence)
+    terms = relation.terms
+
+    def known(holds: Valuation[Term]) -> list[Term]:
+        sums = (sum_term(terms, net, one, holds) for one in stated_sums(invariant))
+        return [*sums, *(_clause(terms, net, clause, holds) for clause in invariant.clauses)]
+
+    def kept(holds: Valuation[Term]) -> Term:
+        return terms.conjunction(_clause(terms, net, clause, holds) for clause in invariant.clauses)
+
+    before, after = relation.before.__getitem__, relation.after.__getitem__
+    if invariant.clauses:
+        claim = terms.negation(kept(before))
+        yield Obligation("initial", "the clauses hold in the initial marking", (relation.initial(), claim))
+        claim = terms.negation(kept(after))
+        yield Obligation("step", "every firing keeps the clauses", (*known(before), relation.term, claim))
+
+    runs = _Runs(relation)
+    run: list[Term] = []
+    for k in range(invariant.depth):
+        goal = runs.at(k, evaluate(terms, net, evidence.claim.goal, before))
+        base = (runs.at(0, relation.initial()), *(runs.step(j) for j in range(k)), goal)
+        yield Obligation(f"base-{k}", f"the goal is not reached by {k} firings", base)
+        run += [terms.negation(goal), runs.step(k), *(runs.at(k, term) for term in known(before))]
+    last = [
+        runs.at(invariant.depth, term) for term in (*known(before), evaluate(terms, net, evidence.claim.goal, before))
+    ]
+    after_so_many = f" and {invariant.depth} markings without the goal before it" if invariant.depth else ""
+    yield Obligation("goal", f"the invariant{after_so_many} excludes the goal", (*run, *last))
+
+
+def _of_markings(evidence: Evidence, found: MarkingSet) -> Iterator[Obligation]:
+    net, relation = evidence.net, _relation(evidence)
+    terms = relation.terms
+    among = terms.disjunction(relation.is_marking(marking) for marking in found.markings)
+    outside = terms.negation(terms.disjunction(relation.is_marking(m, after=True) for m in found.markings))
+    initial = (relation.initial(), terms.negation(among))
+    yield Obligation("initial", "the initial marking is in the set", initial)
+    yield Obligation("step", "no firing leads out of the set", (among, relation.term, outside))
+    if evidence.claim.kind is ClaimKind.NEVER:
+        goal = evaluate(terms, net, evidence.claim.goal, relation.before.__getitem__)
+        yield Obligation("goal", "the goal holds in no marking of the set", (among, goal))
+
+
+def _clause(terms: Terms, net: Net, clause: Clause, holds: Valuation[Term]) -> Term:
+    index = net.place_index
+    literals = [holds(index[name]) for name in clause.marked]
+    return terms.disjunction([*literals, *(terms.negation(holds(index[name])) for name in clause.empty)])
+
+
+def sum_term(terms: Terms, net: Net, of: Equation | Inequality, holds: Valuation[Term]) -> Term:
+    """The equation or inequality as a Boolean term over the places."""
+
+    def at_least(weights: list[tuple[str, int]], tokens: int) -> Term:
+        # sum w p >= c, with q for "not p": sum over positive w of w q + sum over negative w of -w p <= sum w+ - c
+        counted = [
+            (terms.negation(holds(net.place_index[name])) if weight > 0 else holds(net.place_index[name]), abs(weight))
+            for name, weight in weights
+            if weight
+        ]
+        return at_most(terms, counted, sum(weight for _, weight in weights if weight > 0) - tokens)
+
+    weights = list(of.weights)
+    lower = at_least(weights, of.tokens)
+    if isinstance(of, Inequality):
+        return lower
+    return terms.conjunction([lower, at_least([(name, -weight) for name, weight in weights], -of.tokens)])
+
+
+def stated_sums(invariant: InductiveInvariant) -> list[Equation | Inequality]:
+    """The equations and inequalities."""
+    return [*invariant.equations, *invariant.inequalities]
+
+
+class _Runs:
+    """Copies of the relation one after the other; `@k` behind a name is no part of any name of a net's."""
+
+    def __init__(self, relation: Relation) -> None:
+        self.relation = relation
+
+    def at(self, k: int, term: Term) -> Term:
+        """A term over the marking before, of the marking after k firings."""
+        return _renamed(self.relation.terms, term, {p.name: f"{p.name}@{k}" for p in self.relation.before})
+
+    def step(self, k: int) -> Term:
+        """The firing from marking k to marking k + 1."""
+        relation = self.relation
+        names = {variable.name: f"{variable.name}@{k}" for variable in (*relation.fires, *relation.signals)}
+        for before, after in zip(relation.before, relation.after, strict=True):
+            names |= {before.name: f"{before.name}@{k}", after.name: f"{before.name}@{k + 1}"}
+        return _renamed(relation.terms, relation.term, names)
+
+
+def _renamed(terms: Terms, term: Term, names: Mapping[str, str]) -> Term:
+    made: dict[Term, Term] = {}
+    for subterm in subterms([term]):
+        operands = [made[operand] for operand in subterm.operands]
+        match subterm.operator:
+            case Operator.VARIABLE:
+                made[subterm] = terms.variable(names[subterm.name])
+            case Operator.TRUE | Operator.FALSE:
+                made[subterm] = subterm
+            case Operator.NOT:
+                made[subterm] = terms.negation(operands[0])
+            case Operator.AND:
+                made[subterm] = terms.conjunction(operands)
+            case Operator.OR:
+                made[subterm] = terms.disjunction(operands)
+            case Operator.EQUAL:
+                made[subterm] = terms.equal(operands[0], operands[1])
+    return made[term]
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """A sum that is not as stated: in M0, or by the firing of a transition."""
+
+    of: Equation | Inequality
+    by: str
+
+    def __str__(self) -> str:
+        total = " + ".join(f"{weight} {name}" for name, weight in self.of.weights)
+        return f"the sum {total} {self.by}"
+
+
+def wrong_sums(net: Net, certificate: Certificate) -> Iterator[Violation]:
+    """The obligation `sums`, multiplied out in integers: what is wrong with the equations and inequalities.
+
+    M' = (M minus I) plus O, and a transition with a place in both never fires. What holds of each firing holds of a
+    step, in which a place has one consumer and one producer at most.
+    """
+    if not isinstance(certificate, InductiveInvariant):
+        return
+    for of, initial, changes in _sums(net, certificate):
+        exact = isinstance(of, Equation)
+        if initial != of.tokens if exact else initial < of.tokens:
+            yield Violation(of, f"is {initial} in the initial marking")
+        for name, change in changes:
+            if change if exact else change < 0:
+                yield Violation(of, f"is changed by {change} when {name} fires")
+
+
+def sums_text(evidence: Evidence) -> str | None:
+    """The same obligation as SMT-LIB 2 text; None where there are no sums."""
+    certificate = evidence.certificate
+    if not isinstance(certificate, InductiveInvariant) or not (certificate.equations or certificate.inequalities):
+        return None
+    statement = "in the initial marking the sums are as stated, no firing changes or lowers them"
+    lines = [*(f"; {line}" for line in _comments(evidence, statement)), "(set-logic QF_LIA)", "(assert (or false"]
+    for of, initial, changes in _sums(evidence.net, certificate):
+        wrong = "distinct" if isinstance(of, Equation) else "<"
+        lines.append(f"  ({wrong} {_number(initial)} {_number(of.tokens)})")
+        lines += [f"  ({wrong} {_number(change)} 0)" for _, change in changes]
+    return "\n".join([*lines, "))", "(check-sat)"]) + "\n"
+
+
+def _number(number: int) -> str:
+    return str(number) if number >= 0 else f"(- {-number})"
+
+
+def _sums(
+    net: Net, certificate: InductiveInvariant
+) -> Iterator[tuple[Equation | Inequality, int, list[tuple[str, int]]]]:
+    """Each sum with its value in M0, and by how much each transition that touches it changes it."""
+    for of in stated_sums(certificate):
+        weights: dict[int, int] = {}
+        for name, weight in of.weights:
+            weights[net.place_index[name]] = weights.get(net.place_index[name], 0) + weight
+        initial = sum(weight for place, weight in weights.items() if net.initial_marking >> place & 1)
+        touching = sorted({t for place in weights for t in (*net.consumers[place], *net.producers[place])})
+        changes = []
+        for t in touching:
+            transition = net.transitions[t]
+            if not transition.self_loops:
+                put = sum(weights.get(net.place_index[name], 0) for name in transition.outputs)
+                taken = sum(weights.get(net.place_index[name], 0) for name in transition.inputs)
+                changes.append((transition.name, put - taken))
+        yield of, initial, changes

@@ -1,0 +1,327 @@
+"""Evidence shows what it claims to z3 and to cvc5, and nothing that was damaged, edited or weakened does."""
+
+import json
+import random
+from collections.abc import Callable, Iterator
+from copy import deepcopy
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.dense_nets import PLACES, dense_nets
+from support.second_solver import by_cvc5
+from support.whole_nets import formulas
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import (
+    Clause,
+    Equation,
+    FiringSequence,
+    InductiveInvariant,
+    Inequality,
+    MarkingSet,
+)
+from firable.analysis.evidence.checker import check_evidence
+from firable.analysis.evidence.document import Claim, ClaimKind, Evidence, evidence_from_text, seal
+from firable.analysis.evidence.obligations import obligations, sums_text
+from firable.analysis.evidence.producing import evidence_of_finding, evidence_of_graph
+from firable.analysis.goal import Limits
+from firable.analysis.induction.k_induction import decide_by_k_induction
+from firable.analysis.spaces.reachability import explore
+from firable.nets.catalogue import catalogue_net
+from firable.nets.catalogue.families import family_net
+from firable.nets.diagnostics import InputError
+from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Start, parse_formula
+from firable.nets.interchange import net_digest, net_from_json
+from firable.nets.net import Net, Place, Transition
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import Player, holds_in
+from firable.semantics.trace import Discipline
+
+DISCIPLINES = [Discipline.INTERLEAVING, Discipline.STEP]
+BOTH_EAT = And((Holds("p1.eating"), Holds("p2.eating")))
+
+
+def induced(net: Net, goal: Formula, discipline: Discipline = Discipline.INTERLEAVING) -> Evidence | None:
+    limits = Limits(Deadline.after(20))
+    return evidence_of_finding(
+        net, goal, decide_by_k_induction(net, goal, limits, discipline=discipline, depth_max=3), discipline
+    )
+
+
+def refuses(evidence: Evidence | str) -> bool:
+    try:
+        checked = check_evidence(evidence_from_text(evidence) if isinstance(evidence, str) else evidence)
+    except InputError as error:
+        return {found.code for found in error.diagnostics} <= {"F6001", "F6002"}
+    if checked.shown is None:
+        raise AssertionError(checked.bound)
+    return False
+
+
+def true(evidence: Evidence) -> bool:
+    """Whether the claim holds, by playing everything."""
+    net, step = evidence.net, evidence.discipline is Discipline.STEP
+    graph = Player(net).reachable(step=step)
+    goal = {m for m in graph if evaluate(BOOL, net, evidence.claim.goal, holds_in(m))}
+    match evidence.claim.kind:
+        case ClaimKind.NEVER:
+            return not goal
+        case ClaimKind.REACHABLE:
+            return bool(goal)
+    while more := {m for m, edges in graph.items() if m not in goal and any(after in goal for _, after in edges)}:
+        goal |= more
+    return goal == set(graph)
+
+
+@st.composite
+def questions(draw: st.DrawFn) -> tuple[Net, Formula]:
+    net = draw(dense_nets(signals=True))
+    return net, draw(formulas(list(PLACES), list(net.transition_index)))
+
+
+@pytest.mark.parametrize("discipline", DISCIPLINES)
+@given(question=questions())
+@settings(max_examples=25, deadline=None)
+def test_all_that_induction_finds_is_shown_to_two_solvers(
+    discipline: Discipline, question: tuple[Net, Formula]
+) -> None:
+    found = induced(*question, discipline)
+    if found is None:
+        return
+    assert evidence_from_text(found.to_text()) == found
+    assert check_evidence(found).shown is True
+    texts = [obligation.text(found) for obligation in obligations(found)]
+    assert {by_cvc5(text) for text in [*texts, *filter(None, [sums_text(found)])]} <= {"unsat"}
+
+
+@pytest.mark.parametrize("discipline", DISCIPLINES)
+@given(question=questions(), kind=st.sampled_from([ClaimKind.NEVER, ClaimKind.ALWAYS_POSSIBLE]))
+@settings(max_examples=25, deadline=None)
+def test_the_markings_of_a_net_show_a_claim_iff_it_is_true(
+    discipline: Discipline, question: tuple[Net, Formula], kind: ClaimKind
+) -> None:
+    net, goal = question
+    found = evidence_of_graph(explore(net, discipline), Claim(kind, goal))
+    if found is None:
+        assert kind is ClaimKind.ALWAYS_POSSIBLE
+        return
+    assert evidence_from_text(found.to_text()) == found
+    assert refuses(found) is not true(found)
+    if true(found):
+        assert {by_cvc5(obligation.text(found)) for obligation in obligations(found)} <= {"unsat"}
+
+
+@given(question=questions(), data=st.data(), discipline=st.sampled_from(DISCIPLINES))
+@settings(max_examples=80, deadline=None)
+def test_no_certificate_shows_a_claim_that_is_false(
+    question: tuple[Net, Formula], data: st.DataObject, discipline: Discipline
+) -> None:
+    net, goal = question
+    names = st.lists(st.sampled_from(PLACES), max_size=3).map(tuple)
+    weights = st.dictionaries(st.sampled_from(PLACES), st.integers(-2, 2)).map(lambda w: tuple(w.items()))
+    invariants = st.builds(
+        InductiveInvariant,
+        st.lists(st.builds(Equation, weights, st.integers(-2, 3)), max_size=2).map(tuple),
+        st.lists(st.builds(Clause, names, names), max_size=3).map(tuple),
+        st.integers(0, 2),
+        st.lists(st.builds(Inequality, weights, st.integers(-3, 2)), max_size=1).map(tuple),
+    )
+    sets = st.builds(MarkingSet, st.lists(st.integers(0, 31), unique=True, max_size=32).map(tuple))
+    sequences = st.lists(st.sampled_from(["t0", "t1"]).map(lambda t: (t,)), max_size=3).map(
+        lambda firings: FiringSequence(tuple(f for f in firings if f[0] in net.transition_index))
+    )
+    certificate = data.draw(st.one_of(invariants, sets, sequences))
+    kind = data.draw(st.sampled_from(ClaimKind))
+    evidence = Evidence(net, discipline, Claim(kind, goal), certificate)
+    assert refuses(evidence) or true(evidence)
+
+
+def sealed(data: dict[str, Any]) -> str:
+    return json.dumps(data | {"seal": seal(data)})
+
+
+TRAPPED = Net(  # no sum of tokens stays the same, and yet somewhere there is always a token
+    "trapped",
+    (Place("a", marked=True), Place("b"), Place("c")),
+    (Transition("fork", ("a",), ("b", "c")), Transition("up", ("c",), ("a",)), Transition("over", ("c",), ("b",))),
+)
+
+EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
+    "invariant": lambda: induced(family_net("philosophers-3"), BOTH_EAT),
+    "traps": lambda: induced(TRAPPED, parse_formula("not a and not b and not c")),
+    "markings": lambda: evidence_of_graph(
+        explore(catalogue_net("conceptual_one_robot")), Claim(ClaimKind.NEVER, Deadlock())
+    ),
+    "distances": lambda: evidence_of_graph(
+        explore(catalogue_net("conceptual_one_robot")), Claim(ClaimKind.ALWAYS_POSSIBLE, Start())
+    ),
+    "sequence": lambda: induced(family_net("philosophers-3"), Deadlock()),
+}
+
+
+@pytest.fixture(params=EXAMPLES)
+def example(request: pytest.FixtureRequest) -> Evidence:
+    found = EXAMPLES[request.param]()
+    assert found is not None
+    assert not refuses(found.to_text())
+    return found
+
+
+def test_every_damaged_byte_is_seen(example: Evidence) -> None:
+    text = example.to_text()
+    chance = random.Random(0)
+    for at in chance.sample(range(len(text)), 150):
+        if not text[at].isspace():
+            damaged = text[:at] + chance.choice('0 x}"') + text[at + 1 :]
+            assert damaged == text or _harmless(text, damaged) or refuses(damaged)
+
+
+def _harmless(text: str, damaged: str) -> bool:
+    try:
+        return bool(json.loads(text) == json.loads(damaged))
+    except ValueError:
+        return False
+
+
+def test_a_text_that_ends_early_is_refused(example: Evidence) -> None:
+    text = example.to_text().rstrip()
+    assert all(refuses(text[:at]) for at in range(0, len(text), 211))
+    assert not refuses(" \n" + text + "\n\n")
+
+
+def _edits(value: Any) -> Iterator[Any]:
+    """The value with one thing changed somewhere in it: an element left out, a number or a truth value changed."""
+    match value:
+        case dict():
+            for key, inner in value.items():
+                for edited in _edits(inner):
+                    yield value | {key: edited}
+        case list():
+            for i, inner in enumerate(value):
+                yield value[:i] + value[i + 1 :]
+                for edited in _edits(inner):
+                    yield [*value[:i], edited, *value[i + 1 :]]
+        case bool():
+            yield not value
+        case int():
+            yield from (value - 1, value + 1)
+
+
+def test_an_edited_certificate_that_is_sealed_anew_is_refused_or_a_proof_all_the_same(example: Evidence) -> None:
+    data = json.loads(example.to_text())
+    edits = list(_edits(data["certificate"]))
+    assert edits
+    refused = 0
+    for edited in random.Random(0).sample(edits, min(40, len(edits))):
+        refused += refuses(sealed(data | {"certificate": edited}))  # where not, the claim is true: it has not changed
+    assert refused
+
+
+def test_the_markings_need_each_of_them() -> None:
+    found = EXAMPLES["markings"]()
+    assert found is not None
+    assert isinstance(found.certificate, MarkingSet)
+    markings = found.certificate.markings
+    for i in range(len(markings)):
+        assert refuses(replace(found, certificate=MarkingSet(markings[:i] + markings[i + 1 :])))
+
+
+def test_an_invariant_without_its_trap_is_refused() -> None:
+    found = EXAMPLES["traps"]()
+    assert found is not None
+    assert isinstance(found.certificate, InductiveInvariant)
+    (clause,) = found.certificate.clauses
+    assert refuses(replace(found, certificate=replace(found.certificate, clauses=())))
+    for place in clause.marked:
+        smaller = Clause(tuple(name for name in clause.marked if name != place), clause.empty)
+        assert refuses(replace(found, certificate=replace(found.certificate, clauses=(smaller,))))
+
+
+def test_another_goal_sealed_anew_is_proved_for_itself_or_refused(example: Evidence) -> None:
+    for goal in ("true", "start", "deadlock", "not start", "false"):
+        data = json.loads(example.to_text())
+        data["claim"]["goal"] = goal
+        if not refuses(sealed(data)):
+            assert true(replace(example, claim=Claim(example.claim.kind, parse_formula(goal))))
+
+
+def test_another_net_is_refused_or_the_claim_is_true_of_it(example: Evidence) -> None:
+    data = json.loads(example.to_text())
+    edits = [("marked", i) for i in range(len(data["net"]["places"]))]
+    edits += [(side, i) for side in ("inputs", "outputs") for i in range(len(data["net"]["transitions"]))]
+    for key, i in edits:
+        edited = deepcopy(data)
+        if key == "marked":
+            edited["net"]["places"][i]["marked"] ^= True
+        else:
+            edited["net"]["transitions"][i][key] = edited["net"]["transitions"][i][key][1:]
+        assert refuses(sealed(edited))  # the digest is that of the old net
+        try:
+            net = net_from_json(edited["net"])
+        except InputError:
+            continue
+        edited["digest"] = net_digest(net)
+        if not refuses(sealed(edited)):
+            assert true(replace(example, net=net))
+
+
+def test_a_kind_of_evidence_shows_its_kind_of_claim_only() -> None:
+    net = family_net("philosophers-2")
+    claim = Claim(ClaimKind.NEVER, Holds("p1.eating"))
+    assert refuses(Evidence(net, Discipline.INTERLEAVING, claim, FiringSequence(())))
+    claim = Claim(ClaimKind.REACHABLE, Start())
+    assert refuses(Evidence(net, Discipline.INTERLEAVING, claim, InductiveInvariant()))
+    assert not refuses(Evidence(net, Discipline.INTERLEAVING, claim, FiringSequence(())))
+
+
+def test_evidence_of_interleaving_shows_nothing_of_steps() -> None:
+    both = And((Not(Holds("a")), Not(Holds("b"))))
+    gated = (Transition("t", ("a",), permissive=("b",)), Transition("u", ("b",), permissive=("a",)))
+    net = Net("racing", (Place("a", marked=True), Place("b", marked=True)), gated)
+    found = evidence_of_graph(explore(net), Claim(ClaimKind.NEVER, both))
+    assert found is not None
+    assert not refuses(found)
+    assert refuses(replace(found, discipline=Discipline.STEP))
+
+
+def test_a_deeper_induction_is_checked_with_its_base() -> None:
+    # Tokens come to c only after two firings, which an induction over one cannot know.
+    chain = tuple(Transition(f"t{i}", (f"p{i}",), (f"p{i + 1}",)) for i in range(4))
+    net = Net("chain", tuple(Place(f"p{i}", marked=i == 0) for i in range(5)), chain)
+    goal = And((Holds("p0"), Holds("p3")))
+    for depth in range(5):
+        evidence = Evidence(net, Discipline.INTERLEAVING, Claim(ClaimKind.NEVER, goal), InductiveInvariant(depth=depth))
+        names = [obligation.name for obligation in obligations(evidence)]
+        assert names == [*(f"base-{k}" for k in range(depth)), "goal"]
+        shown = not refuses(evidence)
+        assert shown is all(by_cvc5(obligation.text(evidence)) == "unsat" for obligation in obligations(evidence))
+    reachable = Evidence(net, Discipline.INTERLEAVING, Claim(ClaimKind.NEVER, Holds("p2")), InductiveInvariant(depth=3))
+    assert refuses(reachable)
+
+
+def test_without_time_evidence_is_neither_shown_nor_refused() -> None:
+    from support.pigeons import pigeon_evidence
+
+    assert check_evidence(pigeon_evidence(), timeout_ms=1).shown is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", "null", "NaN", '{"firable_evidence": 1}', '{"seal": 1, "seal": 1}', "[" * 100_000, "\ud83d"],
+)
+def test_what_is_no_evidence_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="F6001"):
+        evidence_from_text(text)
+
+
+def test_liveness_of_each_transition_is_shown_by_distances() -> None:
+    net = catalogue_net("conceptual_one_robot")
+    graph = explore(net)
+    for transition in net.transitions:
+        found = evidence_of_graph(graph, Claim(ClaimKind.ALWAYS_POSSIBLE, Firable(transition.name)))
+        assert found is not None
+        assert not refuses(found)
