@@ -15,16 +15,13 @@ alternating automata (better for long formulas, which nobody writes about a cell
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Final
 
 from firable.analysis.deadline import NEVER, Deadline
-from firable.nets.formula import And, Constant, Formula, Not, Or
+from firable.nets.formula import Constant, Formula
 from firable.nets.temporal import (
-    Eventually,
     Fires,
-    Globally,
     Next,
     Release,
     Temporal,
@@ -32,14 +29,8 @@ from firable.nets.temporal import (
     TemporalNot,
     TemporalOr,
     Until,
-    WeakUntil,
-    all_of,
-    any_of,
     negated,
 )
-
-TRUE: Final = Constant(value=True)
-FALSE: Final = Constant(value=False)
 
 
 class TooLargeError(RuntimeError):
@@ -70,139 +61,6 @@ class Automaton:
 
     edges: tuple[tuple[Edge, ...], ...]
     n_marks: int
-
-
-def positive(formula: Temporal) -> Temporal:
-    """The formula with negations at atoms only, and with the operators X, U and R alone.
-
-    >>> from firable.nets.temporal import format_temporal, parse_temporal
-    >>> format_temporal(positive(parse_temporal("not G (p -> F q)")))
-    'true U (p and (false R not q))'
-    """
-    match formula:
-        case TemporalAnd(operands):
-            return _all_of(map(positive, operands))
-        case TemporalOr(operands):
-            return _any_of(map(positive, operands))
-        case Next(operand):
-            return _next(positive(operand))
-        case Eventually(operand):
-            return _until(TRUE, positive(operand))
-        case Globally(operand):
-            return _release(FALSE, positive(operand))
-        case Until(left, right):
-            return _until(positive(left), positive(right))
-        case Release(left, right):
-            return _release(positive(left), positive(right))
-        case WeakUntil(left, right):
-            return _release(positive(right), _any_of((positive(left), positive(right))))
-        case TemporalNot(operand):
-            return _positive_of_negation(operand)
-        case Not(Not(operand)):
-            return positive(operand)
-    return formula
-
-
-def _positive_of_negation(formula: Temporal) -> Temporal:
-    match formula:
-        case TemporalNot(operand):
-            return positive(operand)
-        case TemporalAnd(operands):
-            return _any_of(positive(negated(operand)) for operand in operands)
-        case TemporalOr(operands):
-            return _all_of(positive(negated(operand)) for operand in operands)
-        case Next(operand):  # a run never ends: in a deadlock it stutters, so X is its own dual
-            return _next(positive(negated(operand)))
-        case Eventually(operand):
-            return _release(FALSE, positive(negated(operand)))
-        case Globally(operand):
-            return _until(TRUE, positive(negated(operand)))
-        case Until(left, right):
-            return _release(positive(negated(left)), positive(negated(right)))
-        case Release(left, right):
-            return _until(positive(negated(left)), positive(negated(right)))
-        case WeakUntil(left, right):
-            either = any_of((left, right))
-            return _until(positive(negated(right)), positive(negated(either)))
-    return negated(formula)
-
-
-def _all_of(operands: Iterable[Temporal]) -> Temporal:
-    """A conjunction whose state formulas are one operand."""
-    flat: dict[Temporal, None] = {}
-    for operand in operands:
-        parts = operand.operands if isinstance(operand, TemporalAnd) else (operand,)
-        flat.update(dict.fromkeys(parts))
-    states = tuple(one for one in flat if isinstance(one, Formula) and one != TRUE)
-    others = tuple(one for one in flat if not isinstance(one, Formula))
-    if FALSE in states:
-        return FALSE
-    state = states[0] if len(states) == 1 else And(states)
-    if not others:
-        return state if states else TRUE
-    return all_of((state, *others) if states else others)
-
-
-def _any_of(operands: Iterable[Temporal]) -> Temporal:
-    """A disjunction whose state formulas are one operand."""
-    flat: dict[Temporal, None] = {}
-    for operand in operands:
-        parts = operand.operands if isinstance(operand, TemporalOr) else (operand,)
-        flat.update(dict.fromkeys(parts))
-    states = tuple(one for one in flat if isinstance(one, Formula) and one != FALSE)
-    others = tuple(one for one in flat if not isinstance(one, Formula))
-    if TRUE in states:
-        return TRUE
-    state = states[0] if len(states) == 1 else Or(states)
-    if not others:
-        return state if states else FALSE
-    return any_of((state, *others) if states else others)
-
-
-def _next(operand: Temporal) -> Temporal:
-    return operand if operand in {TRUE, FALSE} else Next(operand)
-
-
-def _until(left: Temporal, right: Temporal) -> Temporal:
-    if right in {TRUE, FALSE} or left == FALSE:
-        return right
-    match right:
-        case Until(inner, _) if inner in {left, TRUE}:  # p U (p U q), F F q
-            return right if inner == left or left == TRUE else _until(TRUE, right.right)
-        case TemporalOr(operands) if left == TRUE:  # F (p or q)
-            return _any_of(_until(TRUE, operand) for operand in operands)
-        case Release(inner, Until(first, _) as goal) if left == TRUE and inner == FALSE and first == TRUE:  # F G F q
-            return Release(FALSE, goal)
-    return Until(left, right)
-
-
-def _release(left: Temporal, right: Temporal) -> Temporal:
-    if right in {TRUE, FALSE} or left == TRUE:
-        return right
-    match right:
-        case Release(inner, _) if inner in {left, FALSE}:
-            return right if inner == left or left == FALSE else _release(FALSE, right.right)
-        case TemporalAnd(operands) if left == FALSE:
-            return _all_of(_release(FALSE, operand) for operand in operands)
-        case Until(inner, Release(first, _) as goal) if left == FALSE and inner == TRUE and first == FALSE:
-            return Until(TRUE, goal)
-    return Release(left, right)
-
-
-def replaced(formula: Temporal, value: Callable[[Formula], Formula]) -> Temporal:
-    """The (positive) formula with each state formula of it replaced, and simplified again."""
-    match formula:
-        case TemporalAnd(operands):
-            return _all_of(replaced(operand, value) for operand in operands)
-        case TemporalOr(operands):
-            return _any_of(replaced(operand, value) for operand in operands)
-        case Next(operand):
-            return _next(replaced(operand, value))
-        case Until(left, right):
-            return _until(replaced(left, value), replaced(right, value))
-        case Release(left, right):
-            return _release(replaced(left, value), replaced(right, value))
-    return value(formula) if isinstance(formula, Formula) else formula
 
 
 _Owed = frozenset[Temporal]
@@ -322,11 +180,12 @@ def _edge(term: _Term, target: int, marks: frozenset[int]) -> Edge:
 
 
 def automaton_of(formula: Temporal, states_max: int = 2_000, deadline: Deadline = NEVER) -> Automaton:
-    """The automaton that accepts the runs which satisfy a formula of LTL in the form that `positive` gives.
+    """The automaton that accepts the runs which satisfy a formula of LTL in the form that `rewriting.positive` gives.
 
     Raises `TooLargeError` where it has more states than the limit, and `TimeEndedError`. Cost: exponential in the
     formula at worst, a few states at best.
 
+    >>> from firable.analysis.temporal.rewriting import positive
     >>> from firable.nets.temporal import parse_temporal
     >>> automaton = automaton_of(positive(parse_temporal("G F p")))
     >>> len(automaton.edges), automaton.n_marks

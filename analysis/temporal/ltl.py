@@ -13,8 +13,9 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from firable.analysis.temporal.automaton import FALSE, TRUE, automaton_of, positive, replaced
+from firable.analysis.temporal.automaton import automaton_of
 from firable.analysis.temporal.product import Pairs, Product
+from firable.analysis.temporal.rewriting import FALSE, TRUE, positive, replaced
 from firable.analysis.temporal.sets import Sets
 from firable.nets.formula import Formula
 from firable.nets.temporal import Temporal, negated

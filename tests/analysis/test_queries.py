@@ -10,8 +10,9 @@ from support.ring_nets import ring_nets
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.spaces.reachability import Budget, explore
-from firable.analysis.temporal.automaton import TimeEndedError, TooLargeError, automaton_of, positive
+from firable.analysis.temporal.automaton import TimeEndedError, TooLargeError, automaton_of
 from firable.analysis.temporal.queries import answer, as_goal, upper_bound
+from firable.analysis.temporal.rewriting import positive
 from firable.analysis.verdicts.goals import goals_of
 from firable.analysis.verdicts.properties import decide_properties
 from firable.decompose import split
