@@ -101,6 +101,8 @@ class _Search:
         self.net, self.deadline, self.of = net, deadline, ordinary(net)
         self.may_be_marked = markable(self.of)
         self.changes = columns(net)
+        # A unit is a draining set that fewer tries find, where there is one.
+        self.units = UnitSearch(self.changes, self.of.n_places, self.of.marked, 1)
         self.search = UnitSearch(self.changes, self.of.n_places, self.of.marked, 1, draining=True)
         self.drains: list[tuple[frozenset[int], int]] = []  # each with its tokens
         self.at: dict[int, list[int]] = {}
@@ -119,10 +121,14 @@ class _Search:
             return True
         if place not in self.tried and place not in self.at:
             self.tried.add(place)
-            if drain := self.search.unit(place, deadline=self.deadline):
-                self._add(drain)
-                if self._by_drain(full, {place}):
-                    return True
+            for search, tries in ((self.search, 20), (self.units, 200), (self.search, 500)):
+                if drain := search.unit(place, tries, self.deadline):
+                    self._add(drain)
+                    if self._by_drain(full, {place}):
+                        return True
+                    break
+        if self.deadline.over:
+            return False
         found = self._refuter.inequality(full, empty, self.deadline)
         if found is not None:
             self.inequalities.append(found)

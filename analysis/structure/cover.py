@@ -108,7 +108,6 @@ class UnitSearch:
                 self.sides[number][coefficient > 0].append(variable)
                 self.standing[variable].append((number, coefficient > 0))
         self.chosen = set[int]()
-        self.barred: dict[int, int] = {}
         self.held: dict[Side, int] = {}  # how many are chosen on each side
         self.open: dict[Side, None] = {}
         self.tokens = 0
@@ -117,10 +116,9 @@ class UnitSearch:
         """A unit through the start, the empty one where none was found; None where the deadline came first."""
         undo: list[int] = []  # the variables in the order they were taken
         branches: list[tuple[int, list[int]]] = []  # how much was done before a choice, and what is left to try
-        tries, alive, steps = 0, self._choose(start, undo), 0
+        tries, alive = 0, self._choose(start, undo)
         while True:
-            steps += 1
-            if steps % 256 == 1 and deadline.over:
+            if deadline.over:
                 self._back(undo, 0)
                 return None
             if alive and not self.open:
@@ -159,7 +157,7 @@ class UnitSearch:
         """What may be taken for the open side that leaves the least choice, among the last few."""
         best: list[int] | None = None
         for looked, (number, positive) in enumerate(reversed(self.open)):
-            found = [v for v in self.sides[number][positive] if v not in self.barred]
+            found = [v for v in self.sides[number][positive] if not self._barred(v)]
             if best is None or len(found) < len(best):
                 best = found
             if len(best) < 2 or looked == 8:
@@ -169,7 +167,7 @@ class UnitSearch:
 
     def _choose(self, variable: int, undo: list[int]) -> bool:
         """Take a variable into the unit; False where that contradicts what was taken before."""
-        if variable in self.barred or self.tokens + (variable in self.marked) > self.tokens_max:
+        if self._barred(variable) or self.tokens + (variable in self.marked) > self.tokens_max:
             return False
         self.chosen.add(variable)
         self.tokens += variable in self.marked
@@ -177,14 +175,14 @@ class UnitSearch:
         for side in self.standing[variable]:
             self.held[side] = self.held.get(side, 0) + 1
             self.open.pop(side, None)
-            if self._needs_across(side):
-                for other in self.sides[side[0]][side[1]]:
-                    if other != variable:
-                        self.barred[other] = self.barred.get(other, 0) + 1
-                across = (side[0], not side[1])
-                if not self.held.get(across):
-                    self.open[across] = None
+            across = (side[0], not side[1])
+            if self._needs_across(side) and not self.held.get(across):
+                self.open[across] = None
         return True
+
+    def _barred(self, variable: int) -> bool:
+        """Whether another one was taken on a side where it would have to be alone."""
+        return any(self.held.get(side) and self._needs_across(side) for side in self.standing[variable])
 
     def _needs_across(self, side: Side) -> bool:
         """Whether what is chosen on a side is alone there and needs one on the other side."""
@@ -197,11 +195,6 @@ class UnitSearch:
             self.held[side] -= 1
             across = (side[0], not side[1])
             if self._needs_across(side):
-                for other in self.sides[side[0]][side[1]]:
-                    if other != variable:
-                        self.barred[other] -= 1
-                        if not self.barred[other]:
-                            del self.barred[other]
                 self.open.pop(across, None)
             if not self.held[side] and self.held.get(across) and self._needs_across(across):
                 self.open[side] = None
