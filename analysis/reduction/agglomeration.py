@@ -46,11 +46,11 @@ from typing import Final
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.reduction.draft import Draft, Literal, Move, Tail, composed, literal
-from firable.analysis.reduction.pairs import Facts, forbids
+from firable.analysis.reduction.pairs import Facts
 
 _AROUND_MAX: Final = 2_000  # moves looked at for one place, so that places that all share cost no square
-LENGTH_MAX: Final = 100_000
-"""Firings of the original net that one move may stand for."""
+LENGTH_MAX: Final = 1_000
+"""Firings of the original net that one of two composed moves may stand for: a counter's double with each place."""
 
 
 def agglomerate(draft: Draft, facts: Facts, deadline: Deadline) -> bool:
@@ -85,10 +85,11 @@ class _Around:
     """A place with its openers and closers."""
 
     def __init__(self, draft: Draft, facts: Facts, place: int, openers: set[int], closers: set[int]) -> None:
-        self.draft, self.facts, self.place = draft, facts, place
+        self.draft, self.place = draft, place
         self.openers = {number: draft.moves[number] for number in sorted(openers)}
         self.closers = {number: draft.moves[number] for number in sorted(closers)}
-        self.away = literal(place, not draft.values[place])
+        away = literal(place, not draft.values[place])
+        self.excluded = facts.excluded_by(away)
         self.left = _AROUND_MAX
 
     @classmethod
@@ -112,7 +113,7 @@ class _Around:
             if number in self.openers or number in self.closers:
                 continue
             move = self.draft.moves[number]
-            if self.left < 0 or not forbids(self.facts, self.away, move):
+            if self.left < 0 or not any(map(self.excluded, move.literals)):
                 yield move
 
     def flipped(self, moves: Iterable[Move]) -> Iterator[Literal]:
@@ -127,7 +128,7 @@ class _Around:
         """Whether each closer can be made as soon as the place is away, and is missed by nobody."""
         for move in self.closers.values():
             for one in move.literals:
-                if one // 2 != self.place and not self.facts.exclude(self.away, one ^ 1):
+                if one // 2 != self.place and not self.excluded(one ^ 1):
                     return False
         return not any(
             self.wanted(lost) or any(True for _ in self.others(lost)) for lost in self.flipped(self.closers.values())

@@ -23,7 +23,10 @@ Cost: a matrix of literals by literals in bytes; each move is looked at again wh
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, Protocol
 
 import numpy as np
@@ -44,23 +47,18 @@ Matrix = npt.NDArray[np.bool_]
 class Facts(Protocol):
     """What is known of pairs of literals."""
 
-    def exclude(self, one: Literal, other: Literal) -> bool:
-        """Whether the two are never true together."""
+    def excluded_by(self, one: Literal) -> Callable[[Literal], bool]:
+        """Whether a literal is never true together with this one, as a function of it."""
         ...
-
-
-def forbids(facts: Facts, one: Literal, move: Move) -> bool:
-    """Whether the move can never be made while the literal is true."""
-    return any(facts.exclude(one, need) for need in move.literals)
 
 
 @dataclass(frozen=True, slots=True)
 class NoFacts:
     """What is known of any net: a place is not both marked and empty."""
 
-    def exclude(self, one: Literal, other: Literal) -> bool:
-        """Whether the two are never true together."""
-        return one == other ^ 1
+    def excluded_by(self, one: Literal) -> Callable[[Literal], bool]:
+        """Whether a literal is never true together with this one, as a function of it."""
+        return lambda other: other == one ^ 1
 
 
 @dataclass(frozen=True)
@@ -72,11 +70,21 @@ class Pairs:
 
     numbers: dict[Literal, int]
     together: Matrix
-    cells: bytes
+
+    @cached_property
+    def cells(self) -> memoryview:
+        """The matrix, row after row, one byte for each pair."""
+        return self.together.view(np.uint8).reshape(-1).data
 
     def exclude(self, one: Literal, other: Literal) -> bool:
         """Whether the two are never true together."""
         return not self.cells[self.numbers[one] * len(self.numbers) + self.numbers[other]]
+
+    def excluded_by(self, one: Literal) -> Callable[[Literal], bool]:
+        """Whether a literal is never true together with this one, as a function of it."""
+        start, numbers = self.numbers[one] * len(self.numbers), self.numbers
+        row = self.cells[start : start + len(numbers)]
+        return lambda other: not row[numbers[other]]
 
     def dead(self, move: Move) -> bool:
         """Whether the move can never be made."""
@@ -84,14 +92,16 @@ class Pairs:
         return not bool(self.together[np.ix_(rows, rows)].all())
 
 
-def pairs(draft: Draft, known: Pairs | None, deadline: Deadline) -> Pairs | None:
-    """The facts on the draft as it is, at least those `known`; None past the work allowed or the deadline."""
+def pairs(
+    draft: Draft, known: Pairs | None, deadline: Deadline, matrix_bytes_max: int = MATRIX_BYTES_MAX
+) -> Pairs | None:
+    """The facts on the draft as it is, at least those `known`; None past the work or memory allowed or the deadline."""
     order = sorted(draft.places)
     numbers = {literal(place, value): 2 * i + value for i, place in enumerate(order) for value in (False, True)}
     size = len(numbers)
-    if size * size > MATRIX_BYTES_MAX or deadline.over:
+    if size * size > matrix_bytes_max or deadline.over:
         return None
-    bound = np.ones((size, size), dtype=np.bool_)
+    bound = None
     if known is not None:
         rows = np.array([known.numbers[one] for one in numbers], dtype=np.intp)
         bound = known.together[np.ix_(rows, rows)]
@@ -100,14 +110,16 @@ def pairs(draft: Draft, known: Pairs | None, deadline: Deadline) -> Pairs | None
     together = np.outer(initial, initial)
     if not _propagate(draft, numbers, together, bound, deadline):
         return None
-    return Pairs(numbers, together, together.tobytes())
+    return Pairs(numbers, together)
 
 
-def _propagate(draft: Draft, numbers: dict[Literal, int], together: Matrix, bound: Matrix, deadline: Deadline) -> bool:
+def _propagate(
+    draft: Draft, numbers: dict[Literal, int], together: Matrix, bound: Matrix | None, deadline: Deadline
+) -> bool:
     """Close `together` under the moves, within `bound`; False where that ended early."""
     size, work, looked = len(numbers), 0, 0
     changed = np.ones(size, dtype=np.int64)  # when the row of a literal changed last
-    moves = [_Rows(move, numbers) for move in draft.moves.values()]
+    moves = [_Rows(move, numbers) for move in _from_the_start(draft)]
     now = 1
     again = True
     while again:
@@ -130,7 +142,9 @@ def _propagate(draft: Draft, numbers: dict[Literal, int], together: Matrix, boun
             possible[move.after] = True
             now += 1
             for made in move.made:
-                new = possible & ~together[made] & bound[made]
+                new = possible & ~together[made]
+                if bound is not None:
+                    new &= bound[made]
                 if new.any():
                     together[made] |= new
                     together[:, made] |= new
@@ -138,6 +152,22 @@ def _propagate(draft: Draft, numbers: dict[Literal, int], together: Matrix, boun
                     changed[made] = now
                     again = True
     return True
+
+
+def _from_the_start(draft: Draft) -> list[Move]:
+    """The moves in the order in which they may be made for the first time, so that a round carries a token far."""
+    true = {literal(place, draft.values[place]) for place in draft.places}
+    missing = {number: len(move.needs) for number, move in draft.moves.items()}
+    order = [draft.moves[number] for number, count in missing.items() if not count]
+    todo = deque(sorted(true))
+    while todo:
+        for number in sorted(draft.at[todo.popleft()]):
+            missing[number] -= 1
+            if not missing[number]:
+                order.append(draft.moves[number])
+                todo += [made for made in draft.moves[number].made if made not in true]
+                true.update(draft.moves[number].made)
+    return order
 
 
 class _Rows:

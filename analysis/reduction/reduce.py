@@ -23,7 +23,7 @@ from firable.analysis.reduction.draft import Draft, Move, Origin, Tail, flat
 from firable.analysis.reduction.early import fire_early
 from firable.analysis.reduction.goals import Goal, goal_of
 from firable.analysis.reduction.implied import remove_dead, remove_implied_gates, remove_implied_places
-from firable.analysis.reduction.pairs import NoFacts, Pairs, pairs
+from firable.analysis.reduction.pairs import MATRIX_BYTES_MAX, NoFacts, Pairs, pairs
 from firable.analysis.reduction.relevance import remove_irrelevant
 from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.nets.formula import Constant, Deadlock, Formula
@@ -122,7 +122,7 @@ def reduce_for_goal(net: Net, goal: Formula, limits: Limits | None = None) -> Re
     """
     wanted = goal_of(net, goal)
     draft = Draft(net, wanted)
-    _reduce(draft, (limits or Limits()).deadline)
+    _reduce(draft, limits or Limits())
     small, numbers = draft.as_net()
     assert draft.goal is not None
     moves = {name: draft.moves[number] for name, number in numbers.items()}
@@ -144,7 +144,7 @@ def reduce_for_liveness(net: Net, limits: Limits | None = None) -> ReducedTransi
     many markings there are is not, nor whether M0 can be reached again: two of them may have one image.
     """
     draft = Draft(net, None)
-    _reduce(draft, (limits or Limits()).deadline)
+    _reduce(draft, limits or Limits())
     small, numbers = draft.as_net()
     names = {number: name for name, number in numbers.items()}
     images: dict[str, str | None] = {}
@@ -156,8 +156,9 @@ def reduce_for_liveness(net: Net, limits: Limits | None = None) -> ReducedTransi
     return ReducedTransitions(net, small, draft.applied, images)
 
 
-def _reduce(draft: Draft, deadline: Deadline) -> None:
+def _reduce(draft: Draft, limits: Limits) -> None:
     """Apply all rules until none applies, or the deadline comes."""
+    deadline, matrix_bytes_max = limits.deadline, min(MATRIX_BYTES_MAX, limits.memory_bytes // 4)
     fired: set[int] = set()
     facts: Pairs | None = None
     fresh = False
@@ -168,7 +169,7 @@ def _reduce(draft: Draft, deadline: Deadline) -> None:
         _by_arcs(draft, fired, deadline)
         fresh = not changed
         if fresh:
-            facts = pairs(draft, facts, deadline)
+            facts = pairs(draft, facts, deadline, matrix_bytes_max)
             draft.touch_all()
             if facts is None:
                 if agglomerate(draft, NoFacts(), deadline):

@@ -221,8 +221,7 @@ def test_facts_that_take_too_long_are_none(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr("firable.analysis.reduction.pairs.WORK_MAX", 1)
     assert pairs(draft, None, NEVER) is None
     monkeypatch.undo()
-    monkeypatch.setattr("firable.analysis.reduction.pairs.MATRIX_BYTES_MAX", 1)
-    assert pairs(draft, None, NEVER) is None
+    assert pairs(draft, None, NEVER, matrix_bytes_max=1) is None
 
 
 # implied
@@ -361,6 +360,15 @@ def test_a_goal_that_a_closer_would_spoil_keeps_it_from_being_early() -> None:
     assert agglomerated(draft_of("not b", "a", *SEQUENCE)) == "openers late"
     assert not agglomerated(draft_of("not b and not a", "a", *SEQUENCE))
     assert agglomerated(draft_of("b or a", "a", *SEQUENCE)) == "closers early"
+
+
+def test_a_deadlock_is_not_spoilt_by_what_a_closer_does() -> None:
+    assert agglomerated(draft_of("deadlock and not b and not a", "a", *SEQUENCE)) == "closers early"
+
+
+def test_moves_that_stand_for_too_many_firings_are_not_composed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.reduction.agglomeration.LENGTH_MAX", 1)
+    assert not agglomerated(draft_of("b", "a", *SEQUENCE))
 
 
 MEETING = ("f: p, x -> b, y", "g: b -> a", "k: y -> x")
