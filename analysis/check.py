@@ -150,7 +150,7 @@ class _Check:
 
     def _held_explicitly(self, limits: Limits) -> StateSpace[Any]:
         budget = replace(self.budget, memory_bytes=limits.memory_bytes, seconds=None)
-        graph = explore(self.net, self.discipline, budget, deadline=limits.deadline)
+        graph = explore(self.net, self.discipline, budget, deadline=limits.deadline, progress=self.progress)
         graph.require_complete()
         return graph
 

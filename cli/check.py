@@ -36,6 +36,7 @@ class _Asked:
     cached: bool
     query_file: str | None
     query_texts: tuple[str, ...]
+    progress: bool | None
 
     def of_the_net(self, queries: Iterable[Query]) -> dict[str, Any]:
         """What the answer depends on besides the net, as JSON values."""
@@ -79,6 +80,9 @@ class _Asked:
 @click.option(
     "--no-cache", is_flag=True, help="Decide anew what was decided before of the same net; see FIRABLE_CACHE."
 )
+@click.option(
+    "--progress/--no-progress", default=None, help="Tell how far exploring is.  [default: where there is a terminal]"
+)
 @click.option("-v", "--verbose", is_flag=True, help="Tell methods, costs and the sequences of warnings too.")
 @format_option
 def check(
@@ -90,6 +94,7 @@ def check(
     query_file: str | None,
     query_texts: tuple[str, ...],
     no_cache: bool,
+    progress: bool | None,
     verbose: bool,
     format_: str,
     **limits: Any,
@@ -100,7 +105,8 @@ def check(
     states, and queries in CTL, LTL and more (docs/queries.md). Each verdict is proved, violated (with a shortest firing
     sequence) or unknown (with the bound reached); Ctrl-C ends the exploration and shows what is known so far.
     """
-    asked = _Asked(discipline, method, budget(**limits), trace_dir, structure, not no_cache, query_file, query_texts)
+    allowed = budget(**limits)
+    asked = _Asked(discipline, method, allowed, trace_dir, structure, not no_cache, query_file, query_texts, progress)
     makers = [partial(_report, net, asked, many=len(nets) > 1) for net in nets]
     return answer_all("check", format_, makers, partial(_show, verbose=verbose))
 
@@ -159,8 +165,10 @@ def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> Kept:
     """What the techniques find of a net."""
     from firable.analysis.check import check as check_net
     from firable.cli.cache import Kept
+    from firable.cli.progress import progress_line
 
-    found = check_net(net, asked.discipline, asked.budget, method=asked.method, queries=queries)
+    with progress_line(asked.progress) as line:
+        found = check_net(net, asked.discipline, asked.budget, method=asked.method, queries=queries, progress=line)
     figures = found.figures.to_json()
     if asked.structure:
         contacts = found.figures.contacts

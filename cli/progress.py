@@ -1,0 +1,64 @@
+"""A line on the terminal that tells how far an exploration has come, while somebody waits.
+
+It goes to standard error, and by itself only where that is a terminal, so that reports and logs hold nothing of it; it
+begins after a second, because what is done sooner needs no line, and is wiped before the report is printed. Told is
+what the engine counts, markings and edges: how many are still to come nobody knows, so that a bar or a percentage, the
+alternative, would be made up.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from time import monotonic
+from typing import Final, TextIO
+
+SILENT_SECONDS: Final = 1.0
+EVERY_SECONDS: Final = 0.2
+
+
+class ProgressLine:
+    """Writes how many markings and edges were found: over itself on a terminal, else line by line."""
+
+    def __init__(self, stream: TextIO, clock: Callable[[], float] = monotonic) -> None:
+        self._stream = stream
+        self._clock = clock
+        self._is_terminal = stream.isatty()
+        self._began = clock()
+        self._next = self._began + SILENT_SECONDS
+        self._width = 0
+
+    def __call__(self, n_markings: int, n_edges: int) -> None:
+        """Tell how far it is; most calls come too soon after the last to be told."""
+        now = self._clock()
+        if now < self._next:
+            return
+        self._next = now + (EVERY_SECONDS if self._is_terminal else 10 * EVERY_SECONDS)
+        line = f"  {n_markings:,} markings, {n_edges:,} edges, {now - self._began:.0f} s"
+        if self._is_terminal:
+            self._stream.write(f"\r{line.ljust(self._width)}")
+            self._width = len(line)
+        else:
+            self._stream.write(f"{line}\n")
+        self._stream.flush()
+
+    def wipe(self) -> None:
+        """Take the line off the terminal."""
+        if self._width:
+            self._stream.write(f"\r{' ' * self._width}\r")
+            self._stream.flush()
+            self._width = 0
+
+
+@contextmanager
+def progress_line(wanted: bool | None) -> Generator[ProgressLine | None]:
+    """A line for the work of this block; None where it is not wanted, or by default where nobody would see it."""
+    if not (sys.stderr.isatty() if wanted is None else wanted):
+        yield None
+        return
+    line = ProgressLine(sys.stderr)
+    try:
+        yield line
+    finally:
+        line.wipe()
