@@ -321,3 +321,103 @@ class MarkingSet:
         """Whether the marking in which exactly these places hold a token is in the set."""
     def any(self) -> list[int] | None:
         """The places that hold a token in some marking of the set, the same one every time; None where it is empty."""
+
+@final
+class Stubborn:
+    """A net that is ready for searches by stubborn sets, interleaving and external gates free.
+
+    The arguments are those of `explore`. Raises `ValueError` for a place out of range.
+
+    >>> net = Stubborn(2, [([0], [1], [], [], [])], [0])
+    >>> found = net.deadlocks(max_markings=100, max_memory_bytes=1_000_000, max_seconds=None)
+    >>> found.complete, [found.marking(i) for i in found.deadlocks()], found.path_to(1)
+    (True, [2], [0])
+    """
+
+    def __new__(
+        cls,
+        n_places: int,
+        transitions: list[tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]],
+        initial: list[int],
+    ) -> Stubborn: ...
+    def deadlocks(
+        self,
+        *,
+        all: bool = True,  # noqa: A002 - the engine's name
+        thorough: bool = False,
+        max_markings: int,
+        max_memory_bytes: int,
+        max_seconds: float | None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> Search:
+        """Search for all deadlocks, or for the first one; `thorough` thinks longer about each marking.
+
+        Running out of a budget, and Ctrl-C, give an incomplete search with its `reason`. Raises `BudgetExceeded` where
+        not even the net fits, `ValueError` for a negative time; so do the other searches.
+        """
+    def reach(
+        self,
+        nodes: list[tuple[int, list[int]]],
+        *,
+        thorough: bool = False,
+        max_markings: int,
+        max_memory_bytes: int,
+        max_seconds: float | None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> Search:
+        """Search for a marking that satisfies a formula.
+
+        The formula is its nodes, the last one the whole: (0, [place]) the place is empty, (1, [place]) it is full,
+        (2, nodes) all of these earlier nodes are true, (3, nodes) some of them is. `ValueError` for anything else.
+        """
+    def fire(
+        self,
+        transitions: list[int],
+        *,
+        thorough: bool = False,
+        max_markings: int,
+        max_memory_bytes: int,
+        max_seconds: float | None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> Search:
+        """Search for markings at which some transitions are firable and openable, until each has one or can have none.
+
+        `IndexError` for a transition that does not exist.
+        """
+
+@final
+class Search:
+    """What a search found: a part of the reachability graph, its markings numbered breadth first, M0 first.
+
+    Where it is `complete`, the goal cannot be reached unless it was found.
+    """
+
+    @property
+    def complete(self) -> bool:
+        """Whether the question is answered."""
+    @property
+    def reason(self) -> str | None:
+        """Why not: "markings", "memory", "time", "interrupted" or "cancelled"; None where complete."""
+    @property
+    def n_markings(self) -> int:
+        """How many markings were found."""
+    @property
+    def n_edges(self) -> int:
+        """How many firings were followed."""
+    @property
+    def memory_bytes(self) -> int:
+        """Bytes held by the search."""
+    @property
+    def seconds(self) -> float:
+        """How long the search took."""
+    @property
+    def found(self) -> int | None:
+        """The marking that satisfies the formula of `reach`, one nearest to M0."""
+    def deadlocks(self) -> list[int]:
+        """The deadlocks found, ascending; for `deadlocks` all there are, where the search is complete."""
+    def firable(self) -> list[int | None]:
+        """For each transition the first marking found at which it is firable and openable."""
+    def marking(self, index: int) -> int:
+        """The marking of an index, as a mask; `IndexError` where there is none."""
+    def path_to(self, index: int) -> list[int]:
+        """A firing sequence from M0 to a marking, one transition after the other; for a goal a shortest one."""

@@ -40,6 +40,8 @@ pub mod step;
 #[forbid(unsafe_code)]
 pub mod store;
 #[forbid(unsafe_code)]
+pub mod stubborn;
+#[forbid(unsafe_code)]
 pub mod symbolic;
 #[forbid(unsafe_code)]
 pub mod table;
@@ -65,6 +67,8 @@ mod extension {
     use crate::python::explore::explore;
     #[pymodule_export]
     use crate::python::graph::Graph;
+    #[pymodule_export]
+    use crate::python::stubborn::{Search, Stubborn};
     use crate::python::{BudgetExceeded, IncompleteGraph};
 
     #[pymodule_init]

@@ -9,6 +9,7 @@ pub(crate) mod components;
 pub(crate) mod diagram;
 pub(crate) mod explore;
 pub(crate) mod graph;
+pub(crate) mod stubborn;
 
 use std::time::{Duration, Instant};
 
