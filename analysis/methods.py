@@ -33,6 +33,7 @@ class Method(StrEnum):
     STRUCTURE = "structure"
     SYMBOLIC = "symbolic"
     STATE_EQUATION = "state-equation"
+    STUBBORN_SETS = "stubborn-sets"
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,11 @@ GOALS: Final[dict[Method, GoalMethod]] = {
     Method.STATE_EQUATION: GoalMethod(
         "state equation", "firable.analysis.structure.state_equation:decide_by_state_equation"
     ),
+    Method.STUBBORN_SETS: GoalMethod("stubborn sets", "firable.analysis.stubborn:decide_by_stubborn_sets"),
 }
 
-GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = ((Method.STATE_EQUATION,),)
+GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (
+    (Method.STATE_EQUATION,),
+    (Method.STUBBORN_SETS,),
+)
 """How `auto` races them: what finds violations beside what proves; each lane from the quick to the thorough."""

@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.analysis.compiled import rows
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.spaces.space import Derived, Witnesses
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -70,7 +71,7 @@ _METHODS: Final = {
     Discipline.INTERLEAVING: "reachability graph, interleaving",
     Discipline.STEP: "reachability graph, synchronous steps",
 }
-_REASONS: Final = {
+REASONS: Final = {
     "markings": "the budget of markings is used up",
     "memory": "the budget of memory is used up",
     "time": "the budget of time is used up",
@@ -138,7 +139,7 @@ class ReachabilityGraph(Derived):
         """How far an incomplete exploration went, in words; empty where it is complete."""
         if self.complete:
             return ""
-        reason = _REASONS.get(self.engine.reason or "", str(self.engine.reason))
+        reason = REASONS.get(self.engine.reason or "", str(self.engine.reason))
         return f"{self.n_markings:,} markings found, {self.n_edges:,} edges followed: {reason}"
 
     @property
@@ -355,20 +356,8 @@ def _explored(
 ) -> _engine.Graph:
     limits = engine_limits(deadline)
     limits["max_seconds"] = min((t for t in (limits["max_seconds"], budget.seconds) if t is not None), default=None)
-    place, signal = net.place_index, net.signal_index
     return _engine.explore(
-        len(net.places),
-        [
-            (
-                [place[name] for name in transition.inputs],
-                [place[name] for name in transition.outputs],
-                [place[name] for name in transition.permissive],
-                [place[name] for name in transition.inhibitive],
-                [(signal[gate.signal], gate.wanted) for gate in transition.external],
-            )
-            for transition in net.transitions
-        ],
-        [i for i, of in enumerate(net.places) if of.marked],
+        *rows(net),
         step=discipline is Discipline.STEP,
         max_markings=budget.markings,
         max_memory_bytes=budget.memory_bytes,

@@ -12,7 +12,9 @@ from typing import Final
 
 import pytest
 
+from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import explore
+from firable.analysis.stubborn import find_deadlocks
 from firable.analysis.verdicts.behaviour import Behaviour
 from firable.nets.pnml import read_pnml
 
@@ -41,12 +43,15 @@ def by_family() -> dict[str, list[Row]]:
 @pytest.mark.parametrize("family", sorted(by_family()))
 def test_the_figures_of_public_nets(family: str) -> None:
     for row in by_family()[family]:
-        graph = explore(read_pnml(Path(FOLDER) / row["file"]).net)
+        net = read_pnml(Path(FOLDER) / row["file"]).net
+        graph = explore(net)
         behaviour = Behaviour(graph)
         found = {
             "markings_contact_rule": graph.n_markings,
             "deadlocks_contact_rule": int(graph.deadlocks.sum()),
         }
+        reduced = find_deadlocks(net, Limits())
+        assert (reduced.found, reduced.complete) == (found["deadlocks_contact_rule"], True), row["file"]
         if row["one_safe"] == "yes":
             assert not behaviour.contacts, row["file"]
             found |= {

@@ -1,0 +1,270 @@
+"""Stubborn sets: goals, deadlocks and first firings by a search that leaves most orders of independent firings out.
+
+In a marking only the members of a stubborn set are fired. The rules for such a set, derived for exactly our firing rule
+(contact, both kinds of internal gates, external gates free), and the proof that the goal stays reachable, at the same
+distance, stand in `analysis/engine/src/stubborn/mod.rs`; the search is the engine's. A set depends on the goal: what
+must happen before the goal can hold is in it, or it could be put off for ever (Kristensen, Schmidt, Valmari 2006,
+"Question-guided stubborn set methods for state properties"; Valmari, Hansen 2017, "Stubborn set intuition explained").
+
+How long to think about each marking is not known beforehand: the thorough closure takes some five times as long as the
+quick one and leaves a fortieth of the markings on one net, and more of them on the next. So both are tried in turn,
+with budgets of markings that grow; the last word has the quick one. All of this is counted in markings, not seconds,
+so the same net gives the same answer.
+
+A firing is asked for each transition (`find_firings`): all that are open are asked for together, which is one search
+where most of them fire, and then one by one, which is next to nothing where they are dead for a reason nearby.
+
+The rejected alternative, stubborn sets that keep liveness or temporal properties, needs provisos on cycles and leaves
+little to save; those questions are asked of the whole state space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any, Final
+
+from firable.analysis._engine import BudgetExceeded, Search, Stubborn
+from firable.analysis.compiled import nodes_of, rows
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.spaces.reachability import REASONS, engine_limits
+from firable.analysis.spaces.space import Witnesses
+from firable.nets.formula import Deadlock, Formula
+from firable.nets.net import Net
+from firable.nets.verdict import Cost, Witness
+from firable.semantics.trace import Discipline
+
+METHOD: Final = "stubborn sets"
+_MARKINGS_MAX: Final = 2**32 - 2
+_BUDGETS: Final = ((2**15, 2**13), (2**18, 2**16), (2**21, 2**19))
+"""Markings of a quick and of a thorough search, in turn; then a quick one without a bound."""
+
+
+def decide_by_stubborn_sets(net: Net, goal: Formula, limits: Limits) -> Finding:
+    """Decide whether a marking that satisfies the goal is reachable; where it is, with a shortest firing sequence.
+
+    Cost: for each marking of the reduced graph at most the net's size for each choice that the goal leaves; the reduced
+    graph has between the length of the sequence and all markings.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> found = decide_by_stubborn_sets(catalogue_net("one_robot_mc_late"), Deadlock(), Limits())
+    >>> found.reachable, found.witness is not None
+    (True, True)
+    """
+    runs = _Runs(net, limits)
+    if isinstance(goal, Deadlock):
+        last = runs.in_turn(lambda engine, options: engine.deadlocks(all=False, **options))
+        found = next(iter(last.deadlocks()), None) if last else None
+    else:
+        nodes = nodes_of(net, goal)
+        last = runs.in_turn(lambda engine, options: engine.reach(nodes, **options))
+        found = last.found if last else None
+    if last is None:
+        return Finding(None, METHOD, bound=_NO_ROOM, cost=runs.cost)
+    if found is not None:
+        return Finding(reachable=True, method=METHOD, witness=runs.witness(last, found), cost=runs.cost)
+    if last.complete:
+        return Finding(reachable=False, method=METHOD, cost=runs.cost)
+    return Finding(None, METHOD, bound=_bound(last), cost=runs.cost)
+
+
+@dataclass(frozen=True, slots=True)
+class Deadlocks:
+    """The deadlocks of a net: how many were found, whether these are all, and a shortest way to one of them."""
+
+    found: int
+    complete: bool
+    witness: Witness | None = None
+    bound: str = ""
+    cost: Cost = field(default_factory=Cost)
+
+
+def find_deadlocks(net: Net, limits: Limits) -> Deadlocks:
+    """Count the reachable deadlocks; exact where `complete`.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> found = find_deadlocks(catalogue_net("one_robot_mc_late"), Limits())
+    >>> found.found, found.complete
+    (1, True)
+    """
+    runs = _Runs(net, limits)
+    last = runs.in_turn(lambda engine, options: engine.deadlocks(**options))
+    if last is None:
+        return Deadlocks(0, complete=False, bound=_NO_ROOM, cost=runs.cost)
+    all_found = last.deadlocks()
+    witness = runs.witness(last, all_found[0]) if all_found else None
+    return Deadlocks(len(all_found), last.complete, witness, _bound(last), runs.cost)
+
+
+@dataclass(frozen=True)
+class Firings:
+    """Which transitions can fire: those that do in one of the `runs`, the dead ones, and those left undecided.
+
+    `fires` gives for each transition that fires a run and the number of firings up to and with its own.
+    """
+
+    net: Net
+    runs: tuple[tuple[int, ...], ...]
+    fires: Mapping[int, tuple[int, int]]
+    dead: tuple[str, ...]
+    undecided: tuple[str, ...]
+    bound: str = ""
+    cost: Cost = field(default_factory=Cost)
+
+    def witness(self, name: str) -> Witness | None:
+        """A firing sequence that ends with the firing of a transition, replayed; None where none was found."""
+        if (at := self.fires.get(self.net.transition_index[name])) is None:
+            return None
+        run, end = at
+        witnesses = Witnesses(self.net, Discipline.INTERLEAVING)
+        firings = [(t,) for t in self.runs[run][:end]]
+        return witnesses.named(firings, witnesses.play(self.net.initial_marking, firings))
+
+
+_TOGETHER_FIRST: Final = 2**12
+_ALONE_LEAST: Final = 2**8
+
+
+def find_firings(net: Net, limits: Limits) -> Firings:
+    """Find for each transition whether it can ever fire (quasi-liveness); each run was replayed.
+
+    Cost: in each round as many markings for all open transitions together as for all of them one by one, four times as
+    many in the next.
+
+    >>> from firable.nets.net import Place, Transition
+    >>> places = (Place("p", marked=True), Place("q"), Place("r"))
+    >>> net = Net("n", places, (Transition("t", ("p",), ("q",)), Transition("u", ("q", "r"), ("p",))))
+    >>> found = find_firings(net, Limits())
+    >>> found.dead, found.undecided, found.witness("t").firings
+    (('u',), (), (('t',),))
+    """
+    return _Firings(_Runs(net, limits)).found()
+
+
+class _Firings:
+    """The search for firings: what is open, and what is known."""
+
+    def __init__(self, runs: _Runs) -> None:
+        self.runs = runs
+        self.open = set(range(len(runs.net.transitions)))
+        self.sequences: list[tuple[int, ...]] = []
+        self.fires: dict[int, tuple[int, int]] = {}
+        self.dead: set[int] = set()
+
+    def found(self) -> Firings:
+        budget, bound = _TOGETHER_FIRST, ""
+        while self.open and not bound:
+            bound = self._round(budget)
+            budget = min(4 * budget, _MARKINGS_MAX)
+        names = self.runs.net.transitions
+        dead, undecided = (tuple(names[t].name for t in sorted(of)) for of in (self.dead, self.open))
+        return Firings(
+            self.runs.net,
+            tuple(self.sequences),
+            self.fires,
+            dead,
+            undecided,
+            bound if undecided else "",
+            self.runs.cost,
+        )
+
+    def _round(self, budget: int) -> str:
+        """All together, then one by one; why it must be the last, or nothing."""
+        bound = self._ask(sorted(self.open), budget, thorough=False)
+        alone = max(_ALONE_LEAST, budget // max(1, len(self.open)))
+        for t in sorted(self.open):
+            if bound:
+                break
+            if t in self.open:
+                bound = self._ask([t], alone, thorough=True)
+        return bound
+
+    def _ask(self, transitions: list[int], budget: int, *, thorough: bool) -> str:
+        search = self.runs.one(
+            lambda engine, options: engine.fire(transitions, **options), thorough=thorough, markings=budget
+        )
+        if search is None:
+            return _NO_ROOM
+        self._note(search)
+        if search.complete:
+            dead = self.open.intersection(transitions)
+            self.dead |= dead
+            self.open -= dead
+        # What the budget of markings ended is asked again, with more; whatever else ended it ends all.
+        return "" if search.complete or search.reason == "markings" else _bound(search)
+
+    def _note(self, search: Search) -> None:
+        """Keep a run for each open transition that was found firable, the longest first: they hold others."""
+        firable = search.firable()
+        deepest = sorted(((index, t) for t in self.open if (index := firable[t]) is not None), reverse=True)
+        for index, last in deepest:
+            if last not in self.open:
+                continue
+            run = (*search.path_to(index), last)
+            self.runs.witnesses.play(self.runs.net.initial_marking, ((t,) for t in run))
+            for end, t in enumerate(run, start=1):
+                if t in self.open:
+                    self.open.remove(t)
+                    self.fires[t] = (len(self.sequences), end)
+            self.sequences.append(run)
+
+
+_Ask = Callable[[Stubborn, dict[str, Any]], Search]
+_NO_ROOM: Final = "the budget of memory does not hold the net itself"
+
+
+class _Runs:
+    """The searches of one net within limits, and what they cost together."""
+
+    def __init__(self, net: Net, limits: Limits) -> None:
+        self.net = net
+        self.limits = limits
+        self.witnesses = Witnesses(net, Discipline.INTERLEAVING)
+        self.engine = Stubborn(*rows(net))
+        self.markings = self.edges = 0
+        self.began = perf_counter()
+
+    @property
+    def cost(self) -> Cost:
+        """What all searches so far have cost."""
+        return Cost(self.markings, self.edges, perf_counter() - self.began)
+
+    def in_turn(self, ask: _Ask) -> Search | None:
+        """The first search that answers, quick and thorough ones in turn; else the last one; None: no room for any."""
+        last = None
+        for thorough, markings in _turns():
+            last = self.one(ask, thorough=thorough, markings=markings)
+            if last is None or last.complete or last.reason != "markings":
+                break
+        return last
+
+    def one(self, ask: _Ask, *, thorough: bool, markings: int) -> Search | None:
+        """One search; None where the budget does not hold the net."""
+        options = engine_limits(self.limits.deadline)
+        options |= {"max_markings": markings, "max_memory_bytes": self.limits.memory_bytes, "thorough": thorough}
+        try:
+            search = ask(self.engine, options)
+        except BudgetExceeded:
+            return None
+        self.markings += search.n_markings
+        self.edges += search.n_edges
+        return search
+
+    def witness(self, search: Search, index: int) -> Witness:
+        """The firing sequence to a marking, replayed by the reference player."""
+        return self.witnesses.replayed([(t,) for t in search.path_to(index)], search.marking(index))
+
+
+def _bound(search: Search) -> str:
+    """How far an incomplete search went, in words; empty for a complete one."""
+    if search.complete:
+        return ""
+    return f"{search.n_markings:,} markings of a reduced graph: {REASONS.get(search.reason or '', search.reason)}"
+
+
+def _turns() -> Iterator[tuple[bool, int]]:
+    for quick, thorough in _BUDGETS:
+        yield False, quick
+        yield True, thorough
+    yield False, _MARKINGS_MAX
