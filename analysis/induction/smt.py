@@ -165,6 +165,11 @@ def variables(roots: Iterable[Term]) -> tuple[str, ...]:
 
 def value(term: Term, assignment: Mapping[str, bool]) -> bool:
     """The value of a term where each variable has the value assigned to it; `KeyError` where one has none."""
+    return values_of(term, assignment)[term]
+
+
+def values_of(term: Term, assignment: Mapping[str, bool]) -> dict[Term, bool]:
+    """The value of a term and of each of its subterms."""
     values: dict[Term, bool] = {}
     for subterm in subterms([term]):
         operands = [values[operand] for operand in subterm.operands]
@@ -179,7 +184,7 @@ def value(term: Term, assignment: Mapping[str, bool]) -> bool:
                 values[subterm] = any(operands)
             case Operator.EQUAL:
                 values[subterm] = operands[0] == operands[1]
-    return values[term]
+    return values
 
 
 # --------------------------------------------------------------------------------------------------------------------

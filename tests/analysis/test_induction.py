@@ -1,24 +1,31 @@
 """Bounded search and k-induction against exploration: what they decide is so, and they end when they are told to."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from threading import Event
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from support.dense_nets import PLACES, dense_nets
+from support.second_solver import by_cvc5
 from support.whole_nets import formulas
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Clause, InductiveInvariant
+from firable.analysis.evidence.checker import check_evidence
+from firable.analysis.evidence.obligations import obligations
+from firable.analysis.evidence.producing import evidence_of_finding
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.bounded import decide_by_bounded_search, shortened
 from firable.analysis.induction.encoding import parallel_relation
 from firable.analysis.induction.k_induction import decide_by_k_induction
+from firable.analysis.induction.pdr import decide_by_pdr
 from firable.analysis.induction.smt import Answer, Terms, decide
-from firable.analysis.induction.strengthening import Traps, structural_facts
+from firable.analysis.induction.strengthening import Facts, Traps, structural_facts
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Deadlock, Formula, Holds, Not, Or
 from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
 from firable.semantics.algebra import BOOL
@@ -127,6 +134,56 @@ def test_structural_facts_hold_in_every_reachable_marking(net: Net, discipline: 
             assert holds & set(clause.marked) or set(clause.empty) - holds
 
 
+@given(question=questions())
+@example(question=(RACING, NEITHER))
+@example(question=(TORN, NEITHER))
+@example(question=(CLOSING, And((Holds("b"), Holds("c")))))
+@settings(max_examples=50, deadline=None)
+def test_property_directed_reachability_decides_every_goal(question: tuple[Net, Formula]) -> None:
+    net, goal = question
+    found = decide_by_pdr(net, goal, in_time())
+    assert found.reachable is reachable(net, goal, Discipline.INTERLEAVING)
+    evidence = evidence_of_finding(net, goal, found)
+    assert evidence is not None
+    assert check_evidence(evidence).shown is True
+    assert {by_cvc5(obligation.text(evidence)) for obligation in obligations(evidence)} <= {"unsat"}
+
+
+@pytest.mark.parametrize("family", ["counter-4", "interlocked-3", "grid-2", "philosophers_either-3"])
+def test_each_place_is_reached_or_an_invariant_says_why_not(family: str) -> None:
+    net = family_net(family)
+    markings = Player(net).reachable()
+    for first, second in zip(net.places, net.places[1:], strict=False):
+        goal = And((Holds(first.name), Holds(second.name)))
+        found = decide_by_pdr(net, goal, in_time())
+        assert found.reachable is any(evaluate(BOOL, net, goal, holds_in(m)) for m in markings)
+        evidence = evidence_of_finding(net, goal, found)
+        assert evidence is not None
+        assert check_evidence(evidence).shown is True
+
+
+def test_an_invariant_is_found_where_the_arcs_say_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.induction.pdr.structural_facts", lambda *_: Facts())
+    net = family_net("philosophers-2")
+    goal = And((Holds("p1.eating"), Holds("p2.eating")))
+    found = decide_by_pdr(net, goal, in_time())
+    assert isinstance(found.certificate, InductiveInvariant)
+    assert found.certificate.clauses
+    evidence = evidence_of_finding(net, goal, found)
+    assert evidence is not None
+    assert check_evidence(evidence).shown is True
+    assert {by_cvc5(obligation.text(evidence)) for obligation in obligations(evidence)} == {"unsat"}
+    for i in range(len(found.certificate.clauses)):
+        fewer = found.certificate.clauses[:i] + found.certificate.clauses[i + 1 :]
+        weaker = replace(evidence, certificate=replace(found.certificate, clauses=fewer))
+        answers = {by_cvc5(obligation.text(weaker)) for obligation in obligations(weaker)}
+        if answers == {"unsat"}:  # the clause was not needed
+            assert check_evidence(weaker).shown is True
+        else:
+            with pytest.raises(InputError, match="F6002"):
+                check_evidence(weaker)
+
+
 def test_a_place_that_no_token_can_come_to_is_known_to_stay_empty() -> None:
     net = Net("n", (Place("a", marked=True), Place("b")), (Transition("t", ("b",), ()),))
     assert structural_facts(net, Deadline()).clauses == (Clause(empty=("b",)),)
@@ -149,7 +206,7 @@ def test_the_number_of_philosophers_does_not_matter_to_induction() -> None:
     assert found.certificate.depth == 0
 
 
-@pytest.mark.parametrize("decide_by", [decide_by_bounded_search, decide_by_k_induction])
+@pytest.mark.parametrize("decide_by", [decide_by_bounded_search, decide_by_k_induction, decide_by_pdr])
 def test_the_deadlock_of_many_philosophers_is_a_step_away(decide_by: Callable[[Net, Formula, Limits], Finding]) -> None:
     found = decide_by(family_net("philosophers-20"), Deadlock(), in_time())
     assert found.reachable is True
@@ -171,7 +228,7 @@ def test_firings_that_the_goal_does_not_need_are_left_out() -> None:
     assert shortened(net, NEITHER, [1, 0]) == [(1,), (0,)]
 
 
-@pytest.mark.parametrize("decide_by", [decide_by_bounded_search, decide_by_k_induction])
+@pytest.mark.parametrize("decide_by", [decide_by_bounded_search, decide_by_k_induction, decide_by_pdr])
 def test_a_method_that_is_cancelled_answers_unknown(decide_by: Callable[[Net, Formula, Limits], Finding]) -> None:
     cancelled = Event()
     cancelled.set()
@@ -180,6 +237,6 @@ def test_a_method_that_is_cancelled_answers_unknown(decide_by: Callable[[Net, Fo
     assert found.bound
 
 
-@pytest.mark.parametrize("decide_by", [decide_by_bounded_search, decide_by_k_induction])
+@pytest.mark.parametrize("decide_by", [decide_by_bounded_search, decide_by_k_induction, decide_by_pdr])
 def test_without_time_nothing_is_known(decide_by: Callable[[Net, Formula, Limits], Finding]) -> None:
     assert decide_by(family_net("philosophers-5"), Deadlock(), in_time(0)).reachable is None
