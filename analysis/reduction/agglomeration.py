@@ -41,6 +41,7 @@ grow.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from heapq import heappop, heappush
 from itertools import product
 from typing import Final
 
@@ -54,15 +55,36 @@ LENGTH_MAX: Final = 1_000
 
 
 def agglomerate(draft: Draft, facts: Facts, deadline: Deadline) -> bool:
-    """Apply both rules where something has changed, until there are no such places; whether any was taken."""
+    """Apply both rules where something has changed, until there are no such places; whether any was taken.
+
+    Places with few transitions come first, so that the many that leave a choice are composed once, with the whole
+    sequence that leads to it, and not with each of its steps.
+    """
     changed = False
-    while draft.touched and not deadline.over:
-        place = next(iter(draft.touched))
-        del draft.touched[place]
+    heap: list[tuple[int, int]] = []
+    queued: set[int] = set()
+    while not deadline.over:
+        for place in draft.touched:
+            if place not in queued:
+                queued.add(place)
+                heappush(heap, (_pairs_at(draft, place), place))
+        draft.touched.clear()
+        if not heap:
+            break
+        expected, place = heappop(heap)
+        if (now := _pairs_at(draft, place)) > expected:
+            heappush(heap, (now, place))
+            continue
+        queued.remove(place)
         if rule := agglomerate_at(draft, facts, place):
             draft.count(rule)
             changed = True
     return changed
+
+
+def _pairs_at(draft: Draft, place: int) -> int:
+    """How many pairs of an opener and a closer there are."""
+    return len(draft.at[2 * place]) * len(draft.at[2 * place + 1])
 
 
 def agglomerate_at(draft: Draft, facts: Facts, place: int) -> str:
@@ -161,5 +183,5 @@ class _Around:
             self.draft.remove(number)
         for first, then in product(self.openers.values(), self.closers.values()):
             if (move := composed(first, then)) is not None:
-                self.draft.add(move)
+                self.draft.add(move.without((self.place,)))
         self.draft.drop(self.place)

@@ -129,6 +129,15 @@ def test_a_deadlock_that_an_opener_leads_to_is_lifted_with_it() -> None:
     assert reduced.lift(_deadlock(reduced)).marking == ("c", "d")
 
 
+def test_openers_that_were_left_out_one_after_the_other_are_fired_in_the_opposite_order() -> None:
+    # A line of buffers that nobody empties is stuck when all are full, from the last to the first.
+    line = net_of("", "in: -> a", "t: a -> b", "u: b -> c", "v: c -> d")
+    reduced = check(replace(line, places=tuple(reversed(line.places))), Deadlock())
+    assert len(reduced.tails) > 1
+    with pytest.raises(WitnessError):
+        replace(reduced, tails=reduced.tails[::-1]).lift(_deadlock(reduced))
+
+
 def _deadlock(reduced: Reduced) -> list[str]:
     space = NaiveSpace(reduced.net)
     found = space.witness(space.satisfying(reduced.goal))

@@ -204,6 +204,13 @@ def test_a_gate_keeps_two_rings_apart() -> None:
     assert not facts_of(free).exclude(2 * index["b"] + 1, 2 * index["d"] + 1)
 
 
+def test_what_becomes_possible_with_a_place_that_stays_is_followed_on() -> None:
+    # t is looked at after v, and makes b true together with c: v must be looked at again.
+    draft = draft_of("b", "a c", "v: c -> d", "t: a -> b if c")
+    b, d = (2 * draft.net.place_index[name] + 1 for name in "bd")
+    assert not facts_of(draft).exclude(b, d)
+
+
 def test_what_was_known_bounds_what_is_proved_later() -> None:
     draft = draft_of("b", "a c", "t: a -> b unless d", "u: b -> a", "v: c -> d unless b", "w: d -> c")
     facts = facts_of(draft)
@@ -380,6 +387,12 @@ def test_an_opener_may_wait_for_what_its_closer_waits_for(question: str) -> None
     assert agglomerated(draft) == "openers late"
     assert fired(draft) == {("h", "f"), ("g",), ("k",)}
     assert len(draft.tails) == (question == "deadlock")
+
+
+def test_a_closer_that_its_opener_makes_impossible_composes_to_nothing() -> None:
+    draft = draft_of("b", "a y", "h: a -> p", *MEETING, "never: p, a -> c")
+    assert agglomerated(draft) == "openers late"
+    assert fired(draft) == {("h", "f"), ("g",), ("k",)}
 
 
 def test_an_opener_that_somebody_waits_for_is_not_late() -> None:
