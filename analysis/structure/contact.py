@@ -101,9 +101,9 @@ class _Search:
         self.net, self.deadline, self.of = net, deadline, ordinary(net)
         self.may_be_marked = markable(self.of)
         self.changes = columns(net)
-        # A unit is a draining set that fewer tries find, where there is one.
-        self.units = UnitSearch(self.changes, self.of.n_places, self.of.marked, 1)
-        self.search = UnitSearch(self.changes, self.of.n_places, self.of.marked, 1, draining=True)
+        # A unit is a draining set that fewer tries find, where there is one. Next time what was found goes first.
+        self.drain = UnitSearch(self.changes, self.of.n_places, self.of.marked, 1, draining=True)
+        self.searches = [UnitSearch(self.changes, self.of.n_places, self.of.marked, 1), self.drain]
         self.drains: list[tuple[frozenset[int], int]] = []  # each with its tokens
         self.at: dict[int, list[int]] = {}
         self.used: dict[int, None] = {}
@@ -121,8 +121,10 @@ class _Search:
             return True
         if place not in self.tried and place not in self.at:
             self.tried.add(place)
-            for search, tries in ((self.search, 20), (self.units, 200), (self.search, 500)):
+            first, second = self.searches
+            for search, tries in ((first, 20), (second, 200), (first, 500)):
                 if drain := search.unit(place, tries, self.deadline):
+                    self.searches = [search, second if search is first else first]
                     self._add(drain)
                     if self._by_drain(full, {place}):
                         return True
@@ -163,7 +165,7 @@ class _Search:
     def proof(self, *, whole: bool, behaves: bool, undecided: str) -> ContactProof:
         """What was found, with the units that were needed."""
         used = [(tuple(sorted(self.drains[k][0])), self.drains[k][1]) for k in self.used]
-        lossless = self.search.lossless([places for places, _ in used])
+        lossless = self.drain.lossless([places for places, _ in used])
         units = tuple(places for (places, _), unit in zip(used, lossless, strict=True) if unit)
         sums = (never_more(*drain) for drain, unit in zip(used, lossless, strict=True) if not unit)
         told = "the time was over" if undecided and self.deadline.over else undecided

@@ -21,8 +21,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import networkx as nx
-
 from firable.nets.net import Net
 
 
@@ -68,10 +66,9 @@ def net_class(net: Net, *, contact_free: bool | None = None) -> NetClass:
     >>> net_class(net, contact_free=True).name
     'state machine and marked graph'
     """
-    graph = arcs(net)
+    connected, strongly_connected = _joined(net)
     index = net.place_index
     inputs = [[index[name] for name in t.inputs] for t in net.transitions]
-    empty = not graph.number_of_nodes()
     return NetClass(
         state_machine=all(len(t.inputs) == 1 == len(t.outputs) for t in net.transitions),
         marked_graph=all(len(c) == 1 == len(p) for c, p in zip(net.consumers, net.producers, strict=True)),
@@ -79,8 +76,8 @@ def net_class(net: Net, *, contact_free: bool | None = None) -> NetClass:
         extended_free_choice=extended_free_choice(inputs, net.consumers),
         asymmetric_choice=asymmetric_choice(inputs, net.consumers),
         pure=not any(t.self_loops for t in net.transitions),
-        connected=empty or nx.is_weakly_connected(graph),
-        strongly_connected=empty or nx.is_strongly_connected(graph),
+        connected=connected,
+        strongly_connected=strongly_connected,
         outside=tuple(_outside(net, contact_free)),
     )
 
@@ -111,16 +108,34 @@ def _equal(consumers: Sequence[tuple[int, ...]]) -> list[int]:
     return [numbers.setdefault(group, len(numbers)) for group in consumers]
 
 
-def arcs(net: Net) -> nx.DiGraph[tuple[str, str]]:
-    """The places and transitions of a net as a directed graph, by arcs only; nodes are ("place", name) and so on."""
-    graph: nx.DiGraph[tuple[str, str]] = nx.DiGraph()
-    graph.add_nodes_from(("place", place.name) for place in net.places)
-    for transition in net.transitions:
-        node = ("transition", transition.name)
-        graph.add_node(node)
-        graph.add_edges_from((("place", place), node) for place in transition.inputs)
-        graph.add_edges_from((node, ("place", place)) for place in transition.outputs)
-    return graph
+def _joined(net: Net) -> tuple[bool, bool]:
+    """Whether the graph of places and transitions, by arcs, is connected, and whether it is strongly.
+
+    Strongly: one node reaches all and is reached by all. Cost: linear in the arcs.
+    """
+    n, index = len(net.places), net.place_index
+    after: list[list[int]] = [[] for _ in range(n + len(net.transitions))]
+    before: list[list[int]] = [[] for _ in after]
+    for t, transition in enumerate(net.transitions, n):
+        for name in transition.inputs:
+            after[index[name]].append(t)
+            before[t].append(index[name])
+        for name in transition.outputs:
+            after[t].append(index[name])
+            before[index[name]].append(t)
+    either = [x + y for x, y in zip(after, before, strict=True)]
+    return _reaches_all(either), _reaches_all(after) and _reaches_all(before)
+
+
+def _reaches_all(neighbours: Sequence[Sequence[int]]) -> bool:
+    """Whether the first node reaches all; so does the first of none."""
+    found, todo = {0}, [0]
+    while todo and neighbours:
+        for node in neighbours[todo.pop()]:
+            if node not in found:
+                found.add(node)
+                todo.append(node)
+    return len(found) >= len(neighbours)
 
 
 def _outside(net: Net, contact_free: bool | None) -> Iterator[str]:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from support.dense_nets import dense_nets
 from support.reference import load_net
 
-from firable.analysis.structure.net_class import arcs, net_class
+from firable.analysis.structure.net_class import net_class
 from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
 
 
@@ -73,6 +73,26 @@ def test_the_cell_is_strongly_connected_and_of_asymmetric_choice() -> None:
 
 def test_gates_are_no_arcs_of_the_graph() -> None:
     net = Net("n", (Place("p"), Place("q")), (Transition("t", ("p",), permissive=("q",)),))
-    assert set(arcs(net).edges) == {(("place", "p"), ("transition", "t"))}
-    assert nx.number_weakly_connected_components(arcs(net)) == 2
     assert not net_class(net).connected
+    read = Net("n", (Place("p"), Place("q")), (Transition("t", ("p",), ("q",)),))
+    assert net_class(read).connected
+    assert not net_class(read).strongly_connected
+
+
+@settings(max_examples=100)
+@given(dense_nets())
+def test_the_graph_of_arcs_is_connected_as_networkx_says(net: Net) -> None:
+    graph: nx.DiGraph[str] = nx.DiGraph()
+    graph.add_nodes_from(place.name for place in net.places)
+    graph.add_nodes_from(transition.name for transition in net.transitions)
+    graph.add_edges_from((place, t.name) for t in net.transitions for place in t.inputs)
+    graph.add_edges_from((t.name, place) for t in net.transitions for place in t.outputs)
+    found = net_class(net)
+    assert (found.connected, found.strongly_connected) == (
+        nx.is_weakly_connected(graph),
+        nx.is_strongly_connected(graph),
+    )
+
+
+def test_the_empty_net_is_connected() -> None:
+    assert net_class(Net("empty")).strongly_connected
