@@ -51,20 +51,18 @@ def main() -> None:
         parser.error("--repeat must be at least 1")
     head = machine()
     build_examples()
-    parts = []
-    for name in options.only or BENCHMARKS:
-        for table in BENCHMARKS[name](options.repeat):
-            print(table.markdown(), flush=True)
-            parts.append(table.markdown())
-    if options.only:
-        return
     about = (
         f"# Results\n\nWritten by `make bench`; do not edit. {head}.\n\n"
         "Each figure is a ratio to something measured in the same run, from the smallest of "
         f"{options.repeat} processor times; beside a goal stands whether it is met.\n"
     )
-    options.output.write_text("\n".join([about, *parts, OTHER_TOOLS]))
-    print(f"written to {options.output}")
+    parts = [about]
+    for name in options.only or BENCHMARKS:
+        for table in BENCHMARKS[name](options.repeat):
+            print(table.markdown(), flush=True)
+            parts.append(table.markdown())
+            if not options.only:  # after each table, so that a run that is broken off has not been for nothing
+                options.output.write_text("\n".join([*parts, OTHER_TOOLS]))
 
 
 if __name__ == "__main__":
