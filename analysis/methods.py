@@ -33,6 +33,9 @@ class Method(StrEnum):
     STRUCTURE = "structure"
     SYMBOLIC = "symbolic"
     STATE_EQUATION = "state-equation"
+    BOUNDED = "bounded"
+    K_INDUCTION = "k-induction"
+    PDR = "pdr"
     STUBBORN_SETS = "stubborn-sets"
 
 
@@ -92,11 +95,14 @@ GOALS: Final[dict[Method, GoalMethod]] = {
     Method.STATE_EQUATION: GoalMethod(
         "state equation", "firable.analysis.structure.state_equation:decide_by_state_equation"
     ),
+    Method.BOUNDED: GoalMethod("bounded model checking", "firable.analysis.induction.bounded:decide_by_bounded_search"),
+    Method.K_INDUCTION: GoalMethod("k-induction", "firable.analysis.induction.k_induction:decide_by_k_induction"),
+    Method.PDR: GoalMethod("property-directed reachability", "firable.analysis.induction.pdr:decide_by_pdr"),
     Method.STUBBORN_SETS: GoalMethod("stubborn sets", "firable.analysis.stubborn:decide_by_stubborn_sets"),
 }
 
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (
-    (Method.STATE_EQUATION,),
-    (Method.STUBBORN_SETS,),
+    (Method.STATE_EQUATION, Method.K_INDUCTION, Method.PDR),
+    (Method.STUBBORN_SETS, Method.BOUNDED),
 )
 """How `auto` races them: what finds violations beside what proves; each lane from the quick to the thorough."""

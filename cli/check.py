@@ -52,6 +52,9 @@ class _Asked:
         }
 
 
+_EVIDENCE = ".evidence.json"
+
+
 @click.command(short_help="Check nets: deadlock, contact, liveness, conflicts, their own properties.")
 @click.argument("nets", metavar="NET...", nargs=-1, required=True)
 @click.option(
@@ -70,6 +73,12 @@ class _Asked:
 )
 @analysis_options
 @click.option("--trace-dir", metavar="DIR", help="Write the firing sequence of each violation, for `firable replay`.")
+@click.option(
+    "--evidence",
+    "evidence_dir",
+    metavar="DIR",
+    help="Write evidence of what was decided, for `firable verify`; looked for in --max-seconds more, or 30.",
+)
 @click.option(
     "--structure", is_flag=True, help="Also net class, invariants, siphons, traps; in --max-seconds more, or 30."
 )
@@ -90,6 +99,7 @@ def check(
     discipline: str,
     method: str,
     trace_dir: str | None,
+    evidence_dir: str | None,
     structure: bool,
     query_file: str | None,
     query_texts: tuple[str, ...],
@@ -107,11 +117,11 @@ def check(
     """
     allowed = budget(**limits)
     asked = _Asked(discipline, method, allowed, trace_dir, structure, not no_cache, query_file, query_texts, progress)
-    makers = [partial(_report, net, asked, many=len(nets) > 1) for net in nets]
+    makers = [partial(_report, net, asked, evidence_dir, many=len(nets) > 1) for net in nets]
     return answer_all("check", format_, makers, partial(_show, verbose=verbose))
 
 
-def _report(argument: str, asked: _Asked, *, many: bool) -> Report:
+def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: bool) -> Report:
     from firable.cli.cache import key_of, opened_cache
 
     loaded = load_net(argument)
@@ -134,6 +144,13 @@ def _report(argument: str, asked: _Asked, *, many: bool) -> Report:
 
         folder = str(Path(asked.trace_dir) / file_stem(argument)) if many else asked.trace_dir
         files = write_folder(folder, _traces(net, kept.verdicts, asked.discipline))
+    if evidence_dir is not None:
+        from pathlib import Path
+
+        from firable.nets.bundle import file_stem
+
+        folder = str(Path(evidence_dir) / file_stem(argument)) if many else evidence_dir
+        files += write_folder(folder, _evidence(net, kept.verdicts, asked))
     return Report(
         "check",
         argument,
@@ -194,6 +211,26 @@ def _traces(net: Net, verdicts: Iterable[Verdict], discipline: str) -> dict[str,
     return traces
 
 
+def _evidence(net: Net, verdicts: Iterable[Verdict], asked: _Asked) -> dict[str, str]:
+    """The documents of evidence that can be had of the verdicts, by the names of their files."""
+    from dataclasses import replace
+
+    from firable.analysis.deadline import Deadline
+    from firable.analysis.evidence.producing import MARKINGS_MAX, evidence_of_verdict
+    from firable.analysis.goal import Limits
+    from firable.analysis.spaces.reachability import explore
+    from firable.nets.bundle import file_stem
+
+    seconds = 30.0 if asked.budget.seconds is None else asked.budget.seconds
+    limits = Limits(Deadline.after(seconds))
+    graph = explore(net, asked.discipline, replace(asked.budget, markings=MARKINGS_MAX, seconds=seconds))
+    return {
+        f"{file_stem(name)}{_EVIDENCE}": evidence.to_text()
+        for verdict in verdicts
+        for name, evidence in evidence_of_verdict(net, verdict, graph, limits).items()
+    }
+
+
 def _show(report: Report, *, verbose: bool) -> None:
     for note in report.notes:
         text.show_diagnostic(note)
@@ -214,5 +251,12 @@ def _show(report: Report, *, verbose: bool) -> None:
         for line in structure_lines(figures["structure"]):
             click.echo(f"  {line}")
     text.show_summary(report)
+    documents = [file for file in report.files if file.endswith(_EVIDENCE)]
     for file in report.files:
-        click.echo(f"  replay it: firable replay {file} --net {report.input}")
+        if file not in documents:
+            click.echo(f"  replay it: firable replay {file} --net {report.input}")
+    if documents:
+        from pathlib import Path
+
+        folder = Path(documents[0]).parent
+        click.echo(f"  {text.counted(len(documents), 'document')} of evidence: firable verify {folder}/*{_EVIDENCE}")

@@ -6,14 +6,23 @@ Nothing here needs to be right for a check to be sound: what is wrong is refused
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
+from time import monotonic
 from typing import Final
 
+from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Certificate, FiringSequence, MarkingSet
 from firable.analysis.evidence.document import Claim, ClaimKind, Evidence
-from firable.analysis.goal import Finding
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.induction.k_induction import decide_by_k_induction
+from firable.analysis.induction.pdr import decide_by_pdr
 from firable.analysis.spaces.reachability import ReachabilityGraph
-from firable.nets.formula import Formula
-from firable.nets.net import Net
+from firable.analysis.structure.state_equation import decide_by_state_equation
+from firable.analysis.verdicts.behaviour import LIVE, REVERSIBLE
+from firable.analysis.verdicts.goals import goals_of
+from firable.nets.formula import Firable, Formula, Start
+from firable.nets.net import Net, Property, PropertyKind
+from firable.nets.verdict import Status, Verdict
 from firable.semantics.trace import Discipline
 
 MARKINGS_MAX: Final = 20_000
@@ -24,8 +33,6 @@ def evidence_of_finding(
 ) -> Evidence | None:
     """The evidence that a finding comes with: its witness, or its certificate; None where it has neither.
 
-    >>> from firable.analysis.goal import Limits
-    >>> from firable.analysis.induction.k_induction import decide_by_k_induction
     >>> from firable.nets.catalogue.families import family_net
     >>> from firable.nets.formula import Deadlock
     >>> net = family_net("token_ring-5")
@@ -75,3 +82,68 @@ def _distances(graph: ReachabilityGraph, goal: Formula) -> list[int | None]:
                 distances[i] = (distances[target] or 0) + 1
                 todo.append(i)
     return distances
+
+
+def evidence_of_verdict(net: Net, verdict: Verdict, graph: ReachabilityGraph, limits: Limits) -> dict[str, Evidence]:
+    """Evidence of each claim that a decided verdict comes down to, by name; what cannot be had is left out.
+
+    The firing sequence of the verdict itself, the markings where `graph` holds all of them and they are few, or else an
+    inductive invariant, looked for anew within the limits.
+    """
+    wanted = dict(_claims(net, verdict))
+    found = {}
+    for name, claim in wanted.items():
+        evidence = _evidence(net, verdict, claim, graph, limits, single=len(wanted) == 1)
+        if evidence is not None:
+            found[name] = evidence
+    return found
+
+
+def _claims(net: Net, verdict: Verdict) -> Iterator[tuple[str, Claim]]:
+    """What a decided verdict claims of the reachable markings, each with a name."""
+    proved, name = verdict.status is Status.PROVED, verdict.name
+    property_ = next((of for of in net.properties if f"property.{of.name}" == name), None)
+    if verdict.status is Status.UNKNOWN:
+        return
+    if (asked := goals_of(net, name)) is not None:
+        _, goals = asked
+        for goal in goals:
+            # Of several goals a verdict that is not proved says which failed by its subjects.
+            if proved or len(goals) == 1 or (goal.wanted and set(goal.subjects) & set(verdict.subjects)):
+                kind = ClaimKind.REACHABLE if goal.wanted is proved else ClaimKind.NEVER
+                yield ".".join((name, *goal.subjects)), Claim(kind, goal.formula)
+    elif proved and name == LIVE.name:
+        for transition in net.transitions:
+            yield f"{name}.{transition.name}", Claim(ClaimKind.ALWAYS_POSSIBLE, Firable(transition.name))
+    elif proved and name == REVERSIBLE.name:
+        yield name, Claim(ClaimKind.ALWAYS_POSSIBLE, Start())
+    elif proved and isinstance(property_, Property) and property_.kind is PropertyKind.ALWAYS_POSSIBLE:
+        yield name, Claim(ClaimKind.ALWAYS_POSSIBLE, property_.formula)
+
+
+def _evidence(
+    net: Net, verdict: Verdict, claim: Claim, graph: ReachabilityGraph, limits: Limits, *, single: bool
+) -> Evidence | None:
+    discipline = graph.discipline
+    if claim.kind is ClaimKind.REACHABLE:
+        witness = verdict.witness if single else None
+        if witness is None:
+            witness = graph.witness(graph.satisfying(claim.goal))
+        return None if witness is None else Evidence(net, discipline, claim, FiringSequence(witness.firings))
+    if (found := evidence_of_graph(graph, claim)) is not None:
+        return found
+    if claim.kind is ClaimKind.NEVER:
+        return evidence_of_finding(net, claim.goal, _proof(net, claim.goal, limits, discipline), discipline)
+    return None
+
+
+def _proof(net: Net, goal: Formula, limits: Limits, discipline: Discipline) -> Finding:
+    """An inductive invariant against a goal, by the methods that give one, from the quick to the thorough."""
+    if discipline is Discipline.STEP:
+        return decide_by_k_induction(net, goal, limits, discipline=discipline)
+    found = decide_by_state_equation(net, goal, limits)
+    if found.reachable is None:
+        third = (limits.deadline.left_seconds or 30) / 3
+        soon = Deadline(monotonic() + third, limits.deadline.cancelled)
+        found = decide_by_k_induction(net, goal, Limits(soon, limits.memory_bytes))
+    return decide_by_pdr(net, goal, limits) if found.reachable is None else found

@@ -85,3 +85,30 @@ def test_the_worst_of_several_documents_decides(invariant: Path, tmp_path: Path)
     assert main(["verify", str(invariant), str(invariant), "--smt-dir", str(tmp_path / "smt")]) == 0
     assert main(["verify", str(invariant), str(tmp_path / "none.json")]) == 2
     assert main(["verify", str(tmp_path / "missing.json")]) == 2
+
+
+@pytest.mark.parametrize("discipline", ["interleaving", "step"])
+def test_all_that_check_decides_of_the_cell_is_verified(
+    discipline: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["check", "catalogue:one_robot", "--discipline", discipline, "--evidence", str(tmp_path), "--no-cache"])
+    assert "documents of evidence: firable verify" in capsys.readouterr().out
+    documents = sorted(tmp_path.glob("*.evidence.json"))
+    names = {document.name.removesuffix(".evidence.json").partition(".")[0] for document in documents}
+    assert {"contact-free", "deadlock-free", "quasi-live", "live", "reversible"} <= names
+    assert main(["verify", *map(str, documents)]) == 0
+
+
+def test_the_evidence_of_a_deadlock_is_the_way_into_it(tmp_path: Path) -> None:
+    assert main(["check", "catalogue:one_robot_mc_late", "--evidence", str(tmp_path), "--no-cache"]) == 1
+    document = json.loads((tmp_path / "deadlock-free.evidence.json").read_text())
+    assert (document["claim"]["kind"], document["certificate"]["kind"]) == ("reachable", "firing-sequence")
+    assert main(["verify", str(tmp_path / "deadlock-free.evidence.json")]) == 0
+
+
+def test_a_net_too_large_to_list_has_an_invariant_as_evidence(tmp_path: Path) -> None:
+    arguments = ["catalogue:token_ring-40", "--max-seconds", "5", "--evidence", str(tmp_path), "--no-cache"]
+    main(["check", *arguments, "--method", "k-induction"])
+    document = json.loads((tmp_path / "deadlock-free.evidence.json").read_text())
+    assert document["certificate"]["kind"] == "inductive-invariant"
+    assert main(["verify", str(tmp_path / "deadlock-free.evidence.json")]) == 0
