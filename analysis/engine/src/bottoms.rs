@@ -282,7 +282,7 @@ fn search<W: Width>(
 mod tests {
     use super::*;
     use crate::budget::unwatched;
-    use crate::explore::tests::random_spaces;
+    use crate::samples::random_spaces;
 
     #[test]
     fn bottom_components_without_edges_are_those_of_pearce() {

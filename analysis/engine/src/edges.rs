@@ -153,7 +153,7 @@ impl<'a> Edges<'a> {
 mod tests {
     use super::*;
     use crate::budget::unwatched;
-    use crate::explore::tests::{explore, machines};
+    use crate::samples::{explore, machines};
 
     #[test]
     fn edges_computed_again_are_those_explored() {

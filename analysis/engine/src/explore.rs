@@ -170,7 +170,7 @@ impl Space {
                 if base & blocked != 0 {
                     self.note_contact(t, next, base & blocked);
                 }
-                let mut fire = base & !blocked & net.forward.edge(t);
+                let fire = base & !blocked & net.forward.edge(t);
                 if fire == 0 {
                     continue;
                 }
@@ -178,19 +178,15 @@ impl Space {
                 let edges = u64::from(fire.count_ones());
                 self.fired[t] += edges;
                 self.edges += edges;
-                let flip = net.flip(t, words);
-                let flip_hash = net.flip_hashes[t];
-                while fire != 0 {
-                    let j = fire.trailing_zeros() as usize;
-                    fire &= fire - 1;
-                    let from = &batch.markings[j * words..(j + 1) * words];
-                    if candidates.push(width, from, flip, batch.hashes[j] ^ flip_hash) {
-                        self.table.insert_batch(width, &mut candidates, max, &self.memory)?;
-                    }
+                if candidates.push(width, &batch, fire, net.flip(t, words), net.flip_hashes[t]) {
+                    self.table.insert_batch(width, &mut candidates, max, &self.memory)?;
                 }
             }
             self.note_deadlocks(next, batch.valid & !alive)?;
-            self.table.insert_batch(width, &mut candidates, max, &self.memory)?;
+            // What is left waits for the next batch; only a level must be whole before it is taken up.
+            if stop == end {
+                self.table.insert_batch(width, &mut candidates, max, &self.memory)?;
+            }
             watch.found = Found { markings: self.table.store.len() as u64, edges: self.edges };
             watch.tick((stop - next) + (self.edges - before) as usize + net.transitions.len())?;
             next = stop;
@@ -290,40 +286,6 @@ impl Space {
         self.table.store.get(Dynamic(self.net.words), index)
     }
 
-    /// For each pair of transitions, the lowest index of a marking at which both are firable by Eq. (1).
-    pub fn firable_together(&self, pairs: &[(usize, usize)], watch: &mut Watch<'_>) -> Result<Vec<Option<u32>>, Stop> {
-        let mut found = vec![None; pairs.len()];
-        let mut asked = vec![false; self.net.transitions.len()];
-        for &(t, u) in pairs {
-            asked[t] = true;
-            asked[u] = true;
-        }
-        let mut firable = vec![0; self.net.transitions.len()];
-        let mut batch = Batch::new(self.net.words);
-        let mut missing = pairs.len();
-        let mut first = 0;
-        while first < self.len() && missing > 0 {
-            let stop = self.len().min(first + 64);
-            batch.markings.clear();
-            self.table.store.copy_range(first, stop, &mut batch.markings);
-            with_width!(self.net.words, width => batch.cut(width));
-            for t in (0..firable.len()).filter(|&t| asked[t]) {
-                let (base, blocked) = self.net.forward.test(t, &batch.slices, batch.valid);
-                firable[t] = base & !blocked & self.net.forward.sound(t);
-            }
-            for (found, &(t, u)) in found.iter_mut().zip(pairs).filter(|(found, _)| found.is_none()) {
-                let both = firable[t] & firable[u];
-                if both != 0 {
-                    *found = Some(first as u32 + both.trailing_zeros());
-                    missing -= 1;
-                }
-            }
-            watch.tick(stop - first)?;
-            first = stop;
-        }
-        Ok(found)
-    }
-
     /// The openable transitions that a rule enables at one marking, by tests of single places.
     pub fn enabled_by(&self, rules: &Rules, marking: &[u64]) -> Vec<u32> {
         (0..self.net.transitions.len())
@@ -334,66 +296,11 @@ impl Space {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
     use crate::budget::unwatched;
     use crate::net::Transition;
-
-    /// `n` machines of two places each, `pad` unused places before them.
-    pub(crate) fn machines(n: u32, pad: u32) -> Net {
-        let transitions = (0..n)
-            .flat_map(|i| {
-                let (idle, busy) = (pad + 2 * i, pad + 2 * i + 1);
-                [Transition::new(&[idle], &[busy], &[], &[], &[]), Transition::new(&[busy], &[idle], &[], &[], &[])]
-            })
-            .collect();
-        let initial: Vec<u32> = (0..n).map(|i| pad + 2 * i).collect();
-        Net::new((pad + 2 * n) as usize, transitions, &initial).expect("well formed")
-    }
-
-    pub(crate) fn explore(net: Net, step: bool) -> Space {
-        let limits = Limits { step, markings: 1 << 20, memory_bytes: 1 << 28, time: None };
-        Space::explore(net, limits, &mut unwatched).expect("fits")
-    }
-
-    /// Graphs of small random nets: tokens that move, merge and split under gates.
-    pub(crate) fn random_spaces(count: u64, step: bool) -> impl Iterator<Item = Space> {
-        let mut seed = 5_u64;
-        let mut below = move |n: u64| {
-            seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            (crate::marking::mix(seed) % n) as u32
-        };
-        (0..count).map(move |round| {
-            // Some nets are wider than a word.
-            let (places, spread) = (4 + below(9), [1, 1, 7, 40][round as usize % 4]);
-            let mut transitions: Vec<Transition> = (0..places + below(6))
-                .map(|_| {
-                    let mut some = |most: u64| -> Vec<u32> {
-                        (0..below(most + 1)).map(|_| below(u64::from(places)) * spread).collect()
-                    };
-                    let (mut inputs, mut outputs) = (some(2), some(2));
-                    outputs.retain(|p| !inputs.contains(p));
-                    if below(4) > 0 {
-                        inputs.truncate(1);
-                        outputs.truncate(1);
-                    }
-                    let mut gate =
-                        |n: u64| if below(n) == 0 { vec![below(u64::from(places)) * spread] } else { Vec::new() };
-                    Transition::new(&inputs, &outputs, &gate(5), &gate(5), &[])
-                })
-                .collect();
-            // Most of these only lose tokens; where many firings can be taken back, runs go on.
-            let back = below(4);
-            for t in 0..transitions.len() {
-                if below(3) < back {
-                    let Transition { inputs, outputs, .. } = &transitions[t];
-                    transitions.push(Transition::new(outputs, inputs, &[], &[], &[]));
-                }
-            }
-            let initial: Vec<u32> = (0..places).filter(|_| below(2) == 0).map(|p| p * spread).collect();
-            explore(Net::new((places * spread) as usize, transitions, &initial).expect("well formed"), step)
-        })
-    }
+    use crate::samples::{explore, machines};
 
     #[test]
     fn independent_machines_multiply_at_every_width() {

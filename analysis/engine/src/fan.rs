@@ -88,14 +88,10 @@ impl<'a> Fan<'a> {
             if fire == 0 {
                 continue;
             }
-            let flip = net.flip(t, words);
-            let flip_hash = net.flip_hashes[t];
+            self.candidates.push(width, &self.batch, fire, net.flip(t, words), net.flip_hashes[t]);
             while fire != 0 {
-                let j = fire.trailing_zeros() as usize;
+                self.edges.push((fire.trailing_zeros() as u8, t as u32));
                 fire &= fire - 1;
-                let from = &self.batch.markings[j * words..(j + 1) * words];
-                self.candidates.push(width, from, flip, self.batch.hashes[j] ^ flip_hash);
-                self.edges.push((j as u8, t as u32));
             }
             if self.edges.len() >= 64 {
                 pending &= !self.ask(width, visit);

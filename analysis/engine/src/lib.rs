@@ -33,6 +33,8 @@ pub mod net;
 pub mod paths;
 #[forbid(unsafe_code)]
 pub mod region;
+#[cfg(test)]
+pub(crate) mod samples;
 #[forbid(unsafe_code)]
 pub mod scc;
 #[forbid(unsafe_code)]
@@ -45,6 +47,8 @@ pub mod stubborn;
 pub mod symbolic;
 #[forbid(unsafe_code)]
 pub mod table;
+#[forbid(unsafe_code)]
+pub mod together;
 
 #[cfg(feature = "extension-module")]
 mod python;

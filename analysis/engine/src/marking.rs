@@ -162,10 +162,10 @@ pub fn slice<W: Width>(width: W, markings: &[u64], slices: &mut [u64]) {
         return;
     }
     for (k, block) in slices.as_chunks_mut::<64>().0.iter_mut().enumerate() {
-        block.fill(0);
-        for (j, marking) in markings.chunks_exact(words).enumerate() {
-            block[j] = marking[k];
+        for (row, marking) in block.iter_mut().zip(markings.chunks_exact(words)) {
+            *row = marking[k];
         }
+        block[count..].fill(0);
         transpose(block);
     }
 }

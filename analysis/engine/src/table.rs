@@ -13,6 +13,7 @@
 //! inline in the table (one cache miss less on a hit at one word, but 8 bytes a slot more, and no index for the graph
 //! methods); buckets that grow one by one (each look-up would ask which ones have).
 
+use crate::batch::Batch;
 use crate::budget::{Memory, Stop};
 use crate::marking::{Width, linear_hash, mix};
 use crate::region::Region;
@@ -55,18 +56,29 @@ impl Candidates {
         }
     }
 
-    /// Adds `from ^ flip`; true when the batch should be looked up. The bound is soft: 64 more do no harm.
+    /// Adds `from ^ flip` for each marking of `fire`; true when the candidates should be looked up.
+    ///
+    /// The bound is soft: the 64 that one transition adds at most find room beyond it.
     #[inline(always)]
-    pub fn push<W: Width>(&mut self, width: W, from: &[u64], flip: &[u64], hash: u64) -> bool {
-        let c = self.count % ROOM;
+    pub fn push<W: Width>(&mut self, width: W, batch: &Batch, fire: u64, flip: &[u64], flip_hash: u64) -> bool {
         let words = width.words();
-        self.mixed[c] = mix(hash);
-        let to = &mut self.markings[c * words..(c + 1) * words];
-        for k in 0..words {
-            to[k] = from[k] ^ flip[k];
+        let flip = &flip[..words];
+        let mut count = self.count;
+        let mut rest = fire;
+        while rest != 0 {
+            let j = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            let c = count % ROOM;
+            count += 1;
+            self.mixed[c] = mix(batch.hashes[j] ^ flip_hash);
+            let from = &batch.markings[j * words..(j + 1) * words];
+            let to = &mut self.markings[c * words..(c + 1) * words];
+            for k in 0..words {
+                to[k] = from[k] ^ flip[k];
+            }
         }
-        self.count = c + 1;
-        self.count >= BATCH
+        self.count = count;
+        count >= BATCH
     }
 }
 
@@ -372,12 +384,14 @@ mod tests {
     fn markings_of_one_hash_stay_apart() {
         let memory = Memory::new(1 << 20);
         let mut table = Table::new(2, &memory).expect("fits");
-        let mut batch = Candidates::new(2);
+        let mut candidates = Candidates::new(2);
+        let mut batch = Batch::new(2);
+        batch.markings.extend((0..40).flat_map(|i| [i, 0]));
+        batch.cut(Fixed::<2>);
+        batch.hashes.fill(5);
         for round in 0..2 {
-            for i in 0..40_u64 {
-                assert!(!batch.push(Fixed::<2>, &[i, 0], &[0, 7], 5));
-            }
-            table.insert_batch(Fixed::<2>, &mut batch, usize::MAX, &memory).expect("fits");
+            assert!(!candidates.push(Fixed::<2>, &batch, batch.valid, &[0, 7], 0));
+            table.insert_batch(Fixed::<2>, &mut candidates, usize::MAX, &memory).expect("fits");
             assert_eq!(table.store.len(), 40, "after round {round}");
         }
         for i in 0..40_u64 {

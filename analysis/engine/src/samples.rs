@@ -1,0 +1,61 @@
+//! Nets and graphs that tests of several files share.
+
+use crate::budget::unwatched;
+use crate::explore::{Limits, Space};
+use crate::net::{Net, Transition};
+
+/// `n` machines of two places each, `pad` unused places before them.
+pub(crate) fn machines(n: u32, pad: u32) -> Net {
+    let transitions = (0..n)
+        .flat_map(|i| {
+            let (idle, busy) = (pad + 2 * i, pad + 2 * i + 1);
+            [Transition::new(&[idle], &[busy], &[], &[], &[]), Transition::new(&[busy], &[idle], &[], &[], &[])]
+        })
+        .collect();
+    let initial: Vec<u32> = (0..n).map(|i| pad + 2 * i).collect();
+    Net::new((pad + 2 * n) as usize, transitions, &initial).expect("well formed")
+}
+
+pub(crate) fn explore(net: Net, step: bool) -> Space {
+    let limits = Limits { step, markings: 1 << 20, memory_bytes: 1 << 28, time: None };
+    Space::explore(net, limits, &mut unwatched).expect("fits")
+}
+
+/// Graphs of small random nets: tokens that move, merge and split under gates.
+pub(crate) fn random_spaces(count: u64, step: bool) -> impl Iterator<Item = Space> {
+    let mut seed = 5_u64;
+    let mut below = move |n: u64| {
+        seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        (crate::marking::mix(seed) % n) as u32
+    };
+    (0..count).map(move |round| {
+        // Some nets are wider than a word.
+        let (places, spread) = (4 + below(9), [1, 1, 7, 40][round as usize % 4]);
+        let mut transitions: Vec<Transition> = (0..places + below(6))
+            .map(|_| {
+                let mut some = |most: u64| -> Vec<u32> {
+                    (0..below(most + 1)).map(|_| below(u64::from(places)) * spread).collect()
+                };
+                let (mut inputs, mut outputs) = (some(2), some(2));
+                outputs.retain(|p| !inputs.contains(p));
+                if below(4) > 0 {
+                    inputs.truncate(1);
+                    outputs.truncate(1);
+                }
+                let mut gate =
+                    |n: u64| if below(n) == 0 { vec![below(u64::from(places)) * spread] } else { Vec::new() };
+                Transition::new(&inputs, &outputs, &gate(5), &gate(5), &[])
+            })
+            .collect();
+        // Most of these only lose tokens; where many firings can be taken back, runs go on.
+        let back = below(4);
+        for t in 0..transitions.len() {
+            if below(3) < back {
+                let Transition { inputs, outputs, .. } = &transitions[t];
+                transitions.push(Transition::new(outputs, inputs, &[], &[], &[]));
+            }
+        }
+        let initial: Vec<u32> = (0..places).filter(|_| below(2) == 0).map(|p| p * spread).collect();
+        explore(Net::new((places * spread) as usize, transitions, &initial).expect("well formed"), step)
+    })
+}
