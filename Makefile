@@ -20,11 +20,11 @@ export PYO3_PYTHON = $(abspath $(BIN)/python)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test fmt bench clean lint lint-python lint-ruff lint-format lint-types lint-types-tests
+.PHONY: help demo test fmt bench bench-instructions clean lint lint-python lint-ruff lint-format lint-types lint-types-tests
 .PHONY: lint-rust lint-rust-format lint-clippy test-rust test-python
 
 help: ## these lines
-	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/\t/' | expand -t 14
+	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*##/\t/' | expand -t 20
 
 demo: $(MADE)/install ## check, prove, bundle and run the one-robot cell, and see another one deadlock
 	@BIN=$(BIN) sh docs/demo.sh
@@ -68,6 +68,9 @@ fmt: $(MADE)/develop $(MADE)/rust-tools ## format all code, and repair what the 
 
 bench: $(MADE)/develop ## measure, as ratios to yardsticks in the same run; writes benchmarks/RESULTS.md
 	$(BIN)/python benchmarks/run.py
+
+bench-instructions: $(MADE)/develop ## count the instructions of the engine's hot loops against the record; needs valgrind
+	$(BIN)/python benchmarks/instructions.py
 
 clean: ## remove what was built
 	rm -rf $(VENV) out build dist src/*.egg-info $(CRATE)/target .mypy_cache .ruff_cache .pytest_cache
