@@ -17,7 +17,7 @@ from typing import Final
 
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.encoding import parallel_relation, step_relation
-from firable.analysis.induction.session import OutOfTimeError, Session
+from firable.analysis.induction.session import LimitReachedError, Session
 from firable.analysis.induction.unrolling import Unrolling
 from firable.analysis.spaces.space import Witnesses
 from firable.nets.formula import Formula
@@ -54,12 +54,12 @@ def decide_by_bounded_search(
     start, depth = perf_counter(), -1
     found: Witness | None = None
     try:
-        with Session(limits.deadline) as session:
+        with Session(limits) as session:
             search = BoundedSearch(session, net, goal, discipline)
             while found is None and depth < depth_max:
                 found = search.witness(depth + 1)
                 depth += 1
-    except OutOfTimeError:
+    except LimitReachedError:
         pass
     bound = "" if found else f"no run of up to {depth:,} {_WORDS[discipline]} leads to it" if depth >= 0 else "nothing"
     return Finding(True if found else None, METHOD, found, bound, Cost(seconds=perf_counter() - start))
@@ -81,7 +81,7 @@ class BoundedSearch:
     def witness(self, depth: int) -> Witness | None:
         """A run of this depth into the goal, None where there is none.
 
-        Raises `OutOfTimeError` at the deadline.
+        Raises `LimitReachedError` at the deadline.
         """
         while self.runs.depth < depth:
             self.runs.extend()

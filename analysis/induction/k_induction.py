@@ -23,7 +23,7 @@ from firable.analysis.evidence.certificate import InductiveInvariant
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.bounded import BoundedSearch
 from firable.analysis.induction.encoding import interleaving_relation, step_relation
-from firable.analysis.induction.session import OutOfTimeError, Session
+from firable.analysis.induction.session import LimitReachedError, Session
 from firable.analysis.induction.smt import Term
 from firable.analysis.induction.strengthening import Facts, Traps, structural_facts
 from firable.analysis.induction.unrolling import Unrolling
@@ -56,10 +56,10 @@ def decide_by_k_induction(
     """
     start, proof = perf_counter(), None
     try:
-        with Session(limits.deadline) as session:
+        with Session(limits) as session:
             proof = _Proof(session, net, goal, discipline)
             reachable = proof.decide(depth_max)
-    except OutOfTimeError:
+    except LimitReachedError:
         reachable = None
     cost = Cost(seconds=perf_counter() - start)
     if proof is None or reachable is None:

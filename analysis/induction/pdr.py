@@ -26,7 +26,7 @@ from typing import Final
 from firable.analysis.evidence.certificate import Clause, InductiveInvariant
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.bounded import reached, shortened
-from firable.analysis.induction.session import OutOfTimeError, Session
+from firable.analysis.induction.session import LimitReachedError, Session
 from firable.analysis.induction.smt import Operator, Term, Terms, value, values_of, variables
 from firable.analysis.induction.steps_into import Cube, StepsInto
 from firable.analysis.induction.strengthening import Facts, Traps, structural_facts
@@ -51,10 +51,10 @@ def decide_by_pdr(net: Net, goal: Formula, limits: Limits) -> Finding:
     """
     start, proof = perf_counter(), None
     try:
-        with Session(limits.deadline) as session:
+        with Session(limits) as session:
             proof = _Proof(session, net, goal)
             reachable = proof.decide()
-    except OutOfTimeError:
+    except LimitReachedError:
         reachable = None
     cost = Cost(seconds=perf_counter() - start)
     if proof is None or reachable is None:
@@ -91,7 +91,7 @@ class _Proof:
         return Clause(self.net.names(cube.empty), self.net.names(cube.full))
 
     def decide(self) -> bool:
-        """Whether the goal is reachable; raises `OutOfTimeError` at the deadline."""
+        """Whether the goal is reachable; raises `LimitReachedError` at the deadline."""
         net, terms = self.net, Terms()
         places = [terms.variable(place.name) for place in net.places]
         goal = evaluate(terms, net, self.goal, places.__getitem__)

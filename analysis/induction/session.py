@@ -19,31 +19,33 @@ from typing import Any, Final
 
 import z3
 
-from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Limits
 from firable.analysis.induction.smt import SEED, Answer, Operator, Term, subterms
 
 _LISTEN_SECONDS: Final = 0.03
 
 
-class OutOfTimeError(Exception):
-    """The deadline came before the answer."""
+class LimitReachedError(Exception):
+    """The deadline came before the answer, or the memory was used up."""
 
 
 class Session:
-    """Solvers in one context of z3, interrupted at a deadline; a context manager.
+    """Solvers in one context of z3, ended by a deadline or by the memory that z3 takes; a context manager.
 
+    >>> from firable.analysis.goal import Limits
     >>> from firable.analysis.induction.smt import Terms
     >>> terms = Terms()
     >>> p = terms.variable("p")
-    >>> with Session(Deadline()) as session:
+    >>> with Session(Limits()) as session:
     ...     solver = session.solver()
     ...     solver.add(session.translated([terms.negation(p)]))
     ...     session.ask(solver), session.ask(solver, session.variable("p"))
     (<Answer.SAT: 'sat'>, <Answer.UNSAT: 'unsat'>)
     """
 
-    def __init__(self, deadline: Deadline) -> None:
-        self.deadline = deadline
+    def __init__(self, limits: Limits) -> None:
+        self.deadline = limits.deadline
+        self._memory_mebibytes = max(1, limits.memory_bytes >> 20)
         self.context = z3.Context()
         self._translated: dict[Term, Any] = {}
         self._ended = Event()
@@ -66,6 +68,7 @@ class Session:
         """A solver for Boolean terms and weighted sums of them, that keeps what it has learnt."""
         solver = z3.SolverFor("QF_FD", ctx=self.context)
         solver.set("random_seed", SEED)
+        solver.set("max_memory", self._memory_mebibytes)
         # z3 answers Ctrl-C by itself, in whatever thread it is; only the main thread may.
         solver.set("ctrl_c", current_thread() is main_thread())
         return solver
@@ -77,7 +80,7 @@ class Session:
     def translated(self, terms: Sequence[Term]) -> list[z3.BoolRef]:
         """The terms as z3's own, in this context; what they share is shared, also with earlier ones.
 
-        Raises `OutOfTimeError` where the deadline comes first.
+        Raises `LimitReachedError` where the deadline comes first.
         """
         made = self._translated
         for count, term in enumerate(subterms(terms)):
@@ -107,21 +110,26 @@ class Session:
         return z3.Or(operands) if operands else z3.BoolVal(val=False, ctx=self.context)
 
     def check_time(self) -> None:
-        """Raise `OutOfTimeError` where the deadline has come."""
+        """Raise `LimitReachedError` where the deadline has come."""
         if self.deadline.over:
-            raise OutOfTimeError
+            raise LimitReachedError
 
     def ask(self, solver: z3.Solver, *assumptions: z3.BoolRef) -> Answer:
         """Whether all that the solver holds can be true together with the assumptions; never UNKNOWN.
 
-        Raises `OutOfTimeError` at the deadline, and `KeyboardInterrupt` where the user ends the solver.
+        Raises `LimitReachedError` at a limit, and `KeyboardInterrupt` where the user ends the solver.
         """
         self.check_time()
-        found = solver.check(*assumptions)
+        try:
+            found = solver.check(*assumptions)
+        except z3.Z3Exception as error:
+            if "memory" not in str(error):
+                raise
+            raise LimitReachedError(str(error)) from None
         if found == z3.unknown:
             self.check_time()
             reason = solver.reason_unknown()
             if "interrupted" in reason or "canceled" in reason:
                 raise KeyboardInterrupt
-            raise OutOfTimeError(reason)
+            raise LimitReachedError(reason)
         return Answer.SAT if found == z3.sat else Answer.UNSAT

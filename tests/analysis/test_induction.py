@@ -240,3 +240,8 @@ def test_a_method_that_is_cancelled_answers_unknown(decide_by: Callable[[Net, Fo
 @pytest.mark.parametrize("decide_by", [decide_by_bounded_search, decide_by_k_induction, decide_by_pdr])
 def test_without_time_nothing_is_known(decide_by: Callable[[Net, Formula, Limits], Finding]) -> None:
     assert decide_by(family_net("philosophers-5"), Deadlock(), in_time(0)).reachable is None
+
+
+@pytest.mark.parametrize("decide_by", [decide_by_bounded_search, decide_by_k_induction, decide_by_pdr])
+def test_without_memory_nothing_is_known(decide_by: Callable[[Net, Formula, Limits], Finding]) -> None:
+    assert decide_by(family_net("philosophers-20"), Deadlock(), Limits(memory_bytes=2**20)).reachable is None
