@@ -89,10 +89,10 @@ def _table(words: str, make: Callable[[Net, Limits], StateSpace[Any]], repeat: i
             try:
                 space, took = timed(partial(make, net, limits))
             except BudgetExceeded as error:
-                told = f"not in {SECONDS_MAX:.0f} s: {error}"
+                told = f"not in {SECONDS_MAX:.0f} s by the clock: {error}"
                 break
             if not space.complete:
-                told = f"not in {SECONDS_MAX:.0f} s: {space.bound}"
+                told = f"not in {SECONDS_MAX:.0f} s by the clock: {space.bound}"
                 break
             seconds.append(took)
             told = _counted(space.until(Deadline.after(SECONDS_MAX)), subject, words)

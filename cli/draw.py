@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 import click
 
 from firable.cli.options import load_net, net_argument, write_text
 from firable.cli.text import counted
+
+NODES_MAX: Final = 600
+"""How many places and transitions are drawn: lines are laid out to cross little, at a cost that grows with the cube."""
 
 
 @click.command(short_help="Draw a net as SVG.")
@@ -30,6 +34,10 @@ def draw(net: str, output: str, marking: str | None, trace: str | None) -> int:
     if marking is not None and trace is not None:
         raise click.UsageError("--marking and --trace both say which tokens to show: leave one out")
     loaded = load_net(net).net
+    if (n_nodes := len(loaded.places) + len(loaded.transitions)) > NODES_MAX:
+        raise click.UsageError(
+            f"{n_nodes:,} places and transitions make no picture that anybody can read; at most {NODES_MAX:,} are drawn"
+        )
     if trace is not None:
         from firable.semantics.replaying import replay as play
         from firable.semantics.trace import Fired, read_trace
