@@ -126,6 +126,23 @@ def test_a_violation_names_the_siphon_or_trap_that_shows_it() -> None:
     assert "the siphon of a, b contains no marked trap" in known["live"].answer.hint
 
 
+def test_a_place_without_arcs_concerns_nobody() -> None:
+    for ring in ("a>bc b>d c>e de>a", "a>bc b>d b>d c>e de>a"):
+        whole = built(ring, "a")
+        net = Net("n", (*whole.places, Place("unused")), whole.transitions, whole.signals)
+        found = says(net)
+        assert (found["live"], found["reversible"]) == (True, True)
+
+
+def test_two_choices_that_must_agree_fail_the_rank_theorem_though_invariants_cover_them() -> None:
+    net = built("a>b a>c d>e d>f be>ad cf>ad", "ad")
+    assert says(net)["live"] is False
+
+
+def test_the_rank_theorem_alone_makes_no_empty_net_live() -> None:
+    assert says(built("a>bc b>d b>d c>e de>a", ""))["live"] is False
+
+
 def test_inhibitive_gates_and_contact_keep_the_theorems_away() -> None:
     ring = "a>bc b>d c>e de>a"
     gated = built(ring, "a", Transition("u", ("a",), ("b",), inhibitive=("e",)))
