@@ -2,19 +2,21 @@
 
 Every technique that decides a goal is a function of a net, a goal and limits (`firable.analysis.goal`), so a reduction
 stands in front of any of them. Where it leaves nothing to decide, the goal having become true or false, it answers by
-itself. The witness is lifted and replayed on the original net, so a fault in a rule cannot become a wrong
-counterexample; against a wrong "not reachable" there is the proof in each rule, and the tests.
+itself; where what is left falls apart, its parts are decided one by one. The witness is lifted and replayed on the
+original net, so a fault in a rule cannot become a wrong counterexample; against a wrong "not reachable" there is the
+proof in each rule, and the tests.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable
 
 from firable.analysis.goal import Finding, Limits
+from firable.analysis.reduction.components import parts
 from firable.analysis.reduction.reduce import reduce_for_goal
 from firable.nets.formula import Constant, Formula
 from firable.nets.net import Net
+from firable.nets.verdict import Cost
 
 
 def decide_reduced(
@@ -22,7 +24,8 @@ def decide_reduced(
 ) -> Finding:
     """Reduce the net for the goal, let `decide` decide the rest, and lift its witness.
 
-    The method names the rules. Raises `WitnessError` where a witness does not replay on the original net.
+    The method names the rules. A certificate would be one of the small net, so it is not handed on. Raises
+    `WitnessError` where a witness does not replay on the original net.
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> from firable.nets.formula import Deadlock
@@ -36,9 +39,37 @@ def decide_reduced(
     if isinstance(reduced.goal, Constant):
         witness = reduced.lift(()) if reduced.goal.value else None
         return Finding(reduced.goal.value, f"structural {reduced.summary}", witness)
-    finding = decide(reduced.net, reduced.goal, limits)
-    witness = finding.witness
-    if witness is not None:
-        witness = reduced.lift((name for (name,) in witness.firings), witness.note)
-    method = f"{finding.method}, after {reduced.summary}"
-    return replace(finding, method=method, witness=witness, certificate=None)  # a certificate is one of the small net
+    found: list[Finding] = []
+    separate = parts(reduced.net, reduced.goal)
+    apart = f" on {len(separate)} separate parts" if len(separate) > 1 else ""
+    for part, of in separate:
+        finding = decide(part, of, limits)
+        found.append(finding)
+        if finding.reachable is False:
+            break
+    # One part that does not reach its goal decides it; else one that is undecided leaves it so.
+    undecided = [finding for finding in found if finding.reachable is None]
+    last = undecided[0] if undecided and found[-1].reachable is not False else found[-1]
+    witness = None
+    if last.reachable and all(finding.witness is not None for finding in found):
+        witnesses = [finding.witness for finding in found if finding.witness is not None]
+        witness = reduced.lift((name for one in witnesses for (name,) in one.firings), witnesses[-1].note)
+    return Finding(
+        last.reachable,
+        f"{last.method}{apart}, after {reduced.summary}",
+        witness,
+        last.bound,
+        _sum(f.cost for f in found),
+    )
+
+
+def _sum(costs: Iterable[Cost]) -> Cost:
+    """What several techniques took together; None where one of them counts something else."""
+    known = list(costs)
+
+    def total(values: list[int | None]) -> int | None:
+        return None if None in values else sum(value for value in values if value is not None)
+
+    seconds = [cost.seconds for cost in known if cost.seconds is not None]
+    markings, edges = total([cost.markings for cost in known]), total([cost.edges for cost in known])
+    return Cost(markings, edges, sum(seconds) if len(seconds) == len(known) else None)

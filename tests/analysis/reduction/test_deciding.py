@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.cell_nets import cell_nets
 from support.naive_space import NaiveSpace
 from support.small_text import net_of
 
 from firable.analysis.evidence.certificate import InductiveInvariant
 from firable.analysis.goal import Finding, Limits
+from firable.analysis.reduction.components import parts
 from firable.analysis.reduction.deciding import decide_reduced
 from firable.analysis.spaces.space import WitnessError
 from firable.nets.catalogue import catalogue_net
-from firable.nets.formula import Deadlock, Formula, parse_formula
-from firable.nets.net import Net
+from firable.nets.formula import And, Deadlock, Formula, Holds, Not, parse_formula
+from firable.nets.net import Net, Place, Transition
 from firable.nets.verdict import Cost, Witness
 from firable.semantics.player import Player
 
@@ -59,6 +65,90 @@ def test_what_is_not_decided_stays_so() -> None:
     finding = decide_reduced(catalogue_net("one_robot_mc_late"), Deadlock(), Limits(), gives_up)
     assert finding.reachable is None
     assert finding.bound == "nowhere"
+
+
+RING = ("t: a -> b if d", "u: b -> a, c", "v: c -> d unless b", "w: d ->")
+
+
+def beside(*nets: Net) -> Net:
+    """Nets side by side, with names of their own."""
+
+    def renamed(names: tuple[str, ...], i: int) -> tuple[str, ...]:
+        return tuple(f"{name}{i}" for name in names)
+
+    return Net(
+        "beside",
+        tuple(Place(f"{p.name}{i}", marked=p.marked) for i, net in enumerate(nets) for p in net.places),
+        tuple(
+            Transition(
+                f"{t.name}{i}",
+                renamed(t.inputs, i),
+                renamed(t.outputs, i),
+                renamed(t.permissive, i),
+                renamed(t.inhibitive, i),
+            )
+            for i, net in enumerate(nets)
+            for t in net.transitions
+        ),
+    )
+
+
+def test_nets_side_by_side_are_taken_apart_and_what_speaks_of_both_holds_them_together() -> None:
+    net = beside(net_of("a", *RING), net_of("a", *RING))
+    for goal, sizes in (
+        ("deadlock", [4, 4]),
+        ("deadlock and a0 and not b1", [4, 4]),
+        ("a0 and (b0 or c0)", [4]),
+        ("a0 and b1", [4, 4]),
+        ("a0 or b1", [8]),
+        ("deadlock and (a0 or b1)", [8]),
+        ("tokens(a0, a1) = 1", [8]),
+        ("not deadlock", [8]),
+        ("start and b1", [8]),
+    ):
+        found = parts(net, parse_formula(goal))
+        assert [len(part.places) for part, _ in found] == sizes, goal
+
+
+def test_a_transition_without_places_keeps_a_net_together() -> None:
+    net = beside(net_of("a", *RING), net_of("a", *RING))
+    loose = replace(net, transitions=(*net.transitions, Transition("any")))
+    assert len(parts(loose, Deadlock())) == 1
+
+
+@settings(max_examples=40, deadline=None)
+@given(cell_nets(), cell_nets(), st.booleans())
+def test_parts_reach_their_goals_exactly_if_the_whole_does(first: Net, second: Net, deadlock: bool) -> None:
+    goals = [Holds(f"{net.places[-1].name}{i}") for i, net in enumerate((first, second))]
+    goal = Deadlock() if deadlock else And((goals[0], Not(goals[1])))
+    alone = [by_playing(net, of, Limits()).reachable for net, of in parts(beside(first, second), goal)]
+    first_reaches = by_playing(first, Deadlock() if deadlock else Holds(first.places[-1].name), Limits()).reachable
+    second_goal = Deadlock() if deadlock else Not(Holds(second.places[-1].name))
+    assert all(alone) == (first_reaches and by_playing(second, second_goal, Limits()).reachable)
+
+
+def test_parts_are_decided_one_by_one_and_their_witnesses_put_together() -> None:
+    late = catalogue_net("one_robot_mc_late")
+    alone = decide_reduced(late, Deadlock(), Limits(), by_playing)
+    both = decide_reduced(beside(late, late), Deadlock(), Limits(), by_playing)
+    assert both.reachable
+    assert alone.witness is not None
+    assert both.witness is not None
+    assert "playing on 2 separate parts, after" in both.method
+    assert alone.cost.markings is not None
+    assert both.cost.markings == 2 * alone.cost.markings
+    assert len(both.witness.firings) == 2 * len(alone.witness.firings)
+
+
+def test_one_part_that_does_not_reach_its_goal_decides_and_one_that_is_undecided_leaves_it_open() -> None:
+    late = catalogue_net("one_robot_mc_late")
+    for answers, expected in (([None, False], False), ([True, None], None), ([None, True], None)):
+        queue = list(answers)
+
+        def next_of(net: Net, goal: Formula, limits: Limits, queue: list[bool | None] = queue) -> Finding:
+            return Finding(queue.pop(0), "asking")
+
+        assert decide_reduced(beside(late, late), Deadlock(), Limits(), next_of).reachable is expected
 
 
 def test_a_certificate_for_the_reduced_net_is_none_for_the_original() -> None:
