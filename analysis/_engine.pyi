@@ -384,6 +384,21 @@ class Stubborn:
 
         `IndexError` for a transition that does not exist.
         """
+    def walk(
+        self,
+        nodes: list[tuple[int, list[int]]] | None,
+        *,
+        seed: int,
+        max_steps: int,
+        max_seconds: float | None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> tuple[list[int] | None, int]:
+        """Walk at random, with restarts, to a marking that satisfies a formula, or with None to a deadlock.
+
+        The firings that lead there, cut down to what it needs, and how many were made; None where the walk met no such
+        marking within `max_steps` firings or the time, which says nothing about the net. The same seed gives the same
+        walk.
+        """
 
 @final
 class Search:

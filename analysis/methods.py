@@ -37,6 +37,7 @@ class Method(StrEnum):
     K_INDUCTION = "k-induction"
     PDR = "pdr"
     STUBBORN_SETS = "stubborn-sets"
+    WALK = "walk"
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,10 +100,11 @@ GOALS: Final[dict[Method, GoalMethod]] = {
     Method.K_INDUCTION: GoalMethod("k-induction", "firable.analysis.induction.k_induction:decide_by_k_induction"),
     Method.PDR: GoalMethod("property-directed reachability", "firable.analysis.induction.pdr:decide_by_pdr"),
     Method.STUBBORN_SETS: GoalMethod("stubborn sets", "firable.analysis.stubborn:decide_by_stubborn_sets"),
+    Method.WALK: GoalMethod("random walk", "firable.analysis.walk:decide_by_walk"),
 }
 
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (
     (Method.STATE_EQUATION, Method.K_INDUCTION, Method.PDR),
-    (Method.STUBBORN_SETS, Method.BOUNDED),
+    (Method.STUBBORN_SETS, Method.WALK, Method.BOUNDED),
 )
 """How `auto` races them: what finds violations beside what proves; each lane from the quick to the thorough."""

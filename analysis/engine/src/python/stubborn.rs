@@ -1,15 +1,17 @@
 //! `Stubborn`: searches of one net by stubborn sets; and `Search`: what such a search found.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
 use super::{BudgetExceeded, Patience, Row, but_ctrl_c, detached, mask, net};
-use crate::budget::Stop;
+use crate::budget::{Stop, Watch};
 use crate::stubborn::dependencies::literal;
 use crate::stubborn::formula::{Formula, Node};
 use crate::stubborn::search::{self, Goal, Limits, Prepared};
+use crate::stubborn::walk::{self, Target};
 use crate::table::NONE;
 
 /// A formula from Python: (operator, operands), 0 empty, 1 full, 2 all, 3 any.
@@ -120,6 +122,31 @@ impl Stubborn {
         }
         let patience = Patience::new(max_seconds, cancelled)?;
         self.search(py, Goal::Firing(transitions), (thorough, max_markings, max_memory_bytes), &patience)
+    }
+
+    #[pyo3(signature = (nodes, *, seed, max_steps, max_seconds, cancelled=None))]
+    fn walk(
+        &self,
+        py: Python<'_>,
+        nodes: Option<Nodes>,
+        seed: u64,
+        max_steps: u64,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<(Option<Vec<u32>>, u64)> {
+        let mut target = match nodes {
+            Some(nodes) => Target::Formula(formula(nodes, self.prepared.net.places)?),
+            None => Target::Deadlock,
+        };
+        let patience = Patience::new(max_seconds, cancelled)?;
+        let deadline = patience.time.and_then(|time| Instant::now().checked_add(time));
+        let mut raised = None;
+        let Prepared { net, dependencies } = &*self.prepared;
+        let (found, steps) = detached(py, &patience, &mut raised, |poll| {
+            walk::walk(net, dependencies, &mut target, seed, max_steps, &mut Watch::new(deadline, poll))
+        });
+        but_ctrl_c(py, raised)?;
+        Ok((found.unwrap_or(None), steps))
     }
 }
 

@@ -74,6 +74,40 @@ impl Formula {
         self.truth[self.truth.len() - 1]
     }
 
+    /// How many literals must still become true, at least, as if each could by itself; 0 where the formula holds.
+    pub fn distance(&mut self, marking: &[u64]) -> u64 {
+        for (i, node) in self.nodes.iter().enumerate() {
+            self.price[i] = match node {
+                Node::Literal(l) => u64::from(!is_true(*l, marking)),
+                Node::All(operands) => operands.iter().map(|&o| self.price[o as usize]).fold(0, u64::saturating_add),
+                Node::Any(operands) => operands.iter().map(|&o| self.price[o as usize]).min().unwrap_or(u64::MAX),
+            };
+        }
+        self.price[self.price.len() - 1]
+    }
+
+    /// Literals that are true at a marking which satisfies the formula, and enough to make it true.
+    pub fn support(&mut self, marking: &[u64], into: &mut Vec<Literal>) {
+        into.clear();
+        if !self.holds(marking) {
+            return;
+        }
+        self.todo.push(self.nodes.len() as u32 - 1);
+        let mut next = 0;
+        while let Some(&node) = self.todo.get(next) {
+            next += 1;
+            if std::mem::replace(&mut self.seen[node as usize], true) {
+                continue;
+            }
+            match &self.nodes[node as usize] {
+                Node::Literal(l) => into.push(*l),
+                Node::All(operands) => self.todo.extend(operands),
+                Node::Any(operands) => self.todo.extend(operands.iter().find(|&&o| self.truth[o as usize])),
+            }
+        }
+        self.todo.drain(..).for_each(|node| self.seen[node as usize] = false);
+    }
+
     /// What the makers of a false literal cost, for the choice among false operands of conjunctions; after `holds`, of
     /// the same marking, and before `wanted`.
     pub fn weigh(&mut self, price: impl Fn(Literal) -> u64) {

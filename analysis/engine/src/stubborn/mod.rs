@@ -54,3 +54,4 @@ pub mod effort;
 pub mod formula;
 pub mod marks;
 pub mod search;
+pub mod walk;

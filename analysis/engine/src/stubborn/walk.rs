@@ -1,0 +1,334 @@
+//! Walks: firings drawn at random from M0, with restarts, until a goal is met. They find what is too far for a search to
+//! reach and never conclude that a goal cannot be reached.
+//!
+//! A walk takes about twenty nanoseconds for each transition that a firing touches: how many conditions of a transition
+//! are false is counted, and only the needers of what was flipped are looked at, whatever the size of the net. Every
+//! third walk is blind; every third draws a few transitions and fires the one that was fired least; every third
+//! the one after which the goal is nearest (literals that still have to become true; firable transitions, for a
+//! deadlock). The lengths follow the sequence of Luby, Sinclair and Zuckerman ("Optimal speedup of Las Vegas algorithms",
+//! 1993), which is within a logarithm of the best choice of restarts, whatever that is.
+//!
+//! What was found is cut down before it is shown: from the end backwards, a firing is kept if it makes a literal true
+//! that the goal or a kept firing later needs. What is kept can be fired without the rest, because a literal that is
+//! needed is not made false between the firing that makes it and the one that needs it. Then what leads back to a marking
+//! is left out.
+
+use std::collections::HashMap;
+
+use super::dependencies::{Dependencies, Literal, is_true, negation};
+use super::formula::Formula;
+use super::marks::Marks;
+use crate::budget::{Stop, Watch};
+use crate::marking::mix;
+use crate::net::Net;
+
+/// Firings in the shortest walks; longer for nets with more transitions.
+const UNIT: usize = 1 << 10;
+/// Firings in the longest walk.
+const LENGTH_MAX: usize = 1 << 20;
+/// Words of markings that are remembered to find loops.
+const REMEMBERED_MAX: usize = 1 << 24;
+/// How many transitions a guided walk draws to choose from.
+const DRAWS: usize = 4;
+
+/// What a walk looks for.
+#[derive(Clone, Debug)]
+pub enum Target {
+    /// A deadlock.
+    Deadlock,
+    /// A marking that satisfies a formula.
+    Formula(Formula),
+}
+
+/// How a walk chooses among the firable transitions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Guide {
+    Blind,
+    LeastFired,
+    Nearest,
+}
+
+/// A place in the net that walks on.
+struct Walker<'a> {
+    net: &'a Dependencies,
+    marking: Vec<u64>,
+    /// For each transition how many of its conditions are false; those that never fire are not counted down.
+    unmet: Vec<u32>,
+    firable: Vec<u32>,
+    position: Vec<u32>,
+}
+
+impl<'a> Walker<'a> {
+    fn new(net: &'a Dependencies, initial: &[u64], transitions: usize) -> Self {
+        let mut walker = Walker {
+            net,
+            marking: initial.to_vec(),
+            unmet: vec![u32::MAX; transitions],
+            firable: Vec::new(),
+            position: vec![0; transitions],
+        };
+        for t in (0..transitions as u32).filter(|&t| net.able(t)) {
+            let unmet = net.conditions(t).iter().filter(|&&l| !is_true(l, initial)).count() as u32;
+            walker.unmet[t as usize] = unmet;
+            if unmet == 0 {
+                walker.add(t);
+            }
+        }
+        walker
+    }
+
+    fn add(&mut self, t: u32) {
+        self.position[t as usize] = self.firable.len() as u32;
+        self.firable.push(t);
+    }
+
+    fn remove(&mut self, t: u32) {
+        let at = self.position[t as usize];
+        self.firable.swap_remove(at as usize);
+        if let Some(&moved) = self.firable.get(at as usize) {
+            self.position[moved as usize] = at;
+        }
+    }
+
+    /// Flips the places of a transition: fires it, or takes the firing back. Returns the work done.
+    fn flip(&mut self, t: u32) -> usize {
+        let net = self.net;
+        let mut work = 1;
+        for &condition in net.flipped(t) {
+            let place = condition >> 1;
+            let now_false = if is_true(condition, &self.marking) { condition } else { negation(condition) };
+            self.marking[place as usize / 64] ^= 1 << (place % 64);
+            for &u in net.needers.of(now_false) {
+                self.unmet[u as usize] += 1;
+                if self.unmet[u as usize] == 1 {
+                    self.remove(u);
+                }
+            }
+            for &u in net.needers.of(negation(now_false)) {
+                self.unmet[u as usize] -= 1;
+                if self.unmet[u as usize] == 0 {
+                    self.add(u);
+                }
+            }
+            work += net.needers.of(condition).len() + net.needers.of(negation(condition)).len();
+        }
+        work
+    }
+}
+
+impl Target {
+    fn met(&mut self, walker: &Walker<'_>) -> bool {
+        match self {
+            Target::Deadlock => walker.firable.is_empty(),
+            Target::Formula(formula) => formula.holds(&walker.marking),
+        }
+    }
+
+    fn distance(&mut self, walker: &Walker<'_>) -> u64 {
+        match self {
+            Target::Deadlock => walker.firable.len() as u64,
+            Target::Formula(formula) => formula.distance(&walker.marking),
+        }
+    }
+
+    fn size(&self) -> usize {
+        match self {
+            Target::Deadlock => 1,
+            Target::Formula(formula) => formula.size(),
+        }
+    }
+}
+
+/// The i-th number, from 1, of 1, 1, 2, 1, 1, 2, 4, 1, 1, 2, ...
+fn luby(i: u64) -> u64 {
+    let bits = 64 - i.leading_zeros();
+    if i + 1 == 1 << bits { 1 << (bits - 1) } else { luby(i + 1 - (1 << (bits - 1))) }
+}
+
+/// Walks from M0 until the target is met: the firings that lead there, cut down, or none after `max_steps` firings. Also
+/// the number of firings done.
+pub fn walk(
+    net: &Net,
+    dependencies: &Dependencies,
+    target: &mut Target,
+    seed: u64,
+    max_steps: u64,
+    watch: &mut Watch<'_>,
+) -> (Result<Option<Vec<u32>>, Stop>, u64) {
+    let mut steps = 0;
+    let found = find(net, dependencies, target, seed, max_steps, &mut steps, watch);
+    (found, steps)
+}
+
+fn find(
+    net: &Net,
+    dependencies: &Dependencies,
+    target: &mut Target,
+    seed: u64,
+    max_steps: u64,
+    steps: &mut u64,
+    watch: &mut Watch<'_>,
+) -> Result<Option<Vec<u32>>, Stop> {
+    let count = net.transitions.len();
+    let mut random = Random(mix(seed));
+    let mut fired = vec![0u32; count];
+    let mut path = Vec::new();
+    let unit = UNIT.max(count.min(LENGTH_MAX / 64));
+    for round in 1_u64.. {
+        let guide = [Guide::LeastFired, Guide::Nearest, Guide::Blind][round as usize % 3];
+        let length = LENGTH_MAX.min(unit.saturating_mul(luby(round.div_ceil(3)) as usize));
+        let mut walker = Walker::new(dependencies, &net.initial, count);
+        watch.tick(count)?;
+        path.clear();
+        for _ in 0..length {
+            if target.met(&walker) {
+                let needed = cut_down(dependencies, target, &walker.marking, &path, count, net.places);
+                return Ok(Some(without_loops(net, &needed)));
+            }
+            if walker.firable.is_empty() {
+                break;
+            }
+            if *steps >= max_steps {
+                return Ok(None);
+            }
+            let (t, work) = choose(&mut walker, target, guide, &fired, &mut random);
+            let work = work + walker.flip(t) + target.size();
+            fired[t as usize] = fired[t as usize].saturating_add(1);
+            path.push(t);
+            *steps += 1;
+            watch.tick(work)?;
+        }
+        if path.is_empty() {
+            return Ok(None); // M0 is a deadlock and not the target: there is nowhere to go
+        }
+    }
+    Ok(None)
+}
+
+fn choose(
+    walker: &mut Walker<'_>,
+    target: &mut Target,
+    guide: Guide,
+    fired: &[u32],
+    random: &mut Random,
+) -> (u32, usize) {
+    let mut best = (u64::MAX, walker.firable[random.below(walker.firable.len())]);
+    let mut work = 0;
+    if guide == Guide::Blind || walker.firable.len() == 1 || random.below(16) == 0 {
+        return (best.1, work);
+    }
+    for _ in 0..DRAWS {
+        let t = walker.firable[random.below(walker.firable.len())];
+        let price = if guide == Guide::LeastFired {
+            u64::from(fired[t as usize])
+        } else {
+            work += walker.flip(t);
+            let distance = target.distance(walker);
+            work += walker.flip(t) + target.size();
+            distance
+        };
+        if price < best.0 {
+            best = (price, t);
+        }
+    }
+    (best.1, work)
+}
+
+/// The firings of a path that the target needs, in their order.
+fn cut_down(
+    net: &Dependencies,
+    target: &mut Target,
+    reached: &[u64],
+    path: &[u32],
+    transitions: usize,
+    places: usize,
+) -> Vec<u32> {
+    let mut needed = Marks::new(2 * places);
+    match target {
+        Target::Formula(formula) => {
+            let mut literals: Vec<Literal> = Vec::new();
+            formula.support(reached, &mut literals);
+            literals.iter().for_each(|&l| _ = needed.insert(l));
+        }
+        Target::Deadlock => {
+            for t in (0..transitions as u32).filter(|&t| net.able(t)) {
+                let mut unmet = net.conditions(t).iter().copied().filter(|&l| !is_true(l, reached)).map(negation);
+                let first = unmet.clone().next();
+                if !unmet.any(|l| needed.has(l)) {
+                    first.iter().for_each(|&l| _ = needed.insert(l));
+                }
+            }
+        }
+    }
+    let mut kept = Vec::new();
+    for &t in path.iter().rev() {
+        if net.flipped(t).iter().any(|&l| needed.has(negation(l))) {
+            net.flipped(t).iter().for_each(|&l| needed.remove(negation(l)));
+            net.conditions(t).iter().for_each(|&l| _ = needed.insert(l));
+            kept.push(t);
+        }
+    }
+    kept.reverse();
+    kept
+}
+
+/// The path without the parts that lead back to a marking; unchanged where its markings are too many to remember.
+fn without_loops(net: &Net, path: &[u32]) -> Vec<u32> {
+    if path.len().saturating_mul(net.words) > REMEMBERED_MAX {
+        return path.to_vec();
+    }
+    let mut kept = Vec::new();
+    let mut markings = vec![net.initial.clone()];
+    let mut depth = HashMap::from([(net.initial.clone(), 0)]);
+    for &t in path {
+        let mut after = markings[kept.len()].clone();
+        after.iter_mut().zip(net.flip(t as usize, net.words)).for_each(|(word, flip)| *word ^= flip);
+        if let Some(&back) = depth.get(&after) {
+            markings.drain(back + 1..).for_each(|marking| _ = depth.remove(&marking));
+            kept.truncate(back);
+        } else {
+            kept.push(t);
+            depth.insert(after.clone(), kept.len());
+            markings.push(after);
+        }
+    }
+    kept
+}
+
+/// Numbers from a seed (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, bound: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        ((u128::from(mix(self.0)) * bound as u128) >> 64) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+    use crate::net::Transition;
+
+    #[test]
+    fn lengths_follow_the_sequence_of_luby() {
+        let first: Vec<u64> = (1..=15).map(luby).collect();
+        assert_eq!(first, [1, 1, 2, 1, 1, 2, 4, 1, 1, 2, 1, 1, 2, 4, 8]);
+    }
+
+    #[test]
+    fn what_a_deadlock_does_not_need_and_what_leads_back_is_cut_away() {
+        // A ring of two places, and a way out of it; beside them a place that is filled and never matters.
+        let arc = |from, to| Transition::new(&[from], &[to], &[], &[], &[]);
+        let beside = Transition::new(&[3], &[4], &[], &[2], &[]);
+        let net = Net::new(5, vec![arc(0, 1), arc(1, 0), arc(1, 2), beside], &[0, 3]).expect("well formed");
+        let dependencies = Dependencies::new(&net);
+        for seed in 0..20 {
+            let mut poll = unwatched;
+            let mut watch = Watch::new(None, &mut poll);
+            let (found, _) = walk(&net, &dependencies, &mut Target::Deadlock, seed, 10_000, &mut watch);
+            assert_eq!(found, Ok(Some(vec![0, 2])));
+        }
+    }
+}
