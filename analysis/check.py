@@ -119,9 +119,9 @@ class _Check:
             space = SPACES[method].load()(self.net, Limits(self.deadline, self.budget.memory_bytes))
             return _told(self._report(space), [f"{SPACES[method].words}: {_size(space)}"])
         nothing = self._explore(replace(self.budget, markings=1))
-        if method in KNOWERS:
-            return self._settled(self._report(nothing), (method,), (), [f"{KNOWERS[method].words}, and nothing else"])
-        return self._settled(self._report(nothing), (), ((method,),), [f"{GOALS[method].words}, and nothing else"])
+        knowers, lanes = ((method,) if method in KNOWERS else ()), (((method,),) if method in GOALS else ())
+        words = (KNOWERS | GOALS)[method].words
+        return self._settled(self._report(nothing), knowers, lanes, [f"{words}, and nothing else"])
 
     def _report(self, space: StateSpace[Any]) -> CheckReport:
         return report_on(space, self.queries)

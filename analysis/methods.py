@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:  # the command line reads this table for its help, and so loads nothing with it
     from firable.analysis.goal import Finding, Limits
+    from firable.analysis.question import Known
     from firable.analysis.spaces.space import StateSpace
-    from firable.analysis.structure.theorems import Known
     from firable.nets.formula import Formula
     from firable.nets.net import Net
 
@@ -32,6 +32,7 @@ class Method(StrEnum):
     EXPLICIT = "explicit"
     STRUCTURE = "structure"
     SYMBOLIC = "symbolic"
+    REDUCTION = "reduction"
     STATE_EQUATION = "state-equation"
     BOUNDED = "bounded"
     K_INDUCTION = "k-induction"
@@ -90,9 +91,15 @@ SPACES: Final[dict[Method, SpaceMethod]] = {
 
 KNOWERS: Final[dict[Method, KnowingMethod]] = {
     Method.STRUCTURE: KnowingMethod("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),
+    Method.STUBBORN_SETS: KnowingMethod(
+        "stubborn sets, for all transitions", "firable.analysis.stubborn:known_firings"
+    ),
 }
 
 GOALS: Final[dict[Method, GoalMethod]] = {
+    Method.REDUCTION: GoalMethod(
+        "stubborn sets on the reduced net", "firable.analysis.reduction.searching:decide_by_reduction"
+    ),
     Method.STATE_EQUATION: GoalMethod(
         "state equation", "firable.analysis.structure.state_equation:decide_by_state_equation"
     ),
@@ -104,7 +111,7 @@ GOALS: Final[dict[Method, GoalMethod]] = {
 }
 
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (
+    (Method.WALK, Method.REDUCTION, Method.STUBBORN_SETS, Method.BOUNDED),
     (Method.STATE_EQUATION, Method.K_INDUCTION, Method.PDR),
-    (Method.STUBBORN_SETS, Method.WALK, Method.BOUNDED),
 )
 """How `auto` races them: what finds violations beside what proves; each lane from the quick to the thorough."""

@@ -38,6 +38,14 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
+class Known:
+    """The answer to the question of a verdict by a technique that needs no state space, and which technique."""
+
+    answer: Answer
+    method: str
+
+
+@dataclass(frozen=True, slots=True)
 class Question:
     """A property of a net that some technique decides; `code` and `hint` go with a violation.
 

@@ -28,6 +28,7 @@ from typing import Any, Final
 from firable.analysis._engine import BudgetExceeded, Search, Stubborn
 from firable.analysis.compiled import nodes_of, rows
 from firable.analysis.goal import Finding, Limits
+from firable.analysis.question import Known, no, yes
 from firable.analysis.spaces.reachability import REASONS, engine_limits
 from firable.analysis.spaces.space import Witnesses
 from firable.nets.formula import Deadlock, Formula
@@ -140,6 +141,14 @@ def find_firings(net: Net, limits: Limits) -> Firings:
     (('u',), (), (('t',),))
     """
     return _Firings(_Runs(net, limits)).found()
+
+
+def known_firings(net: Net, limits: Limits) -> Mapping[str, Known]:
+    """The verdict `quasi-live`, by name, where it is decided: some transition is dead, or each was found firing."""
+    found = find_firings(net, limits)
+    if found.dead:
+        return {"quasi-live": Known(no(found.dead), METHOD)}
+    return {} if found.undecided else {"quasi-live": Known(yes(), METHOD)}
 
 
 class _Firings:

@@ -29,10 +29,10 @@ firing sequence; its hint names the siphon or trap that shows it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from firable.analysis.goal import Limits
-from firable.analysis.question import Answer, listed, no, yes
+from firable.analysis.question import Known, listed, no, yes
 from firable.analysis.structure.commoner import Commoner, commoner
 from firable.analysis.structure.contact import METHOD as ONE_TOKEN
 from firable.analysis.structure.contact import contact_proof
@@ -49,14 +49,6 @@ FREE_CHOICE = "theorem of Commoner and Hack on free-choice nets"
 HOME = "theorem on home markings of live and safe free-choice nets"
 ASYMMETRIC_CHOICE = "theorem of Commoner on asymmetric-choice nets"
 SIPHONS = "every siphon contains a marked trap (Commoner)"
-
-
-@dataclass(frozen=True, slots=True)
-class Known:
-    """What a theorem says to the question of a verdict, and which theorem."""
-
-    answer: Answer
-    method: str
 
 
 def decide_by_class(net: Net, limits: Limits) -> Mapping[str, Known]:

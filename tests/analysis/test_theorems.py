@@ -15,10 +15,11 @@ from support.ring_nets import ring_nets
 from firable.analysis.check import check
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.goal import Limits
+from firable.analysis.question import Known
 from firable.analysis.structure.contact import contact_proof
 from firable.analysis.structure.net_class import extended_free_choice
 from firable.analysis.structure.ordinary import ordinary
-from firable.analysis.structure.theorems import Known, decide_by_class
+from firable.analysis.structure.theorems import decide_by_class
 from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
 from firable.nets.verdict import Status
 
