@@ -90,7 +90,7 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class ReachabilityGraph(Derived):
+class ReachabilityGraph(Derived[Column]):
     """The markings reachable from M0 under one discipline, numbered breadth first; M0 is 0.
 
     A marking with a lower number is never farther from M0, so the lowest number of a set is its shortest witness. What

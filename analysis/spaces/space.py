@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from firable.analysis.deadline import Deadline
 from firable.nets.formula import Formula
@@ -188,7 +188,7 @@ class StateSpace(Protocol[S]):
         ...
 
 
-class Derived:
+class Derived(Generic[S]):
     """The second half of a state space, from the first."""
 
     def satisfying(self: StateSpace[S], formula: Formula) -> S:

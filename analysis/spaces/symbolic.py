@@ -23,7 +23,7 @@ from typing import Any
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, MarkingSet
-from firable.analysis.deadline import Deadline
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.spaces.space import Derived, Witnesses
 from firable.nets.formula import And, Deadlock, Firable, Formula, Not, Or, Start
@@ -38,7 +38,7 @@ METHOD = "decision diagram, interleaving"
 
 
 @dataclass(frozen=True)
-class SymbolicSpace(Derived):
+class SymbolicSpace(Derived[MarkingSet]):
     """The markings reachable from M0 under interleaving, all of them, as a decision diagram.
 
     What is not done when the `deadline` comes, or memory ends, raises `BudgetExceeded`.
@@ -46,6 +46,7 @@ class SymbolicSpace(Derived):
 
     net: Net
     engine: _engine.Diagram
+    deadline: Deadline = NEVER
     discipline: Discipline = Discipline.INTERLEAVING
     method: str = METHOD
     complete: bool = True
@@ -54,7 +55,7 @@ class SymbolicSpace(Derived):
     def until(self, deadline: Deadline) -> SymbolicSpace:
         """The same space, for questions that end with another deadline; so do those to this one from now on."""
         self.engine.limit(**_ending(deadline))
-        return replace(self)
+        return replace(self, deadline=deadline)
 
     def require_complete(self) -> None:
         """It always is: an incomplete search makes no space."""
@@ -274,7 +275,7 @@ def explore_symbolically(net: Net, limits: Limits | None = None) -> SymbolicSpac
         max_memory_bytes=limits.memory_bytes,
         **_ending(limits.deadline),
     )
-    return SymbolicSpace(net, diagram)
+    return SymbolicSpace(net, diagram, limits.deadline)
 
 
 def decide_by_diagram(net: Net, goal: Formula, limits: Limits) -> Finding:

@@ -25,7 +25,7 @@ Markings = frozenset[Marking]
 
 
 @dataclass(frozen=True)
-class NaiveSpace(Derived):
+class NaiveSpace(Derived[Markings]):
     """All markings reachable from M0, by the reference player."""
 
     net: Net
