@@ -92,7 +92,7 @@ SPACES: Final[dict[Method, SpaceMethod]] = {
 KNOWERS: Final[dict[Method, KnowingMethod]] = {
     Method.STRUCTURE: KnowingMethod("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),
     Method.STUBBORN_SETS: KnowingMethod(
-        "stubborn sets, for all transitions", "firable.analysis.stubborn:known_firings"
+        "stubborn sets, at large", "firable.analysis.stubborn:known_firings"
     ),
 }
 
