@@ -23,7 +23,7 @@ from threading import Event
 from time import perf_counter
 from typing import Any, Final, TypeVar
 
-from firable.analysis._engine import IncompleteGraph
+from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.methods import GOAL_LANES, GOALS, KNOWERS, SPACES, Method, SpaceMethod
@@ -38,7 +38,7 @@ from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import Formula
 from firable.nets.net import Net
 from firable.nets.queries import Query
-from firable.nets.verdict import Cost, Status, Verdict
+from firable.nets.verdict import Cost, Status, Verdict, spelled
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import holds_in
@@ -138,8 +138,9 @@ class _Check:
         course += outcome.told
         if outcome.answer is None:
             return None
-        course.append(f"{outcome.winner} was the first to hold all markings: {_size(outcome.answer)}")
-        return outcome.answer.until(self.deadline)
+        space = outcome.answer.until(self.deadline)  # the race ended it with itself
+        course.append(f"{outcome.winner} was the first to hold all markings: {_size(space)}")
+        return space
 
     def _noted(self, outcome: Outcome[T], course: list[str]) -> Outcome[T]:
         """The outcome; where Ctrl-C ended the race nothing else is begun, and what is known is reported."""
@@ -164,7 +165,7 @@ class _Check:
             known |= self._known(of, report)
             if said := open_ & known.keys():
                 course.append(f"{KNOWERS[of].words}: {', '.join(sorted(said))}")
-        fired = {self.net.transitions[t].name for t, count in enumerate(report.space.fired()) if count}
+        fired = self._fired(report.space) if open_ else set()
         verdicts = [
             verdict
             if verdict.name not in open_
@@ -172,6 +173,13 @@ class _Check:
             for verdict in report.verdicts
         ]
         return _told(replace(report, verdicts=tuple(verdicts)), course)
+
+    def _fired(self, space: StateSpace[Any]) -> set[str]:
+        """The transitions that are known to fire, as far as there is time to ask."""
+        try:
+            return {self.net.transitions[t].name for t, count in enumerate(space.fired()) if count}
+        except BudgetExceeded:
+            return set()
 
     def _known(self, of: Method, report: CheckReport) -> dict[str, Verdict]:
         """The verdicts that a technique knows at once."""
@@ -262,7 +270,7 @@ def _share(deadline: Deadline, share: float) -> Deadline:
 
 
 def _size(space: StateSpace[Any]) -> str:
-    size = f"{space.n_markings:,} markings, {space.n_edges:,} edges"
+    size = f"{spelled(space.n_markings)} markings, {spelled(space.n_edges)} edges"
     return size if space.complete else f"{size}, which are not all ({space.bound})"
 
 

@@ -91,9 +91,7 @@ SPACES: Final[dict[Method, SpaceMethod]] = {
 
 KNOWERS: Final[dict[Method, KnowingMethod]] = {
     Method.STRUCTURE: KnowingMethod("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),
-    Method.STUBBORN_SETS: KnowingMethod(
-        "stubborn sets, at large", "firable.analysis.stubborn:known_firings"
-    ),
+    Method.STUBBORN_SETS: KnowingMethod("stubborn sets, at large", "firable.analysis.stubborn:known_firings"),
 }
 
 GOALS: Final[dict[Method, GoalMethod]] = {

@@ -15,7 +15,7 @@ from typing import Any
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.spaces.space import StateSpace
-from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
+from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness, spelled
 from firable.semantics.trace import Discipline
 
 _STATUS = {True: Status.PROVED, False: Status.VIOLATED, None: Status.UNKNOWN}
@@ -65,7 +65,7 @@ class Question:
         try:
             answer = find()
         except (IncompleteGraph, BudgetExceeded) as error:
-            bound = space.bound or f"{space.n_markings:,} markings: {error}"
+            bound = space.bound or f"{spelled(space.n_markings)} markings: {error}"
             answer = unknown(bound, "give it a larger budget of markings, memory or time", "F3004")
         seconds = (space.cost.seconds or 0.0) + perf_counter() - start
         cost = Cost(space.n_markings, space.n_edges, seconds)

@@ -47,7 +47,9 @@ def counted(n: int, word: str) -> str:
     >>> counted(1, "place"), counted(1200, "marking")
     ('1 place', '1,200 markings')
     """
-    return f"{n:,} {word}{'' if n == 1 else 's'}"
+    from firable.nets.verdict import spelled
+
+    return f"{spelled(n)} {word}{'' if n == 1 else 's'}"
 
 
 def show_verdicts(net: Net, verdicts: Sequence[Verdict], *, verbose: bool = False) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from decimal import Decimal
 from enum import StrEnum
 from typing import Any
 
@@ -110,6 +111,15 @@ class Verdict:
             if getattr(self.cost, key) is not None:
                 data[key] = getattr(self.cost, key)
         return data
+
+
+def spelled(count: int) -> str:
+    """A number of markings for a person: all its digits, or the first four where nobody would read them.
+
+    >>> spelled(1_331_714), spelled(2**200)
+    ('1,331,714', '1.607e+60')
+    """
+    return f"{count:,}" if count < 10**15 else f"{Decimal(count):.3e}"
 
 
 def overall(verdicts: Iterable[Verdict]) -> Status:

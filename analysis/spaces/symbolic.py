@@ -41,11 +41,14 @@ METHOD = "decision diagram, interleaving"
 class SymbolicSpace(Derived[MarkingSet]):
     """The markings reachable from M0 under interleaving, all of them, as a decision diagram.
 
-    What is not done when the `deadline` comes, or memory ends, raises `BudgetExceeded`.
+    What is not done when the `deadline` comes, or memory ends, raises `BudgetExceeded`. The numbers of markings and of
+    edges (pairs of a marking and a transition that may fire in it) are exact, and counted once.
     """
 
     net: Net
     engine: _engine.Diagram
+    n_markings: int
+    n_edges: int
     deadline: Deadline = NEVER
     discipline: Discipline = Discipline.INTERLEAVING
     method: str = METHOD
@@ -74,16 +77,6 @@ class SymbolicSpace(Derived[MarkingSet]):
     def algebra(self) -> Bitwise[MarkingSet]:
         """The sets of markings as a Boolean algebra; true is all of them."""
         return Bitwise(true=self.reach, false=self.none)
-
-    @cached_property
-    def n_markings(self) -> int:
-        """How many markings, exactly."""
-        return self.reach.count()
-
-    @cached_property
-    def n_edges(self) -> int:
-        """How many pairs of a marking and a transition that may fire in it, exactly."""
-        return self.reach.edges()
 
     @property
     def cost(self) -> Cost:
@@ -275,7 +268,8 @@ def explore_symbolically(net: Net, limits: Limits | None = None) -> SymbolicSpac
         max_memory_bytes=limits.memory_bytes,
         **_ending(limits.deadline),
     )
-    return SymbolicSpace(net, diagram, limits.deadline)
+    reach = diagram.reach()
+    return SymbolicSpace(net, diagram, reach.count(), reach.edges(), limits.deadline)
 
 
 def decide_by_diagram(net: Net, goal: Formula, limits: Limits) -> Finding:

@@ -27,7 +27,7 @@ from typing import Any, Final, Generic
 
 from firable.analysis.question import Answer, Question, listed, no, yes
 from firable.analysis.spaces.space import S, StateSpace, WitnessError
-from firable.nets.verdict import Verdict, Weight, Witness
+from firable.nets.verdict import Verdict, Weight, Witness, spelled
 from firable.semantics.algebra import BOOL
 from firable.semantics.firing import in_contact
 from firable.semantics.player import holds_in
@@ -183,7 +183,9 @@ def deadlock_free(behaviour: Behaviour[Any]) -> Verdict:
         space = behaviour.space
         if count := space.count(space.deadlocks):
             found = (
-                "1 marking of the net is a deadlock" if count == 1 else f"{count:,} markings of the net are deadlocks"
+                "1 marking of the net is a deadlock"
+                if count == 1
+                else f"{spelled(count)} markings of the net are deadlocks"
             )
             note = found if space.complete else f"at least {found}"
             return no((), space.witness(space.deadlocks, note))
@@ -257,7 +259,7 @@ def no_doomed(behaviour: Behaviour[Any]) -> Verdict:
         count = space.count(doomed)
         if not count:
             return yes()
-        note = f"{count:,} doomed markings; from here every run ends in a deadlock"
+        note = f"{spelled(count)} doomed markings; from here every run ends in a deadlock"
         return no((), space.witness(doomed, note))
 
     return NO_DOOMED.ask(behaviour.space, find)
