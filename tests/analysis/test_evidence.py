@@ -325,3 +325,27 @@ def test_liveness_of_each_transition_is_shown_by_distances() -> None:
         found = evidence_of_graph(graph, Claim(ClaimKind.ALWAYS_POSSIBLE, Firable(transition.name)))
         assert found is not None
         assert not refuses(found)
+
+
+def test_a_sum_that_a_firing_changes_is_refused() -> None:
+    net = Net("n", (Place("a", marked=True), Place("b")), (Transition("t", ("a",), ("b",)),))
+
+    def shows(*sums: Equation | Inequality, goal: str = "a and b") -> bool:
+        equations = tuple(one for one in sums if isinstance(one, Equation))
+        inequalities = tuple(one for one in sums if isinstance(one, Inequality))
+        certificate = InductiveInvariant(equations, inequalities=inequalities)
+        claim = Claim(ClaimKind.NEVER, parse_formula(goal))
+        evidence = Evidence(net, Discipline.INTERLEAVING, claim, certificate)
+        text = sums_text(evidence)
+        assert text is not None
+        assert refuses(evidence) is (by_cvc5(text) == "sat")
+        return not refuses(evidence)
+
+    assert shows(Equation((("a", 1), ("b", 1)), 1))
+    assert not shows(Equation((("a", 1), ("b", 1)), 0))  # not so in M0
+    assert not shows(Equation((("b", 1),), 0))  # so in M0, and changed by t
+    assert not shows(Equation((("a", 1), ("b", 2)), 1))
+    assert shows(Inequality((("a", -1), ("b", -1)), -1))
+    assert shows(Inequality((("a", 1), ("b", 2)), 1), goal="not a and not b")
+    assert not shows(Inequality((("a", 1),), 1), goal="not a")  # so in M0, and lowered by t
+    assert not shows(Inequality((("a", 1), ("b", 1)), 2), goal="not a")
