@@ -54,7 +54,7 @@ SUBJECTS: Final = (
     Subject("interlocked-13", spare=60),
     Subject("interlocked-13", spare=180),
 )
-STEP_SUBJECTS: Final = (Subject("machines-11"), Subject("philosophers-10"), Subject("manufacturing_cells-6"))
+STEP_SUBJECTS: Final = (Subject("machines-11"), Subject("grid-4"), Subject("manufacturing_cells-6"))
 
 
 def rows_of(net: Net) -> list[Row]:

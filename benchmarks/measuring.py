@@ -81,6 +81,11 @@ def against(goal: float, ratio: float, *, at_least: bool = False) -> str:
     return f"{ratio:.2f} ({'>=' if at_least else '<='} {goal:g}: {MET if met else MISSED})"
 
 
+def is_busy() -> bool:
+    """Whether other programs want more processors than there are."""
+    return os.getloadavg()[0] > (os.cpu_count() or 1)
+
+
 def machine() -> str:
     """The machine, the commit and how busy the machine was, for the head of the results."""
     commit = _said("git", "rev-parse", "--short=12", "HEAD")

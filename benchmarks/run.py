@@ -14,13 +14,18 @@ from typing import Final
 import explicit
 import reading
 import whole_spaces
-from measuring import REPOSITORY, build_examples, machine
+from measuring import REPOSITORY, build_examples, is_busy, machine
 
 BENCHMARKS: Final = {
     "explicit": explicit.tables,
     "whole_spaces": whole_spaces.tables,
     "reading": reading.tables,
 }
+
+BUSY: Final = (
+    " Other programs kept the machine busy: times are longer than they would be alone, by shared caches and memory, and "
+    "what was to end within a time by the clock had a fraction of it."
+)
 
 OTHER_TOOLS: Final = """## Other tools
 
@@ -54,7 +59,7 @@ def main() -> None:
     about = (
         f"# Results\n\nWritten by `make bench`; do not edit. {head}.\n\n"
         "Each figure is a ratio to something measured in the same run, from the smallest of "
-        f"{options.repeat} processor times; beside a goal stands whether it is met.\n"
+        f"{options.repeat} processor times; beside a goal stands whether it is met.{BUSY if is_busy() else ''}\n"
     )
     parts = [about]
     for name in options.only or BENCHMARKS:

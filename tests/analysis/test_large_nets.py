@@ -4,10 +4,13 @@ No test here looks at a clock: the sizes are such that whatever is quadratic wou
 whatever recurses would run out of its stack.
 """
 
+from dataclasses import replace
+
 from firable.analysis.check import check
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.nets.catalogue import family_net
-from firable.nets.net import Net, Place, Transition
+from firable.nets.formula import NESTING_MAX, parse_formula
+from firable.nets.net import Net, Place, Property, PropertyKind, Transition
 from firable.nets.verdict import Status
 
 
@@ -45,6 +48,13 @@ def test_effective_conflicts_stay_unknown_where_not_all_pairs_are_listed_and_non
     report = check(unmarked)
     assert report.verdict("effective-conflicts").status is Status.UNKNOWN
     assert report.figures.effective_conflicts is None
+
+
+def test_a_formula_nested_to_the_limit_is_decided() -> None:
+    depth = NESTING_MAX // 2 - 1  # `not` and its bracket are a level each
+    deep = parse_formula("not (" * depth + "p0" + ")" * depth)
+    net = replace(chain(3), properties=(Property("deep", PropertyKind.ALWAYS_POSSIBLE, deep),))
+    assert check(net).verdict("property.deep").status is Status.PROVED
 
 
 def test_a_marking_a_hundred_thousand_firings_deep_has_its_witness() -> None:
