@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.reduction.components import parts
 from firable.analysis.reduction.reduce import reduce_for_goal
+from firable.analysis.stubborn import decide_by_stubborn_sets
 from firable.nets.formula import Constant, Formula
 from firable.nets.net import Net
 from firable.nets.verdict import Cost
@@ -61,6 +62,17 @@ def decide_reduced(
         last.bound,
         _sum(f.cost for f in found),
     )
+
+
+def decide_by_reduction(net: Net, goal: Formula, limits: Limits) -> Finding:
+    """Decide on the reduced net by stubborn sets, which leave out orders of firing that the rules cannot.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> from firable.nets.formula import Deadlock
+    >>> decide_by_reduction(catalogue_net("one_robot_mc_late"), Deadlock(), Limits()).cost.markings
+    4
+    """
+    return decide_reduced(net, goal, limits, decide_by_stubborn_sets)
 
 
 def _sum(costs: Iterable[Cost]) -> Cost:

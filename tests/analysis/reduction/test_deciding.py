@@ -14,7 +14,7 @@ from support.small_text import net_of
 from firable.analysis.evidence.certificate import InductiveInvariant
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.reduction.components import parts
-from firable.analysis.reduction.deciding import decide_reduced
+from firable.analysis.reduction.deciding import decide_by_reduction, decide_reduced
 from firable.analysis.spaces.space import WitnessError
 from firable.nets.catalogue import catalogue_net
 from firable.nets.formula import And, Deadlock, Formula, Holds, Not, parse_formula
@@ -149,6 +149,14 @@ def test_one_part_that_does_not_reach_its_goal_decides_and_one_that_is_undecided
             return Finding(queue.pop(0), "asking")
 
         assert decide_reduced(beside(late, late), Deadlock(), Limits(), next_of).reachable is expected
+
+
+@settings(max_examples=30, deadline=None)
+@given(cell_nets())
+def test_stubborn_sets_on_the_reduced_net_find_a_deadlock_exactly_if_there_is_one(net: Net) -> None:
+    found = decide_by_reduction(net, Deadlock(), Limits())
+    assert found.reachable is by_playing(net, Deadlock(), Limits()).reachable
+    assert (found.witness is not None) is found.reachable
 
 
 def test_a_certificate_for_the_reduced_net_is_none_for_the_original() -> None:
