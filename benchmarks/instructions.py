@@ -18,7 +18,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 CRATE: Final = Path(__file__).resolve().parent.parent / "analysis" / "engine"
 PROGRAM: Final = CRATE / "target" / "release" / "examples" / "hot_loops"
@@ -49,7 +49,9 @@ def main() -> int:
     build = ["cargo", "build", "--release", "--locked", "--quiet", "--example", "hot_loops"]
     subprocess.run(build, cwd=CRATE, check=True)
     compiler = subprocess.run(["rustc", "--version"], capture_output=True, text=True, check=True).stdout.strip()
-    record = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {"compiler": "", "counts": {}}
+    record: dict[str, Any] = {"compiler": "", "counts": {}}
+    if RECORD.exists():
+        record = json.loads(RECORD.read_text(encoding="utf-8"))
     if record["compiler"] != compiler and not update:
         print(f"note: the record was made with {record['compiler']}; here is {compiler}\n")
 

@@ -23,8 +23,8 @@ BENCHMARKS: Final = {
 }
 
 BUSY: Final = (
-    " Other programs kept the machine busy: times are longer than they would be alone, by shared caches and memory, and "
-    "what was to end within a time by the clock had a fraction of it."
+    " Other programs kept the machine busy: times are longer than they would be alone, by shared caches and memory, "
+    "and what was to end within a time by the clock had a fraction of it."
 )
 
 OTHER_TOOLS: Final = """## Other tools
