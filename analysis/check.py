@@ -124,7 +124,14 @@ class _Check:
         return self._settled(self._report(nothing), knowers, lanes, [f"{words}, and nothing else"])
 
     def _report(self, space: StateSpace[Any]) -> CheckReport:
-        return report_on(space, self.queries)
+        """The report on a space; Ctrl-C leaves unknown what is not decided yet, and twice ends all."""
+        try:
+            return report_on(space, self.queries)
+        except KeyboardInterrupt:
+            if self.interrupted.is_set():
+                raise
+            self.interrupted.set()
+            return _told(report_on(space, self.queries), ["interrupted"])
 
     def _explore(self, budget: Budget) -> ReachabilityGraph:
         return explore(self.net, self.discipline, budget, deadline=self.deadline, progress=self.progress)

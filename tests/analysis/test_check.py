@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from firable.analysis import check as module
 from firable.analysis.check import check
 from firable.analysis.methods import GOALS, KNOWERS, SPACES, Method
+from firable.analysis.report import CheckReport, report_on
 from firable.analysis.spaces.reachability import Budget
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
@@ -66,3 +69,29 @@ def test_what_theorems_know_is_not_asked_again(monkeypatch: pytest.MonkeyPatch) 
     assert report.course[-1] == (
         "theorems on net classes: contact-free, deadlock-free, doomed-markings, live, quasi-live"
     )
+
+
+def test_an_interrupted_report_leaves_the_rest_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[tuple[Any, ...]] = []
+
+    def interrupted(*arguments: Any) -> CheckReport:
+        calls.append(arguments)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return report_on(*arguments)
+
+    monkeypatch.setattr("firable.analysis.check.report_on", interrupted)
+    report = check(catalogue_net("one_robot"))
+    assert "interrupted" in report.course
+    assert len(calls) == 2
+    assert report.verdict("live").status is Status.UNKNOWN
+    assert report.verdict("deadlock-free").status is Status.PROVED  # known from the exploration
+
+
+def test_interrupted_twice_ends_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: Any) -> CheckReport:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("firable.analysis.check.report_on", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        check(catalogue_net("one_robot"))

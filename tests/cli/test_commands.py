@@ -114,7 +114,7 @@ def test_an_interrupted_check_shows_what_is_known(tmp_path: Path) -> None:
         "    r._engine.explore = engine\n"
         "    return engine(*arguments, **options)\n"
         "r._engine.explore = explore\n"
-        f"sys.exit(main(['check', {str(net)!r}]))\n"
+        f"sys.exit(main(['check', '--method', 'explicit', {str(net)!r}]))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 3, done.stdout + done.stderr
