@@ -96,7 +96,7 @@ KNOWERS: Final[dict[Method, KnowingMethod]] = {
 
 GOALS: Final[dict[Method, GoalMethod]] = {
     Method.REDUCTION: GoalMethod(
-        "stubborn sets on the reduced net", "firable.analysis.reduction.searching:decide_by_reduction"
+        "stubborn sets on the reduced net", "firable.analysis.reduction.deciding:decide_by_reduction"
     ),
     Method.STATE_EQUATION: GoalMethod(
         "state equation", "firable.analysis.structure.state_equation:decide_by_state_equation"
