@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from typing import Final, Generic, TypeVar
 
 from firable.analysis.spaces.space import WitnessError, Witnesses
-from firable.analysis.temporal.product import Pairs, Product, ProductEdge
+from firable.analysis.temporal.product import Pairs, Product, ProductEdge, Steps
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
 from firable.nets.temporal import (
@@ -157,9 +157,12 @@ class Walk(Generic[S]):
                 return False
             size = now
             last = layers[-1]
+            steps = Steps(self.product, last)
             layers.append(
                 {
-                    state: sets.either(last.get(state, sets.none), sets.both(markings, self.product.step(state, last)))
+                    state: sets.either(
+                        last.get(state, sets.none), sets.both(markings, steps.into(self.product.edges[state]))
+                    )
                     for state, markings in within.items()
                 }
             )
@@ -212,7 +215,8 @@ def accepted_run(product: Product[S], fair: Pairs[S], leading: Pairs[S]) -> Run:
     while True:
         begin, anchor = len(walk.fired), (walk.marking, walk.state)
         for mark in range(product.n_marks) or (None,):
-            if not walk.go({q: sets.both(of, product.step(q, inside, mark)) for q, of in inside.items()}, inside):
+            steps = Steps(product, inside)
+            if not walk.go({q: sets.both(of, steps.into(product.edges[q], mark)) for q, of in inside.items()}, inside):
                 raise WitnessError("a mark of the automaton is not met again")
             walk.step(inside, mark)
         home = {anchor[1]: sets.both(sets.of_marking(anchor[0]), inside[anchor[1]])}

@@ -18,7 +18,7 @@ has no counterpart on a decision diagram, and markings one by one are slow in Py
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Generic, TypeVar
 
@@ -67,27 +67,6 @@ class Product(Generic[S]):
             rows.append(tuple(row))
         return cls(sets, tuple(rows), automaton.n_marks)
 
-    def back(self, edge: ProductEdge[S], pairs: Pairs[S], seen: dict[object, S]) -> S:
-        """The markings from which the edge leads into the pairs; `seen` remembers steps back to the same set."""
-        targets = pairs.get(edge.target)
-        if targets is None:
-            return self.sets.none
-        if self.sets.space.deadline.over:
-            raise TimeEndedError
-        key = (edge.target, edge.by)
-        if key not in seen:
-            seen[key] = self.sets.before(targets, edge.by)
-        before = seen[key]
-        if edge.stutters:
-            before = self.sets.either(before, self.sets.both(self.sets.space.deadlocks, targets))
-        return self.sets.both(edge.markings, before)
-
-    def step(self, state: int, pairs: Pairs[S], mark: int | None = None) -> S:
-        """The markings with which the state has an edge (with the mark, if it is given) into the pairs."""
-        seen: dict[object, S] = {}
-        edges = (edge for edge in self.edges[state] if mark is None or mark in edge.marks)
-        return self.sets.either(*(self.back(edge, pairs, seen) for edge in edges))
-
     @cached_property
     def parts(self) -> tuple[tuple[int, ...], ...]:
         """The strongly connected parts of the automaton, each after all that it leads to."""
@@ -95,40 +74,49 @@ class Product(Generic[S]):
 
     def reaching(self, goal: Pairs[S], within: Pairs[S] | None = None) -> Pairs[S]:
         """The pairs from which a pair of the goal can be reached, going only through `within`."""
-        found: Pairs[S] = {}
+        found = Steps(self, {})
         for part in self.parts:
-            inside = [state for state in part if within is None or state in within]
-            for state in inside:
-                found[state] = goal.get(state, self.sets.none)
-            waiting = dict.fromkeys(inside)
-            while waiting:
-                state = next(iter(waiting))
-                del waiting[state]
-                old = self.sets.space.count(found[state])
-                base = self.sets.either(found[state], self._within(state, self.step(state, found), within))
-                found[state] = self._through(state, base, within)
-                if self.sets.space.count(found[state]) != old:
-                    others = (s for s in inside if any(edge.target == state for edge in self.edges[s]))
-                    waiting.update(dict.fromkeys(others))
-        return found
+            states = [state for state in part if within is None or state in within]
+            self._close(found, states, {state: goal.get(state, self.sets.none) for state in states}, within)
+        return found.pairs
 
-    def _within(self, state: int, markings: S, within: Pairs[S] | None) -> S:
-        return markings if within is None else self.sets.both(markings, within[state])
+    def _close(
+        self, found: Steps[S], states: Iterable[int], goal: Pairs[S], within: Pairs[S] | None, *, inside: bool = False
+    ) -> None:
+        """Add to what is found the pairs of these states that lead to the goal or to what is found already.
+
+        With `inside` they lead there by edges between these states alone.
+        """
+        part = set(states)
+        edges = {q: [edge for edge in self.edges[q] if not inside or edge.target in part] for q in part}
+        for state in part:
+            found.put(state, goal[state])
+        waiting = dict.fromkeys(states)
+        while waiting:
+            state = next(iter(waiting))
+            del waiting[state]
+            old, steps = found.pairs[state], found.into(edges[state])
+            base = self.sets.either(old, steps if within is None else self.sets.both(steps, within[state]))
+            new = self._through(state, base, within)
+            if self.sets.space.count(new) != self.sets.space.count(old):
+                found.put(state, new)
+                waiting.update(dict.fromkeys(q for q in part if any(edge.target == state for edge in edges[q])))
 
     def _through(self, state: int, targets: S, within: Pairs[S] | None) -> S:
         """The markings that lead to the targets while the automaton stays in the state, whatever fires."""
         own = [edge.markings for edge in self.edges[state] if edge.target == state and edge.by is None]
         if not own:
             return targets
-        return self.sets.until(self._within(state, self.sets.either(*own), within), targets)
+        through = self.sets.either(*own)
+        return self.sets.until(through if within is None else self.sets.both(through, within[state]), targets)
 
     def fair(self) -> Pairs[S]:
         """The pairs from which a run can be accepted without leaving its part of the automaton."""
         found: Pairs[S] = {}
         for part in self.parts:
             inside = set(part)
-            own = [(state, edge) for state in part for edge in self.edges[state] if edge.target in inside]
-            if own and all(any(mark in edge.marks for _, edge in own) for mark in range(self.n_marks)):
+            own = [edge for state in part for edge in self.edges[state] if edge.target in inside]
+            if own and all(any(mark in edge.marks for edge in own) for mark in range(self.n_marks)):
                 pairs = self._fair_in(part)
                 found.update({state: markings for state, markings in pairs.items() if not self.sets.empty(markings)})
         return found
@@ -142,41 +130,58 @@ class Product(Generic[S]):
             pairs = {part[0]: self.sets.always(pairs[part[0]])}  # all that can stay in the state for ever
             if all(edge.marks == every for edge in own[part[0]]):
                 return pairs
-        marks = [
-            mark for mark in range(self.n_marks) if any(mark not in e.marks for edges in own.values() for e in edges)
-        ]
+        missing = [mark for mark in every if any(mark not in edge.marks for edges in own.values() for edge in edges)]
         size = -1
         while (now := sum(map(self.sets.space.count, pairs.values()))) != size:
             size = now
-            for mark in marks:
-                goal = {state: self._marked_step(state, own[state], pairs, mark) for state in part}
-                pairs = self._closed(part, own, goal, pairs)
-            if not marks:
-                pairs = {state: self._marked_step(state, own[state], pairs, None) for state in part}
+            for mark in missing:
+                closed = Steps(self, {})
+                self._close(closed, part, self._step(own, pairs, mark), pairs, inside=True)
+                pairs = closed.pairs
+            if not missing:
+                pairs = self._step(own, pairs, None)
         return pairs
 
-    def _marked_step(self, state: int, own: list[ProductEdge[S]], pairs: Pairs[S], mark: int | None) -> S:
-        seen: dict[object, S] = {}
-        steps = (self.back(edge, pairs, seen) for edge in own if mark is None or mark in edge.marks)
-        return self.sets.both(self.sets.either(*steps), pairs[state])
+    def _step(self, own: dict[int, list[ProductEdge[S]]], pairs: Pairs[S], mark: int | None) -> Pairs[S]:
+        steps = Steps(self, pairs)
+        return {q: self.sets.both(steps.into(own[q], mark), markings) for q, markings in pairs.items()}
 
-    def _closed(
-        self, part: tuple[int, ...], own: dict[int, list[ProductEdge[S]]], goal: Pairs[S], within: Pairs[S]
-    ) -> Pairs[S]:
-        """The pairs of the part from which the goal can be reached within the part and these pairs."""
-        found = dict(goal)
-        waiting = dict.fromkeys(part)
-        while waiting:
-            state = next(iter(waiting))
-            del waiting[state]
-            old = self.sets.space.count(found[state])
-            seen: dict[object, S] = {}
-            steps = self.sets.either(*(self.back(edge, found, seen) for edge in own[state]))
-            base = self.sets.either(found[state], self.sets.both(steps, within[state]))
-            found[state] = self._through(state, base, within)
-            if self.sets.space.count(found[state]) != old:
-                waiting.update(dict.fromkeys(s for s in part if any(edge.target == state for edge in own[s])))
-        return found
+
+@dataclass
+class Steps(Generic[S]):
+    """Pairs, and one step back into them; the step to a set is found once as long as the set stays."""
+
+    product: Product[S]
+    pairs: Pairs[S]
+    _before: dict[tuple[int, frozenset[int] | None], S] = field(default_factory=dict)
+
+    def put(self, state: int, markings: S) -> None:
+        """Let the state be paired with these markings."""
+        self.pairs[state] = markings
+        for key in [key for key in self._before if key[0] == state]:
+            del self._before[key]
+
+    def into(self, edges: Iterable[ProductEdge[S]], mark: int | None = None) -> S:
+        """The markings from which one of the edges (with the mark, if it is given) leads into the pairs.
+
+        Raises `TimeEndedError` where the deadline of the space comes.
+        """
+        sets = self.product.sets
+        found = []
+        for edge in edges:
+            targets = self.pairs.get(edge.target)
+            if targets is None or (mark is not None and mark not in edge.marks):
+                continue
+            if sets.space.deadline.over:
+                raise TimeEndedError
+            key = (edge.target, edge.by)
+            if key not in self._before:
+                self._before[key] = sets.before(targets, edge.by)
+            step = self._before[key]
+            if edge.stutters:
+                step = sets.either(step, sets.both(sets.space.deadlocks, targets))
+            found.append(sets.both(edge.markings, step))
+        return sets.either(*found)
 
 
 def _where(sets: Sets[S], atoms: Iterable[Formula]) -> S:

@@ -11,6 +11,7 @@ from support.temporal_formulas import ctl_formulas, ltl_formulas
 
 from firable.analysis.spaces.reachability import Column, ReachabilityGraph, explore, indexes
 from firable.analysis.spaces.space import StateSpace
+from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.temporal.ctl import Ctl
 from firable.analysis.temporal.lasso import Run, accepted_run, satisfies, witness_of
 from firable.analysis.temporal.ltl import refuting
@@ -168,6 +169,18 @@ def test_a_formula_and_its_negation_are_not_both_refuted_by_one_run_nor_both_kep
     space = Sets(NaiveSpace(net))
     kept = [refuting(space, one) is None for one in (formula, negated(formula))]
     assert kept != [True, True]  # there is a run
+
+
+@settings(max_examples=25)
+@given(st.data(), ring_nets())
+def test_the_decision_diagram_answers_like_the_definitions(data: st.DataObject, net: Net) -> None:
+    places, transitions = names(net)
+    naive, diagram = NaiveSpace(net), explore_symbolically(net)
+    for formulas in (ctl_formulas(places, transitions), ltl_formulas(places, transitions)):
+        query = Query.of("q", data.draw(formulas))
+        expected, found = answer(naive, query), answer(diagram, query)
+        assert found.status is expected.status
+        assert (found.witness is None) == (expected.witness is None)
 
 
 LAWS = [
