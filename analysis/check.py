@@ -116,12 +116,20 @@ class _Check:
     def by(self, method: Method) -> CheckReport:
         """The report of one technique: what it does not decide stays unknown."""
         if method in SPACES:
-            space = SPACES[method].load()(self.net, Limits(self.deadline, self.budget.memory_bytes))
-            return _told(self._report(space), [f"{SPACES[method].words}: {_size(space)}"])
-        nothing = self._explore(replace(self.budget, markings=1))
+            words = SPACES[method].words
+            try:
+                space = SPACES[method].load()(self.net, Limits(self.deadline, self.budget.memory_bytes))
+            except BudgetExceeded as error:
+                return _told(self._report(self._nothing()), [f"{words} gave up: {error}"])
+            return _told(self._report(space), [f"{words}: {_size(space)}"])
+        nothing = self._nothing()
         knowers, lanes = ((method,) if method in KNOWERS else ()), (((method,),) if method in GOALS else ())
         words = (KNOWERS | GOALS)[method].words
         return self._settled(self._report(nothing), knowers, lanes, [f"{words}, and nothing else"])
+
+    def _nothing(self) -> ReachabilityGraph:
+        """A space of M0 alone, of which nothing is concluded but what holds of M0."""
+        return self._explore(replace(self.budget, markings=1))
 
     def _report(self, space: StateSpace[Any]) -> CheckReport:
         """The report on a space; Ctrl-C leaves unknown what is not decided yet, and twice ends all."""

@@ -334,7 +334,8 @@ pub(crate) fn explore_symbolically(
     }
     let n_transitions = transitions.len();
     let space = answered(py, &patience, |watch| {
-        let transitions = transitions.iter().map(|(i, o, p, h, x)| Transition::new(i, o, p, h, x)).collect();
+        // Each row is freed as it is read: half a million of them take as much as the diagram.
+        let transitions = transitions.into_iter().map(|(i, o, p, h, x)| Transition::new(&i, &o, &p, &h, &x)).collect();
         Symbolic::explore(n_places, transitions, initial, max_memory_bytes, orders, watch)
     })?;
     let n_nodes = space.nodes;

@@ -2,7 +2,7 @@
 //!
 //! Ten thousand machines have more markings than there are atoms, and yet a diagram of a few nodes for each place. Here
 //! is the method for such nets: zero-suppressed decision diagrams (`zdd`, `algebra`, `cache`), one place a level in an
-//! order that keeps neighbours together (`order`), transitions as lists of literals (`events`), reachability by
+//! order that keeps neighbours together (`order`, `race`), transitions as lists of literals (`events`), reachability by
 //! saturation (`saturation`), one step of all transitions (`image`), exact numbers (`count`), firing sequences (`walk`),
 //! and what is found of a net as one value (`space`).
 //!
@@ -17,6 +17,7 @@ pub mod count;
 pub mod events;
 pub mod image;
 pub mod order;
+pub mod race;
 pub mod saturation;
 pub mod space;
 pub mod walk;

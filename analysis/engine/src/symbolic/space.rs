@@ -1,19 +1,15 @@
 //! The markings that a net reaches, as a diagram, and the operators of temporal logic on its sets.
 //!
-//! Which order of places is good shows only in the search. So the candidates race: each searches for some steps, then the
-//! next one; who has come less far up the levels drops out, and the steps are doubled, until two are left, of which
-//! the second gets less. A saturation has its own stack and can be left and gone on with, so nothing is done twice, and
-//! the race costs about two or three times the search of the winner, against a good chance to be a thousand times faster.
-//! Where memory becomes short, the largest search is given up first.
-
-use std::cmp::Reverse;
+//!
+//! An operation that ends for want of memory is tried once more with the garbage gone. The nodes in use are the caller's to
+//! name, as it is the caller who knows which sets are still wanted.
 
 use super::algebra::{Binary, Diagram};
 use super::cache::ANY;
 use super::count::{self, Natural};
 use super::events::{Sense, Suffix, Suffixes, Table, contact_literals, literals};
 use super::image::{All, image};
-use super::order::{Order, candidates};
+use super::order::Order;
 use super::saturation::{Saturation, Workshop};
 use super::zdd::{EMPTY, Node};
 use crate::budget::{Memory, Stop, Watch};
@@ -34,14 +30,14 @@ pub enum Events {
 
 /// An order of places, and the diagram in it.
 #[derive(Debug)]
-struct Ordered {
+pub(super) struct Ordered {
     /// The level of each place.
     level_of: Vec<u32>,
     /// The place of each level but 0.
     place_at: Vec<u32>,
-    diagram: Diagram,
-    suffixes: Suffixes,
-    tables: [Option<Table>; 4],
+    pub(super) diagram: Diagram,
+    pub(super) suffixes: Suffixes,
+    pub(super) tables: [Option<Table>; 4],
     claimed: usize,
 }
 
@@ -63,14 +59,9 @@ pub struct Symbolic {
     pub nodes: usize,
 }
 
-const FUEL: u64 = 1 << 16;
-const FUEL_PER_LEVEL: u64 = 64;
-/// The searches that are kept to the end, and how many times less than the first of them the second one gets.
-const FINALISTS: usize = 2;
-const RUNNER_UP: u64 = 4;
-
 impl Ordered {
-    fn new(places: usize, transitions: &[Transition], order: &Order, bytes: usize) -> Result<Self, Stop> {
+    /// An empty diagram, and the firings in it.
+    pub(super) fn new(places: usize, transitions: &[Transition], order: &Order, bytes: usize) -> Result<Self, Stop> {
         let mut level_of = vec![0; places];
         let mut place_at = vec![0; places + 1];
         for (at, &place) in order.iter().enumerate() {
@@ -84,7 +75,7 @@ impl Ordered {
         Ok(ordered)
     }
 
-    fn levels(&self) -> u32 {
+    pub(super) fn levels(&self) -> u32 {
         self.level_of.len() as u32
     }
 
@@ -134,7 +125,7 @@ impl Ordered {
         literals(transition, &self.level_of, sense).map(|found| self.suffixes.whole(&found)).transpose()
     }
 
-    fn single(&mut self, marked: &[u32]) -> Result<Node, Stop> {
+    pub(super) fn single(&mut self, marked: &[u32]) -> Result<Node, Stop> {
         let mut levels: Vec<u32> = marked.iter().map(|&place| self.level_of[place as usize]).collect();
         levels.sort_unstable();
         levels.dedup();
@@ -142,92 +133,9 @@ impl Ordered {
     }
 }
 
-/// A search in one order, which may be left and gone on with.
-struct Racer {
-    order: Order,
-    begun: Option<(Ordered, Saturation, Node)>,
-}
-
-impl Racer {
-    fn bytes(&self) -> usize {
-        self.begun.as_ref().map_or(0, |(ordered, ..)| ordered.diagram.store.memory.used())
-    }
-
-    /// Levels done (more is better), and nodes made.
-    fn standing(&self) -> (Reverse<u32>, usize) {
-        self.begun.as_ref().map_or((Reverse(0), 0), |(ordered, search, _)| {
-            (Reverse(search.reached(&ordered.diagram)), ordered.diagram.store.used())
-        })
-    }
-
-    fn run(
-        &mut self,
-        transitions: &[Transition],
-        initial: &[u32],
-        room: usize,
-        fuel: u64,
-        watch: &mut Watch<'_>,
-    ) -> Result<Option<Node>, Stop> {
-        let (ordered, search, start) = match &mut self.begun {
-            Some(begun) => begun,
-            none => {
-                let mut ordered = Ordered::new(self.order.len(), transitions, &self.order, room)?;
-                let start = ordered.single(initial)?;
-                let search = Saturation::new(&ordered.diagram, start, ANY, ordered.levels(), false)?;
-                none.insert((ordered, search, start))
-            }
-        };
-        ordered.diagram.store.memory.allow(room);
-        let Ordered { diagram, suffixes, tables, .. } = ordered;
-        let Some(table) = &tables[Events::Forward as usize] else { return Ok(None) };
-        search.run(&mut Workshop { diagram, suffixes, table, roots: &[*start] }, fuel, watch)
-    }
-}
-
 impl Symbolic {
-    /// The reachable markings, or why they were not found; `orders` replaces the candidates of `order`.
-    pub fn explore(
-        places: usize,
-        transitions: Vec<Transition>,
-        initial: Vec<u32>,
-        bytes: usize,
-        orders: Option<Vec<Order>>,
-        watch: &mut Watch<'_>,
-    ) -> Result<Self, Stop> {
-        let orders = orders.unwrap_or_else(|| candidates(places, &transitions));
-        let mut field: Vec<Racer> = orders.into_iter().map(|order| Racer { order, begun: None }).collect();
-        let mut fuel = FUEL + FUEL_PER_LEVEL * places as u64;
-        while !field.is_empty() {
-            let mut at = 0;
-            while at < field.len() {
-                let others: usize = field.iter().map(Racer::bytes).sum::<usize>() - field[at].bytes();
-                let share = if at > 0 && field.len() <= FINALISTS { fuel / RUNNER_UP } else { fuel };
-                match field[at].run(&transitions, &initial, bytes.saturating_sub(others), share, watch) {
-                    Ok(Some(reach)) => {
-                        if let Some(begun) = field.swap_remove(at).begun {
-                            drop(field);
-                            return Ok(Self::found(begun, transitions, initial, reach, bytes));
-                        }
-                    }
-                    Ok(None) => at += 1,
-                    Err(Stop::Memory) => {
-                        // It stopped within a step. If another one is larger, that gives way and this begins again.
-                        let largest = (0..field.len()).max_by_key(|&other| field[other].bytes()).unwrap_or(at);
-                        field[at].begun = None;
-                        field.remove(largest);
-                        at -= usize::from(largest < at);
-                    }
-                    Err(stop) => return Err(stop),
-                }
-            }
-            field.sort_by_key(Racer::standing);
-            field.truncate(FINALISTS.max(field.len() / 2));
-            fuel *= 2;
-        }
-        Err(Stop::Memory)
-    }
-
-    fn found(
+    /// The space of a search that has ended.
+    pub(super) fn found(
         (mut ordered, search, start): (Ordered, Saturation, Node),
         transitions: Vec<Transition>,
         initial: Vec<u32>,
