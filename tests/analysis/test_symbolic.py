@@ -1,0 +1,171 @@
+"""The symbolic state space: sizes that no table holds, its budget, its sets as values, and its firing sequences."""
+
+from __future__ import annotations
+
+import threading
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from support.ring_nets import ring_nets
+
+from firable.analysis import _engine
+from firable.analysis._engine import BudgetExceeded
+from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Limits
+from firable.analysis.spaces.reachability import explore
+from firable.analysis.spaces.symbolic import decide_by_diagram, explore_symbolically
+from firable.nets.catalogue.families import FAMILIES, family_net
+from firable.nets.formula import parse_formula
+from firable.nets.net import Net, Place, Transition
+from firable.semantics.player import Player
+
+SIZES = {
+    "philosophers": (300,),
+    "philosophers_either": (300,),
+    "machines": (500,),
+    "interlocked": (300,),
+    "token_ring": (100,),
+    "counter": (60,),
+    "pipeline": (500,),
+    "grid": (4,),
+    "manufacturing_cells": (100,),
+    "vehicles": (3,),
+}
+
+
+@pytest.mark.parametrize("family", SIZES)
+def test_a_family_has_as_many_markings_as_its_formula_says(family: str) -> None:
+    formula, size = FAMILIES[family].markings, SIZES[family]
+    assert formula is not None
+    assert explore_symbolically(FAMILIES[family].net(*size)).n_markings == formula(*size)
+
+
+def test_the_slotted_ring_has_the_published_number_of_markings() -> None:
+    assert explore_symbolically(family_net("slotted_ring-10")).n_markings == 8_291_791_872
+
+
+def test_edges_are_counted_beyond_a_machine_word() -> None:
+    n = 200  # each machine starts or ends in every marking
+    space = explore_symbolically(family_net(f"machines-{n}"))
+    assert space.n_edges == n * 2**n
+
+
+def test_one_net_has_one_answer() -> None:
+    net = family_net("philosophers-40")
+    first, second = explore_symbolically(net), explore_symbolically(net)
+    assert first.engine.order == second.engine.order
+    assert first.witness(first.deadlocks) == second.witness(second.deadlocks)
+
+
+def test_the_order_of_the_places_changes_no_answer() -> None:
+    gate = [(0, True)]
+    rows = [([i], [(i + 1) % 6], list[int](), list[int](), gate if i == 3 else []) for i in range(6)]
+    orders = [list(range(6)), [3, 0, 5, 1, 4, 2], [5, 4, 3, 2, 1, 0]]
+    for order in orders:
+        diagram = _engine.explore_symbolically(6, rows, [0, 3], max_memory_bytes=1 << 20, orders=[order])
+        assert diagram.order == order
+        assert diagram.reach().count() == 15
+        assert diagram.reach().contains([1, 2])
+        assert not diagram.reach().contains([1])
+
+
+@pytest.mark.parametrize("orders", [[], [[0]], [[0, 0]], [[0, 1, 2]]])
+def test_what_is_no_order_is_refused(orders: list[list[int]]) -> None:
+    with pytest.raises(ValueError, match="order"):
+        _engine.explore_symbolically(2, [], [], max_memory_bytes=1 << 20, orders=orders)
+
+
+def test_a_place_out_of_range_is_refused() -> None:
+    with pytest.raises(ValueError, match="place 2"):
+        _engine.explore_symbolically(2, [([2], [], [], [], [])], [], max_memory_bytes=1 << 20)
+    diagram = _engine.explore_symbolically(2, [], [], max_memory_bytes=1 << 20)
+    with pytest.raises(IndexError):
+        diagram.having(diagram.reach(), [2], [])
+    with pytest.raises(IndexError):
+        diagram.before(diagram.reach(), [0])
+
+
+def test_a_budget_that_ends_is_no_answer() -> None:
+    net = family_net("slotted_ring-60")
+    with pytest.raises(BudgetExceeded, match="memory"):
+        explore_symbolically(net, Limits(memory_bytes=200_000))
+    with pytest.raises(BudgetExceeded, match="seconds"):
+        explore_symbolically(net, Limits(Deadline.after(0.01)))
+    goal = parse_formula("deadlock")
+    found = decide_by_diagram(net, goal, Limits(memory_bytes=200_000))
+    assert (found.reachable, found.witness) == (None, None)
+    assert "memory" in found.bound
+
+
+def test_whoever_no_longer_needs_the_answer_ends_the_search() -> None:
+    over = threading.Event()
+    threading.Timer(0.05, over.set).start()
+    with pytest.raises(BudgetExceeded, match="cancelled"):
+        explore_symbolically(family_net("vehicles-20-64"), Limits(Deadline(cancelled=over)))
+
+
+def test_a_space_may_be_asked_under_another_deadline() -> None:
+    space = explore_symbolically(family_net("philosophers-100"))
+    late = space.until(Deadline.after(0))
+    with pytest.raises(BudgetExceeded):
+        late.backward(late.engine.forward(late.deadlocks) | late.initial)
+    again = late.until(Deadline())
+    assert again.backward(again.deadlocks) == again.reach
+
+
+def test_a_goal_is_decided_with_a_firing_sequence_that_replays() -> None:
+    net = family_net("philosophers-6")
+    found = decide_by_diagram(net, parse_formula("p1.eating and p3.eating and p5.eating"), Limits())
+    assert found.reachable
+    assert found.witness is not None
+    assert {"p1.eating", "p3.eating", "p5.eating"} <= set(found.witness.marking)
+    refuted = decide_by_diagram(net, parse_formula("p1.eating and p2.eating"), Limits())
+    assert (refuted.reachable, refuted.witness) == (False, None)
+
+
+def test_a_deadlock_many_firings_away_is_walked_to() -> None:
+    net = family_net("philosophers-400")
+    space = explore_symbolically(net)
+    witness = space.witness(space.deadlocks)
+    assert witness is not None
+    assert len(witness.firings) == 400
+    assert Player(net).deadlocked(net.marking(witness.marking))
+
+
+@given(net=ring_nets(signals=True))
+def test_near_firing_sequences_are_shortest(net: Net) -> None:
+    graph, space = explore(net), explore_symbolically(net)
+    for place in range(len(net.places)):
+        shortest, found = graph.witness(graph.marked(place)), space.witness(space.marked(place))
+        assert (found is None) == (shortest is None)
+        if found is not None and shortest is not None:
+            assert len(found.firings) == len(shortest.firings)
+
+
+def test_sets_are_values() -> None:
+    space = explore_symbolically(family_net("machines-4"))
+    first, second = space.marked(0), space.marked(2)
+    assert first & second == second & first
+    assert hash(first & second) == hash(second & first)
+    assert (first | second) - first == second - first
+    assert first ^ second == (first | second) - (first & second)
+    assert first != second
+    assert not first - space.reach
+    assert len({first, second, space.marked(0)}) == 2
+    other = explore_symbolically(family_net("machines-4"))
+    assert first != other.marked(0)
+    with pytest.raises(TypeError):
+        first & other.marked(0)
+    with pytest.raises(TypeError):
+        other.engine.backward(first)
+
+
+def test_a_chain_of_twenty_thousand_places_needs_no_deep_stack() -> None:
+    names = [f"p{i}" for i in range(20_000)]
+    moves = tuple(Transition(f"t{i}", (a,), (b,)) for i, (a, b) in enumerate(pairwise(names)))
+    net = Net("chain", tuple(Place(name, marked=name == "p0") for name in names), moves)
+    space = explore_symbolically(net)
+    assert space.n_markings == len(names)
+    assert space.count(space.deadlocks) == 1
+    assert space.backward(space.deadlocks) == space.reach
