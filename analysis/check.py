@@ -26,7 +26,7 @@ from typing import Any, Final, TypeVar
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Finding, Limits
-from firable.analysis.methods import GOAL_LANES, GOALS, KNOWERS, SPACES, Method, SpaceMethod
+from firable.analysis.methods import GOAL_LANES, GOALS, KNOWERS, SPACES, Method, Technique
 from firable.analysis.question import Answer, Question, no, yes
 from firable.analysis.race import Contestant, Outcome, race
 from firable.analysis.report import CheckReport, report_on
@@ -269,7 +269,7 @@ def _decided(of: Method, net: Net, formula: Formula, limits: Limits) -> Finding 
     return found
 
 
-def _held(of: SpaceMethod, net: Net, limits: Limits) -> StateSpace[Any]:
+def _held(of: Technique[Callable[[Net, Limits], StateSpace[Any]]], net: Net, limits: Limits) -> StateSpace[Any]:
     space = of.load()(net, limits)
     space.require_complete()
     return space

@@ -1,4 +1,4 @@
-"""A net and a goal as the engine takes them: rows of indexes, and a formula in negation normal form.
+"""A net, a goal and a deadline as the engine takes them: rows of indexes, a formula in negation normal form, seconds.
 
 The engine knows no atoms but "this place is full" and "this place is empty". What is firable, a deadlock, the start or
 so many tokens comes to it as a formula over these, which `semantics.formulas` evaluates in an algebra of nodes; so the
@@ -12,8 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
+from firable.analysis.deadline import Deadline
 from firable.nets.formula import And, Formula, Not, Or
 from firable.nets.net import Net
 from firable.semantics.formulas import evaluate
@@ -48,6 +49,12 @@ def rows(net: Net) -> tuple[int, list[Row], list[int]]:
         for transition in net.transitions
     ]
     return len(net.places), transitions, [i for i, of in enumerate(net.places) if of.marked]
+
+
+def engine_limits(deadline: Deadline) -> dict[str, Any]:
+    """What ends the engine's long work, as the keywords of its functions: the seconds left, and who else may end it."""
+    flag = deadline.cancelled
+    return {"max_seconds": deadline.left_seconds, "cancelled": None if flag is None else flag.is_set}
 
 
 Pair = tuple[int, int]

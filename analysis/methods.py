@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 if TYPE_CHECKING:  # the command line reads this table for its help, and so loads nothing with it
     from firable.analysis.goal import Finding, Limits
@@ -41,71 +41,44 @@ class Method(StrEnum):
     WALK = "walk"
 
 
+F = TypeVar("F")
+
+
 @dataclass(frozen=True, slots=True)
-class GoalMethod:
-    """A technique that decides goals: what it is in words, and where it is (`module:function`)."""
+class Technique(Generic[F]):
+    """A technique: what it is in words, and where its function of type `F` is (`module:function`)."""
 
     words: str
     at: str
 
-    def load(self) -> GoalDecider:
+    def load(self) -> F:
         """The function itself."""
-        decide: GoalDecider = _loaded(self.at)
-        return decide
+        module, _, name = self.at.partition(":")
+        function: F = getattr(import_module(module), name)
+        return function
 
 
-@dataclass(frozen=True, slots=True)
-class SpaceMethod:
-    """A technique that holds all markings: what it is in words, and where it is (`module:function`)."""
-
-    words: str
-    at: str
-
-    def load(self) -> SpaceMaker:
-        """The function itself."""
-        make: SpaceMaker = _loaded(self.at)
-        return make
-
-
-@dataclass(frozen=True, slots=True)
-class KnowingMethod:
-    """A technique that knows verdicts at once: what it is in words, and where it is (`module:function`)."""
-
-    words: str
-    at: str
-
-    def load(self) -> Knower:
-        """The function itself."""
-        know: Knower = _loaded(self.at)
-        return know
-
-
-def _loaded(at: str) -> Any:
-    module, _, name = at.partition(":")
-    return getattr(import_module(module), name)
-
-
-SPACES: Final[dict[Method, SpaceMethod]] = {
-    Method.SYMBOLIC: SpaceMethod("decision diagram", "firable.analysis.spaces.symbolic:explore_symbolically"),
+SPACES: Final[dict[Method, Technique[SpaceMaker]]] = {
+    Method.SYMBOLIC: Technique("decision diagram", "firable.analysis.spaces.symbolic:explore_symbolically"),
 }
 
-KNOWERS: Final[dict[Method, KnowingMethod]] = {
-    Method.STRUCTURE: KnowingMethod("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),
-    Method.STUBBORN_SETS: KnowingMethod("stubborn sets, at large", "firable.analysis.stubborn:known_firings"),
+KNOWERS: Final[dict[Method, Technique[Knower]]] = {
+    Method.STRUCTURE: Technique("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),
+    Method.STUBBORN_SETS: Technique("stubborn sets, at large", "firable.analysis.stubborn:known_firings"),
 }
 
-GOALS: Final[dict[Method, GoalMethod]] = {
-    Method.REDUCTION: GoalMethod(
+GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
+    Method.REDUCTION: Technique(
         "stubborn sets on the reduced net", "firable.analysis.reduction.deciding:decide_by_reduction"
     ),
-    Method.STATE_EQUATION: GoalMethod(
+    Method.STATE_EQUATION: Technique(
         "state equation", "firable.analysis.structure.state_equation:decide_by_state_equation"
     ),
-    Method.BOUNDED: GoalMethod("bounded model checking", "firable.analysis.induction.bounded:decide_by_bounded_search"),
-    Method.K_INDUCTION: GoalMethod("k-induction", "firable.analysis.induction.k_induction:decide_by_k_induction"),
-    Method.PDR: GoalMethod("property-directed reachability", "firable.analysis.induction.pdr:decide_by_pdr"),
-    Method.STUBBORN_SETS: GoalMethod("stubborn sets", "firable.analysis.stubborn:decide_by_stubborn_sets"),
-    Method.WALK: GoalMethod("random walk", "firable.analysis.walk:decide_by_walk"),
+    Method.BOUNDED: Technique("bounded model checking", "firable.analysis.induction.bounded:decide_by_bounded_search"),
+    Method.K_INDUCTION: Technique("k-induction", "firable.analysis.induction.k_induction:decide_by_k_induction"),
+    Method.PDR: Technique("property-directed reachability", "firable.analysis.induction.pdr:decide_by_pdr"),
+    Method.STUBBORN_SETS: Technique("stubborn sets", "firable.analysis.stubborn:decide_by_stubborn_sets"),
+    Method.WALK: Technique("random walk", "firable.analysis.walk:decide_by_walk"),
 }
 
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (

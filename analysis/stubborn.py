@@ -26,10 +26,10 @@ from time import perf_counter
 from typing import Any, Final
 
 from firable.analysis._engine import BudgetExceeded, Search, Stubborn
-from firable.analysis.compiled import nodes_of, rows
+from firable.analysis.compiled import engine_limits, nodes_of, rows
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.question import Known, no, yes
-from firable.analysis.spaces.reachability import REASONS, engine_limits
+from firable.analysis.spaces.reachability import REASONS
 from firable.analysis.spaces.space import Witnesses
 from firable.nets.formula import Deadlock, Formula
 from firable.nets.net import Net

@@ -16,9 +16,8 @@ from time import perf_counter
 from typing import Final
 
 from firable.analysis._engine import Stubborn
-from firable.analysis.compiled import nodes_of, rows
+from firable.analysis.compiled import engine_limits, nodes_of, rows
 from firable.analysis.goal import Finding, Limits
-from firable.analysis.spaces.reachability import engine_limits
 from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.nets.formula import Deadlock, Formula
 from firable.nets.net import Net

@@ -17,6 +17,7 @@ from typing import Final
 from measuring import Table, against, example, spread, timed
 
 from firable.analysis import _engine
+from firable.analysis.compiled import rows
 from firable.nets.catalogue import FAMILIES, family_net
 from firable.nets.net import Net, Place
 
@@ -24,8 +25,6 @@ MEMORY_BYTES_MAX: Final = 8 << 30
 LIMIT_GOALS: Final = {1: 1.0, 2: 1.0, 4: 2.0, 8: 2.0}
 HASHBROWN_GOAL, STD_GOAL, BYTES_GOAL = 2.0, 4.0, 16.0
 EDGE_STORE_GOAL_NS, COMPONENT_GOAL = 15.0, 1.3
-
-Row = tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]
 
 
 @dataclass(frozen=True)
@@ -57,38 +56,21 @@ SUBJECTS: Final = (
 STEP_SUBJECTS: Final = (Subject("machines-11"), Subject("grid-4"), Subject("manufacturing_cells-6"))
 
 
-def rows_of(net: Net) -> list[Row]:
-    """The transitions as the engine takes them."""
-    place, signal = net.place_index, net.signal_index
-    return [
-        (
-            [place[name] for name in t.inputs],
-            [place[name] for name in t.outputs],
-            [place[name] for name in t.permissive],
-            [place[name] for name in t.inhibitive],
-            [(signal[gate.signal], gate.wanted) for gate in t.external],
-        )
-        for t in net.transitions
-    ]
-
-
 def text_of(net: Net) -> str:
     """The net as the plain explorer reads it."""
-    marked = [i for i, place in enumerate(net.places) if place.marked]
-    lines = [" ".join(map(str, [len(net.places), *marked]))]
-    lines += [";".join(" ".join(map(str, part)) for part in row[:4]) for row in rows_of(net)]
+    n_places, transitions, marked = rows(net)
+    lines = [" ".join(map(str, [n_places, *marked]))]
+    lines += [";".join(" ".join(map(str, part)) for part in row[:4]) for row in transitions]
     return "\n".join(lines)
 
 
 def explorer(net: Net, *, step: bool = False) -> Callable[[], _engine.Graph]:
     """What explores a net, with all that goes before it done; the graph must be complete."""
-    rows, marked = rows_of(net), [i for i, place in enumerate(net.places) if place.marked]
+    compiled = rows(net)
 
     def explore() -> _engine.Graph:
         graph = _engine.explore(
-            len(net.places),
-            rows,
-            marked,
+            *compiled,
             step=step,
             max_markings=1 << 30,
             max_memory_bytes=MEMORY_BYTES_MAX,

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
-from firable.analysis.compiled import rows
+from firable.analysis.compiled import engine_limits, rows
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.spaces.space import Derived, Witnesses
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -339,12 +339,6 @@ def explore(
         message = f"the budget of {budget.memory_bytes:,} bytes does not hold the net itself, let alone its markings"
         raise InputError([Diagnostic("F3004", message, "give it a larger budget of memory")]) from None
     return ReachabilityGraph(net, discipline, budget, graph, deadline)
-
-
-def engine_limits(deadline: Deadline) -> dict[str, Any]:
-    """A deadline as the engine's functions take it."""
-    flag = deadline.cancelled
-    return {"max_seconds": deadline.left_seconds, "cancelled": None if flag is None else flag.is_set}
 
 
 def _explored(

@@ -23,8 +23,9 @@ from typing import Any
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, MarkingSet
+from firable.analysis.compiled import engine_limits, rows
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.goal import Finding, Limits
+from firable.analysis.goal import Limits
 from firable.analysis.spaces.space import Derived, Witnesses
 from firable.nets.formula import And, Deadlock, Firable, Formula, Not, Or, Start
 from firable.nets.net import Marking, Net
@@ -57,7 +58,7 @@ class SymbolicSpace(Derived[MarkingSet]):
 
     def until(self, deadline: Deadline) -> SymbolicSpace:
         """The same space, for questions that end with another deadline; so do those to this one from now on."""
-        self.engine.limit(**_ending(deadline))
+        self.engine.limit(**engine_limits(deadline))
         return replace(self, deadline=deadline)
 
     def require_complete(self) -> None:
@@ -251,38 +252,8 @@ def explore_symbolically(net: Net, limits: Limits | None = None) -> SymbolicSpac
     (True, 2)
     """
     limits = limits or Limits()
-    place, signal = net.place_index, net.signal_index
     diagram = _engine.explore_symbolically(
-        len(net.places),
-        [
-            (
-                [place[name] for name in transition.inputs],
-                [place[name] for name in transition.outputs],
-                [place[name] for name in transition.permissive],
-                [place[name] for name in transition.inhibitive],
-                [(signal[gate.signal], gate.wanted) for gate in transition.external],
-            )
-            for transition in net.transitions
-        ],
-        [i for i, of in enumerate(net.places) if of.marked],
-        max_memory_bytes=limits.memory_bytes,
-        **_ending(limits.deadline),
+        *rows(net), max_memory_bytes=limits.memory_bytes, **engine_limits(limits.deadline)
     )
     reach = diagram.reach()
     return SymbolicSpace(net, diagram, reach.count(), reach.edges(), limits.deadline)
-
-
-def decide_by_diagram(net: Net, goal: Formula, limits: Limits) -> Finding:
-    """Whether a marking that satisfies the goal is reachable, by looking at all of them."""
-    try:
-        space = explore_symbolically(net, limits)
-        found = space.satisfying(goal)
-        return Finding(bool(found), METHOD, space.witness(found), cost=Cost(space.n_markings))
-    except BudgetExceeded as error:
-        return Finding(None, METHOD, bound=f"the diagram was not finished: {error}")
-
-
-def _ending(deadline: Deadline) -> dict[str, Any]:
-    """A deadline as the engine's functions take it."""
-    flag = deadline.cancelled
-    return {"max_seconds": deadline.left_seconds, "cancelled": None if flag is None else flag.is_set}

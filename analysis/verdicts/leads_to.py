@@ -29,13 +29,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from firable.analysis.compiled import engine_limits
 from firable.analysis.question import Answer, no, yes
 from firable.analysis.spaces.reachability import (
     NO_COMPONENT,
     Column,
     Components,
     ReachabilityGraph,
-    engine_limits,
     first,
     indexes,
 )
