@@ -79,7 +79,7 @@ def test_a_run_that_is_cut_off_says_so() -> None:
 
 
 def test_a_run_that_was_cut_off_and_a_graph_that_was_leave_starvation_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
-    of_graph = check(two_ways(), budget=Budget(markings=1)).verdict("starvation")
+    of_graph = check(two_ways(), budget=Budget(markings=1), method="explicit").verdict("starvation")
     monkeypatch.setattr(
         "firable.analysis.verdicts.starvation.eager_run",
         lambda net, deadline: eager_run(net, steps_max=1, deadline=deadline),
