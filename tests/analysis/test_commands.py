@@ -144,7 +144,7 @@ def test_a_cut_off_graph_still_shows_a_machine_with_one_command_and_nothing_more
     one, two = line(*["RUN"] * 9), line(*["RUN", "STOP"] * 5)
     assert machines_stopped(explore(one, budget=Budget(markings=3))).status is Status.VIOLATED
     assert machines_stopped(explore(two, budget=Budget(markings=3))).status is Status.UNKNOWN
-    assert check(two, budget=Budget(markings=3)).status is Status.UNKNOWN
+    assert check(two, budget=Budget(markings=3), method="explicit").status is Status.UNKNOWN
 
 
 def shared(*, together: bool) -> Net:

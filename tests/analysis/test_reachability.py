@@ -75,7 +75,7 @@ def test_a_budget_that_ends_early_gives_unknown_with_its_bound_and_no_figure_of_
     places = tuple(Place(f"{x}{i}", marked=x == "p") for i in range(n) for x in "pq")
     moves = [Transition(f"t{i}", (f"p{i}",), (f"q{i}",)) for i in range(n)]
     moves += [Transition(f"u{i}", (f"q{i}",), (f"p{i}",)) for i in range(n)]
-    report = check(Net("wide", places, tuple(moves)), budget=budget)
+    report = check(Net("wide", places, tuple(moves)), budget=budget, method="explicit")
     assert report.status is Status.UNKNOWN
     figures = report.figures
     assert not figures.complete
@@ -88,7 +88,9 @@ def test_a_budget_that_ends_early_gives_unknown_with_its_bound_and_no_figure_of_
             assert verdict.status is Status.PROVED
         elif verdict.status is Status.UNKNOWN:
             assert verdict.code == "F3004"
-            assert f"{figures.markings:,} markings" in verdict.bound
+            # Starvation runs the net by itself, and tells the bound of that where the time is over before it begins.
+            run_ended = verdict.name == "starvation" and verdict.bound == "0 steps of the run"
+            assert f"{figures.markings:,} markings" in verdict.bound or (run_ended and budget.seconds == 0)
         else:
             # All transitions fired within ten markings, or none was expanded: nothing else can be known.
             assert (verdict.name, verdict.status) == ("quasi-live", Status.PROVED)
@@ -96,7 +98,7 @@ def test_a_budget_that_ends_early_gives_unknown_with_its_bound_and_no_figure_of_
 
 def test_a_violation_found_within_the_budget_is_a_violation() -> None:
     net = load_net("local_output_conflict")
-    report = check(net, budget=Budget(markings=2))
+    report = check(net, budget=Budget(markings=2), method="explicit")
     assert not report.figures.complete
     verdict = report.verdict("effective-conflicts")
     assert verdict.status is Status.VIOLATED
