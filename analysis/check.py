@@ -177,8 +177,10 @@ class _Check:
         open_ = {verdict.name for verdict in report.verdicts if verdict.status is Status.UNKNOWN}
         known: dict[str, Verdict] = {}
         for of in knowers if open_ else ():
-            known |= self._known(of, report)
-            if said := open_ & known.keys():
+            more = self._known(of, report)
+            said = (open_ & more.keys()) - known.keys()
+            known = more | known
+            if said:
                 course.append(f"{KNOWERS[of].words}: {', '.join(sorted(said))}")
         fired = self._fired(report.space) if open_ else set()
         verdicts = [
