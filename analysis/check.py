@@ -16,9 +16,10 @@ The report's `course` tells what was tried. A technique that is asked for by nam
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from threading import Event
 from time import perf_counter
 from typing import Any, Final, TypeVar
@@ -49,7 +50,8 @@ T = TypeVar("T")
 FIRST_MARKINGS: Final = 200_000
 """How many markings `auto` explores before it lets techniques race."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
-_THEOREMS_SHARE: Final = 0.25  # of the time that is left then, for theorems
+_KNOWING_SHARE: Final = 0.15  # of the time, for what is known at once
+_KNOWING_SECONDS_MAX: Final = 30.0
 _GOALS_MAX: Final = 64  # a verdict of more goals than this takes longer than anybody waits
 
 
@@ -111,7 +113,11 @@ class _Check:
         if first.complete or first.engine.reason == "interrupted":
             return _told(self._report(first), [f"explored: {_size(first)}"])
         course = [f"the first {first.n_markings:,} markings are not all"]
-        return self._settled(self._report(self._whole(course) or first), tuple(KNOWERS), GOAL_LANES, course)
+        # Theorems take a moment, and know what no technique may have the time for afterwards.
+        theorems = (Method.STRUCTURE, self._known(Method.STRUCTURE))
+        report = self._report(self._whole(course) or first)
+        rest = ((of, self._known(of)) for of in KNOWERS if of is not Method.STRUCTURE)
+        return self._settled(report, chain([theorems], rest), GOAL_LANES, course)
 
     def by(self, method: Method) -> CheckReport:
         """The report of one technique: what it does not decide stays unknown."""
@@ -123,9 +129,10 @@ class _Check:
                 return _told(self._report(self._nothing()), [f"{words} gave up: {error}"])
             return _told(self._report(space), [f"{words}: {_size(space)}"])
         nothing = self._nothing()
-        knowers, lanes = ((method,) if method in KNOWERS else ()), (((method,),) if method in GOALS else ())
+        knowledge = ((of, self._known(of)) for of in KNOWERS if of is method)
+        lanes = ((method,),) if method in GOALS else ()
         words = (KNOWERS | GOALS)[method].words
-        return self._settled(self._report(nothing), knowers, lanes, [f"{words}, and nothing else"])
+        return self._settled(self._report(nothing), knowledge, lanes, [f"{words}, and nothing else"])
 
     def _nothing(self) -> ReachabilityGraph:
         """A space of M0 alone, of which nothing is concluded but what holds of M0."""
@@ -171,17 +178,24 @@ class _Check:
         return graph
 
     def _settled(
-        self, report: CheckReport, knowers: Sequence[Method], lanes: Sequence[Sequence[Method]], course: list[str]
+        self,
+        report: CheckReport,
+        knowledge: Iterable[tuple[Method, Mapping[str, Verdict]]],
+        lanes: Sequence[Sequence[Method]],
+        course: list[str],
     ) -> CheckReport:
-        """The report with those of its unknown verdicts decided that are known at once or come down to goals."""
+        """The report with those of its unknown verdicts decided that are known at once or come down to goals.
+
+        The knowledge is asked for only as long as something is open.
+        """
         open_ = {verdict.name for verdict in report.verdicts if verdict.status is Status.UNKNOWN}
         known: dict[str, Verdict] = {}
-        for of in knowers if open_ else ():
-            more = self._known(of, report)
-            said = (open_ & more.keys()) - known.keys()
-            known = more | known
-            if said:
+        for of, more in knowledge if open_ else ():
+            if said := (open_ & more.keys()) - known.keys():
                 course.append(f"{KNOWERS[of].words}: {', '.join(sorted(said))}")
+            known = {**more, **known}
+            if open_ <= known.keys():
+                break
         fired = self._fired(report.space) if open_ else set()
         verdicts = [
             verdict
@@ -198,19 +212,21 @@ class _Check:
         except BudgetExceeded:
             return set()
 
-    def _known(self, of: Method, report: CheckReport) -> dict[str, Verdict]:
-        """The verdicts that a technique knows at once."""
-        began = perf_counter()
-        limits = Limits(_share(self.deadline, _THEOREMS_SHARE), self.budget.memory_bytes)
-        found = KNOWERS[of].load()(self.net, limits)
-        seconds = perf_counter() - began
-        questions = {question.name: question for question in QUESTIONS}
+    def _known(self, of: Method) -> dict[str, Verdict]:
+        """The verdicts that a technique knows at once, by name."""
+        began, left = perf_counter(), self.deadline.left_seconds
+        seconds_max = _KNOWING_SECONDS_MAX if left is None else min(left * _KNOWING_SHARE, _KNOWING_SECONDS_MAX)
+        deadline = Deadline.after(seconds_max, self.interrupted)
+        try:
+            found = KNOWERS[of].load()(self.net, Limits(deadline, self.budget.memory_bytes))
+        except KeyboardInterrupt:
+            self.interrupted.set()
+            return {}
+        cost = Cost(seconds=perf_counter() - began)
         return {
-            verdict.name: questions[verdict.name].settle(
-                known.answer, known.method, self.discipline, Cost(seconds=seconds)
-            )
-            for verdict in report.verdicts
-            if (known := found.get(verdict.name)) is not None
+            question.name: question.settle(known.answer, known.method, self.discipline, cost)
+            for question in QUESTIONS
+            if (known := found.get(question.name)) is not None
         }
 
     def _by_goals(
