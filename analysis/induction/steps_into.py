@@ -130,8 +130,15 @@ class StepsInto:
         self._keep(z3.Implies(name, *self.session.translated([goal])))
         return name
 
+    def _renew(self) -> None:
+        """Make the solver anew where it is time; before a question, as what is said for one question alone is lost."""
+        if self._asked >= _QUESTIONS_MAX:
+            self._asked, self._solver = 0, self.session.solver()
+            self._solver.add(*self._lasting)
+
     def may_hold(self, literal: z3.BoolRef, level: int) -> bool:
         """Whether a marking that the level allows satisfies a literal."""
+        self._renew()
         return self._ask([literal], level) is Answer.SAT
 
     def marking(self) -> Marking:
@@ -140,9 +147,6 @@ class StepsInto:
         return sum(1 << i for i, place in enumerate(self._now) if z3.is_true(model[place]))
 
     def _ask(self, assumptions: list[z3.BoolRef], level: int) -> Answer:
-        if self._asked == _QUESTIONS_MAX:
-            self._asked, self._solver = 0, self.session.solver()
-            self._solver.add(*self._lasting)
         self._asked += 1
         self._switch(level)
         return self.session.ask(self._solver, *self._switches[level:], *assumptions)
@@ -154,6 +158,7 @@ class StepsInto:
         """
         wanted = {self._after_literal(i, full=True): Cube(1 << i, 0) for i in _bits(cube.full)}
         wanted |= {self._after_literal(i, full=False): Cube(0, 1 << i) for i in _bits(cube.empty)}
+        self._renew()
         # Outside the cube, for this question only.
         here = self.session.variable(f"asked {self._asked} ")
         self._solver.add(self.session.some([z3.Not(here), *self._not_in(cube)]))

@@ -162,6 +162,18 @@ def test_each_place_is_reached_or_an_invariant_says_why_not(family: str) -> None
         assert check_evidence(evidence).shown is True
 
 
+@pytest.mark.parametrize("questions_max", [1, 2, 3])
+def test_a_solver_made_anew_answers_the_question_that_was_next(
+    questions_max: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("firable.analysis.induction.steps_into._QUESTIONS_MAX", questions_max)
+    monkeypatch.setattr("firable.analysis.induction.pdr.structural_facts", lambda *_: Facts())
+    for net in (family_net("philosophers-2"), family_net("counter-3"), CLOSING, RACING):
+        for goal in (Deadlock(), And(tuple(Holds(place.name) for place in net.places[-2:]))):
+            expected = reachable(net, goal, Discipline.INTERLEAVING)
+            assert decide_by_pdr(net, goal, in_time()).reachable is expected
+
+
 def test_an_invariant_is_found_where_the_arcs_say_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("firable.analysis.induction.pdr.structural_facts", lambda *_: Facts())
     net = family_net("philosophers-2")
