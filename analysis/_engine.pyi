@@ -202,10 +202,10 @@ class Graph:
         max_seconds: float | None = None,
         cancelled: Callable[[], bool] | None = None,
     ) -> list[int | None]:
-        """For each pair of transitions, the lowest marking at which both are firable by Eq. (1), or None.
+        """For each pair of transitions, the lowest marking found at which both are firable by Eq. (1), or None.
 
-        Whether the two conflict in structure, and whether one valuation opens both, is the caller's question. None
-        needs the whole graph.
+        Whether the two conflict in structure, whether one valuation opens both, and whether more markings may come is
+        the caller's question.
         """
 
 @final

@@ -256,8 +256,6 @@ class ReachabilityGraph(Derived[Column]):
 
     def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""
-        if not self.complete:
-            return super().firable_together(pairs)
         return tuple(lowest is not None for lowest in self.engine.effective_conflicts(list(pairs), **self._limits))
 
     def components(self, within: Column | None = None) -> Components:
