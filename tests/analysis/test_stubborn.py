@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
 from threading import Event
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.lively_nets import lively_net, lively_nets, part_of
 from support.ring_nets import ring_nets
 from support.searched import distance_to, goals, played, satisfies
 from support.small_scope import all_nets, net_with
@@ -25,7 +27,7 @@ from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Hold
 from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
 from firable.semantics.player import Player
 
-NETS = st.one_of(ring_nets(signals=True), dense_nets(signals=True, most_transitions=5))
+NETS = st.one_of(lively_nets(), ring_nets(signals=True), dense_nets(signals=True, most_transitions=5))
 UNBOUNDED: dict[str, Any] = {"max_markings": 1 << 20, "max_memory_bytes": 1 << 28, "max_seconds": None}
 
 
@@ -80,6 +82,23 @@ def test_exactly_the_transitions_that_fire_in_the_whole_graph_are_found_firing(n
         if witness is not None:
             assert witness.firings[-1] == (t.name,)
             played(net, witness)
+
+
+@pytest.mark.parametrize("chunk", range(4))
+def test_no_order_that_matters_is_left_out_of_nets_whose_transitions_compete(chunk: int) -> None:
+    for seed in range(400 * chunk, 400 * (chunk + 1)):
+        draw = random.Random(seed)
+        net = lively_net(draw)
+        graph, engine = explore(net), _engine.Stubborn(*rows(net))
+        expected = {graph.marking(i) for i in graph.engine.deadlocks()}
+        goal = part_of(draw, net, graph.marking(draw.randrange(graph.n_markings)))
+        for thorough in (False, True):
+            assert deadlocks_of(net, thorough=thorough) == expected, seed
+            found = engine.reach(nodes_of(net, goal), thorough=thorough, **UNBOUNDED)
+            assert found.found is not None, seed
+            assert len(found.path_to(found.found)) == distance_to(graph, goal), seed
+            firings = engine.fire(list(range(len(net.transitions))), thorough=thorough, **UNBOUNDED).firable()
+            assert [at is not None for at in firings] == [n > 0 for n in graph.engine.fired()], seed
 
 
 @pytest.mark.parametrize("chunk", range(4))

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.lively_nets import lively_nets
 from support.ring_nets import ring_nets
 from support.searched import distance_to, goals, played, satisfies
 
@@ -19,7 +20,7 @@ from firable.nets.catalogue.processes import philosophers
 from firable.nets.formula import And, Deadlock, Holds
 from firable.nets.net import Net, Place, Transition
 
-NETS = st.one_of(ring_nets(signals=True), dense_nets(signals=True))
+NETS = st.one_of(lively_nets(), ring_nets(signals=True), dense_nets(signals=True))
 
 
 @settings(max_examples=100)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.lively_nets import lively_nets
 from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
 from support.whole_nets import formulas
@@ -27,7 +28,7 @@ from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import holds_in
 
-SMALL_NETS = st.one_of(dense_nets(signals=True), ring_nets(signals=True))
+SMALL_NETS = st.one_of(lively_nets(), dense_nets(signals=True), ring_nets(signals=True))
 SECONDS = 1.0  # a bounded search goes on as long as it may where there is nothing to find
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.lively_nets import lively_net, lively_nets
 from support.naive_space import Markings, NaiveSpace
 from support.ring_nets import ring_nets
 
@@ -49,7 +51,7 @@ class Pairing:
 
 
 @pytest.mark.parametrize("name", SPACES)
-@given(net=st.one_of(dense_nets(signals=True), ring_nets(signals=True)), data=st.data())
+@given(net=st.one_of(lively_nets(), dense_nets(signals=True), ring_nets(signals=True)), data=st.data())
 def test_a_space_has_the_sets_of_the_oracle(name: str, net: Net, data: st.DataObject) -> None:
     space = SPACES[name](net)
     both = Pairing(space)
@@ -93,3 +95,20 @@ def test_a_space_has_the_sets_of_the_oracle(name: str, net: Net, data: st.DataOb
     assert witness.note == "here"
     assert net.marking(witness.marking) in targets[1]
     assert space.witness(space.algebra.disjunction(())) is None
+
+
+@pytest.mark.parametrize("chunk", range(4))
+def test_the_table_and_the_diagram_agree_on_nets_whose_transitions_compete(chunk: int) -> None:
+    for seed in range(150 * chunk, 150 * (chunk + 1)):
+        net = lively_net(random.Random(seed))
+        told = []
+        for space in (explore(net), explore_symbolically(net)):
+            transitions = range(len(net.transitions))
+            sizes = [space.count(found) for found in (space.deadlocks, space.home(), space.endless())]
+            sizes += [space.count(space.backward(space.may_fire(t))) for t in transitions]
+            sizes += [space.count(space.before(space.may_fire(t), [t])) for t in transitions]
+            fired = [count > 0 for count in space.fired()]
+            pairs = [(t, u) for t in transitions for u in range(t)]
+            shape = (space.n_markings, space.n_edges, space.reversible(), list(space.live()), list(space.contacts()))
+            told.append((shape, sizes, fired, list(space.firable_together(pairs))))
+        assert told[0] == told[1], seed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.cell_nets import cell_nets
 from support.dense_nets import dense_nets
+from support.lively_nets import lively_net, lively_nets, part_of
 from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
 from support.small_scope import all_nets, net_with
@@ -26,7 +28,7 @@ from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.formula import And, Compare, Constant, Count, Deadlock, Formula, Holds, Not, Sign, parse_formula
 from firable.nets.net import Net, Property
 
-NETS = st.one_of(cell_nets(), ring_nets(signals=True), dense_nets(signals=True))
+NETS = st.one_of(cell_nets(), lively_nets(), ring_nets(signals=True), dense_nets(signals=True))
 
 
 def literal(place: str, value: bool) -> Formula:
@@ -62,6 +64,16 @@ def check(net: Net, goal: Formula) -> Reduced:
         lifted = reduced.lift(name for (name,) in found.firings)
         assert original.contains(original.satisfying(goal), net.marking(lifted.marking))
     return reduced
+
+
+@pytest.mark.parametrize("chunk", range(4))
+def test_goals_of_nets_whose_transitions_compete_are_kept(chunk: int) -> None:
+    for seed in range(60 * chunk, 60 * (chunk + 1)):
+        draw = random.Random(seed)
+        net = lively_net(draw, 10)
+        check(net, Deadlock())
+        check(net, part_of(draw, net, draw.choice(list(NaiveSpace(net).graph))))
+        check(net, part_of(draw, net, draw.getrandbits(len(net.places)), 4))
 
 
 @settings(max_examples=150, deadline=None)
