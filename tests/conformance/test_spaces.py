@@ -102,7 +102,8 @@ def test_the_table_and_the_diagram_agree_on_nets_whose_transitions_compete(chunk
     for seed in range(150 * chunk, 150 * (chunk + 1)):
         net = lively_net(random.Random(seed))
         told = []
-        for space in (explore(net), explore_symbolically(net)):
+        spaces: tuple[StateSpace[Any], ...] = (explore(net), explore_symbolically(net))
+        for space in spaces:
             transitions = range(len(net.transitions))
             sizes = [space.count(found) for found in (space.deadlocks, space.home(), space.endless())]
             sizes += [space.count(space.backward(space.may_fire(t))) for t in transitions]

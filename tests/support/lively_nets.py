@@ -37,23 +37,26 @@ def lively_net(draw: random.Random, most_places: int = 12) -> Net:
         full = [place for place in names if place in marking]
         empty = [place for place in names if place not in marking]
         inputs, outputs = _some(draw, full), _some(draw, empty)
-        gates = [[draw.choice(among)] if among and draw.random() < _GATES else [] for among in (full, empty)]
-        transitions.append((inputs, outputs, *gates))
+        permissive, inhibitive = (_gate(draw, among) for among in (full, empty))
+        transitions.append((inputs, outputs, permissive, inhibitive))
         if draw.random() < _FIRED:
             marking = (marking - set(inputs)) | set(outputs)
         if draw.random() < _STARTED_ANEW:
             marking = start
     draw.shuffle(transitions)
-    rows = (tuple(tuple(sorted(part)) for part in parts) for parts in transitions)
     return Net(
         "lively",
         tuple(Place(name, marked=name in start) for name in names),
-        tuple(Transition(f"t{i}", *row) for i, row in enumerate(rows)),
+        tuple(Transition(f"t{i}", *parts) for i, parts in enumerate(transitions)),
     )
 
 
-def _some(draw: random.Random, among: list[str]) -> list[str]:
-    return draw.sample(among, min(len(among), draw.choices((0, 1, 2), (1, 6, 2))[0]))
+def _some(draw: random.Random, among: list[str]) -> tuple[str, ...]:
+    return tuple(draw.sample(among, min(len(among), draw.choices((0, 1, 2), (1, 6, 2))[0])))
+
+
+def _gate(draw: random.Random, among: list[str]) -> tuple[str, ...]:
+    return (draw.choice(among),) if among and draw.random() < _GATES else ()
 
 
 def part_of(draw: random.Random, net: Net, marking: Marking, count: int = 3) -> Formula:
