@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 from firable.analysis.spaces.space import Witnesses
+from firable.analysis.temporal.automaton import TimeEndedError
 from firable.analysis.temporal.ctl import Ctl, dual
 from firable.analysis.temporal.lasso import Run, TooLongError, Walk, accepted_run, witness_of
 from firable.analysis.temporal.product import Product, ProductEdge
@@ -34,7 +35,7 @@ S = TypeVar("S")
 
 
 def shown(ctl: Ctl[S], formula: Temporal) -> Witness | None:
-    """A witness of a formula that holds in M0; None where it has none, or one that takes too much memory."""
+    """A witness of a formula that holds in M0; None where it has none, or one that takes too much memory or time."""
     space = ctl.sets.space
     match formula:
         case TemporalOr(operands):
@@ -59,7 +60,7 @@ def shown(ctl: Ctl[S], formula: Temporal) -> Witness | None:
 
 
 def refuted(ctl: Ctl[S], formula: Temporal) -> Witness | None:
-    """A counterexample to a formula that does not hold in M0; None where it has none."""
+    """A counterexample to a formula that does not hold in M0; None where it has none, or one that takes too long."""
     match formula:
         case ForAll(Until(left, right)):
             away = negated(right)
@@ -113,7 +114,7 @@ def _sequence(ctl: Ctl[S], through: S, goal: S, note: str) -> Witness | None:
     walk = Walk(Product(ctl.sets, ((_edge(ctl.sets.all),),), 0), space.net.initial_marking)
     try:
         found = walk.go({0: goal}, {0: through})
-    except TooLongError:
+    except (TooLongError, TimeEndedError):
         return None
     if not found:
         return None
@@ -128,7 +129,7 @@ def _endless(ctl: Ctl[S], operand: Temporal) -> Witness | None:
     always = {0: sets.always(markings)}
     try:
         run: Run = accepted_run(product, always, always)
-    except TooLongError:
+    except (TooLongError, TimeEndedError):
         return None
     end = "for ever" if run.cycle else "and it is a deadlock"
     return witness_of(space.net, space.discipline, run, f"({format_temporal(operand)}) holds all the way, {end}")

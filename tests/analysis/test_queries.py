@@ -145,6 +145,22 @@ def test_the_time_ends_a_search_for_a_run() -> None:
     assert (verdict.status, verdict.code) == (Status.UNKNOWN, "F3004")
 
 
+@pytest.mark.parametrize(
+    ("text", "status"),
+    [
+        ("EG not deadlock", Status.PROVED),
+        ("E[not deadlock U not start]", Status.PROVED),
+        ("AF deadlock", Status.VIOLATED),
+        ("A[start U deadlock]", Status.VIOLATED),
+    ],
+)
+def test_what_is_decided_stays_so_where_the_time_ends_before_it_is_shown(text: str, status: Status) -> None:
+    space, query = NaiveSpace(CELL), parse_query(text)
+    assert answer(space, query).witness is not None
+    verdict = answer(space.until(Deadline.after(0)), query)
+    assert (verdict.status, verdict.witness) == (status, None)
+
+
 def test_an_automaton_that_is_too_large_is_not_made() -> None:
     formula = positive(parse_temporal(" and ".join(f"F (p{i} and X q{i})" for i in range(5))))
     with pytest.raises(TooLargeError, match="states"):
