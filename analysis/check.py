@@ -299,7 +299,7 @@ def _settle(question: Question, answer: Answer, found: Finding) -> Verdict:
 
 def _share(deadline: Deadline, share: float) -> Deadline:
     left = deadline.left_seconds
-    return deadline if left is None else Deadline.after(left * share, deadline.cancelled)
+    return deadline if left is None else deadline.within(left * share)
 
 
 def _size(space: StateSpace[Any]) -> str:

@@ -34,6 +34,14 @@ class Deadline:
         """
         return cls(monotonic() + seconds, cancelled)
 
+    def within(self, seconds: float) -> Deadline:
+        """The moment so many seconds away, or this one where it comes first; by the same flag.
+
+        >>> Deadline.after(0).within(60).over, Deadline().within(60).over
+        (True, False)
+        """
+        return Deadline(min(self.at_seconds, monotonic() + seconds), self.cancelled)
+
     @property
     def over(self) -> bool:
         """Whether the moment has come."""

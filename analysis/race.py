@@ -106,8 +106,8 @@ class _Course(Generic[T]):
                     waiting.remove(contestant)
 
     def _until(self, deadline: Deadline, seconds: float | None) -> Deadline:
-        end = deadline.at_seconds if seconds is None else min(deadline.at_seconds, monotonic() + seconds)
-        return Deadline(end, self.over)
+        until = deadline if seconds is None else deadline.within(seconds)
+        return replace(until, cancelled=self.over)
 
     def _try(self, contestant: Contestant[T], limits: Limits) -> bool:
         """Let one technique try; whether it gave up."""

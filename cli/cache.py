@@ -103,16 +103,10 @@ def key_of(net: Net, asked: Mapping[str, Any]) -> str:
     >>> key_of(Net("n", (Place("p", description="a place"),)), {}) == key_of(Net("n", (Place("p"),)), {})
     True
     """
-    from firable.nets.interchange import net_to_json
+    from firable.nets.interchange import net_digest
 
-    content = [_without_descriptions(net_to_json(net)), dict(asked), _program()]
+    content = [net_digest(net), dict(asked), _program()]
     return _sha256(json.dumps(content, sort_keys=True))
-
-
-def _without_descriptions(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: _without_descriptions(value) for key, value in data.items() if key != "description"}
-    return [_without_descriptions(item) for item in data] if isinstance(data, list) else data
 
 
 def _program() -> list[list[Any]]:

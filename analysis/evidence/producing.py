@@ -7,10 +7,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from time import monotonic
 from typing import Final
 
-from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Certificate, FiringSequence, MarkingSet
 from firable.analysis.evidence.document import Claim, ClaimKind, Evidence
 from firable.analysis.goal import Finding, Limits
@@ -26,6 +24,7 @@ from firable.nets.verdict import Status, Verdict
 from firable.semantics.trace import Discipline
 
 MARKINGS_MAX: Final = 20_000
+_SECONDS: Final = 10.0  # for k-induction, where nobody sets a limit
 
 
 def evidence_of_finding(
@@ -143,7 +142,7 @@ def _proof(net: Net, goal: Formula, limits: Limits, discipline: Discipline) -> F
         return decide_by_k_induction(net, goal, limits, discipline=discipline)
     found = decide_by_state_equation(net, goal, limits)
     if found.reachable is None:
-        third = (limits.deadline.left_seconds or 30) / 3
-        soon = Deadline(monotonic() + third, limits.deadline.cancelled)
-        found = decide_by_k_induction(net, goal, Limits(soon, limits.memory_bytes))
+        left = limits.deadline.left_seconds
+        third = limits.deadline.within(_SECONDS if left is None else left / 3)
+        found = decide_by_k_induction(net, goal, Limits(third, limits.memory_bytes))
     return decide_by_pdr(net, goal, limits) if found.reachable is None else found

@@ -20,7 +20,7 @@ from typing import Any, Final
 import z3
 
 from firable.analysis.goal import Limits
-from firable.analysis.induction.smt import SEED, Answer, Operator, Term, subterms
+from firable.analysis.induction.smt import SEED, Answer, Term, subterms, z3_term
 
 _LISTEN_SECONDS: Final = 0.03
 
@@ -88,20 +88,7 @@ class Session:
                 self.check_time()
             if term in made:
                 continue
-            operands = [made[operand] for operand in term.operands]
-            match term.operator:
-                case Operator.VARIABLE:
-                    made[term] = self.variable(term.name)
-                case Operator.TRUE | Operator.FALSE:
-                    made[term] = z3.BoolVal(term.operator is Operator.TRUE, self.context)
-                case Operator.NOT:
-                    made[term] = z3.Not(operands[0])
-                case Operator.AND:
-                    made[term] = z3.And(operands)
-                case Operator.OR:
-                    made[term] = z3.Or(operands)
-                case Operator.EQUAL:
-                    made[term] = operands[0] == operands[1]
+            made[term] = z3_term(term, [made[operand] for operand in term.operands], self.context)
         return [made[term] for term in terms]
 
     def some(self, operands: Iterable[z3.BoolRef]) -> z3.BoolRef:

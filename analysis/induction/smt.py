@@ -286,23 +286,27 @@ class Decision:
 
 def to_z3(terms: Sequence[Term]) -> list[z3.BoolRef]:
     """The terms as z3's own, in its default context; what they share is shared."""
-    made: dict[Term, Any] = {}
+    made: dict[Term, z3.BoolRef] = {}
     for term in subterms(terms):
-        operands = [made[operand] for operand in term.operands]
-        match term.operator:
-            case Operator.VARIABLE:
-                made[term] = z3.Bool(term.name)
-            case Operator.TRUE | Operator.FALSE:
-                made[term] = z3.BoolVal(term.operator is Operator.TRUE)
-            case Operator.NOT:
-                made[term] = z3.Not(operands[0])
-            case Operator.AND:
-                made[term] = z3.And(operands)
-            case Operator.OR:
-                made[term] = z3.Or(operands)
-            case Operator.EQUAL:
-                made[term] = operands[0] == operands[1]
+        made[term] = z3_term(term, [made[operand] for operand in term.operands])
     return [made[term] for term in terms]
+
+
+def z3_term(term: Term, operands: Sequence[z3.BoolRef], context: z3.Context | None = None) -> z3.BoolRef:
+    """One term as z3's own, of its operands as z3's own, in a context."""
+    match term.operator:
+        case Operator.VARIABLE:
+            return z3.Bool(term.name, context)
+        case Operator.TRUE | Operator.FALSE:
+            return z3.BoolVal(term.operator is Operator.TRUE, context)
+        case Operator.NOT:
+            return z3.Not(operands[0])
+        case Operator.AND:
+            return z3.And(operands)
+        case Operator.OR:
+            return z3.Or(operands)
+        case Operator.EQUAL:
+            return operands[0] == operands[1]
 
 
 def decide(assertions: Sequence[Term], *, timeout_ms: int | None = None) -> Decision:

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import inf
-from time import monotonic
 from typing import Final
 
 from firable.analysis.deadline import Deadline
@@ -54,7 +53,7 @@ def structural_facts(net: Net, deadline: Deadline) -> Facts:
     """
     left = deadline.left_seconds
     share = min(_SECONDS_MAX, inf if left is None else left * _SHARE)
-    found = p_invariants(net, deadline=Deadline(monotonic() + share, deadline.cancelled)).minimal
+    found = p_invariants(net, deadline=deadline.within(share)).minimal
     equations, size = list[Equation](), 0
     for invariant in sorted(found, key=lambda one: len(one.weights)):
         size += len(invariant.weights)
@@ -89,6 +88,5 @@ class Traps:
         trap = self._rules.largest(i for i in range(len(self.net.places)) if not marking >> i & 1)
         if not trap & self._marked:
             return None
-        soon = Deadline(min(deadline.at_seconds, monotonic() + _SHRINKING_SECONDS), deadline.cancelled)
-        smaller = self._rules.smallest(trap, self._marked, soon) or trap
+        smaller = self._rules.smallest(trap, self._marked, deadline.within(_SHRINKING_SECONDS)) or trap
         return Clause(marked=tuple(self.net.places[i].name for i in sorted(smaller)))
