@@ -1,17 +1,18 @@
-"""What holds of a net: by its reachability graph, by its structure, by a solver.
+"""What holds of a net: by its markings, held in a table or a diagram, by its structure, by a solver.
 
-What a program imports from here: `explore` gives the `ReachabilityGraph` of a net within a `Budget`, and `report_on`
-the `CheckReport` of a graph, with every verdict and with the `Figures` behind them. `p_invariants`, `t_invariants`,
-`minimal_siphons`, `minimal_traps` and `deadlock_trap` read the arcs alone, and may be given a `Deadline`. `eager_run`
-is the run under the arbiters with all gates open; `isomorphic` and `weakly_bisimilar` compare two graphs. What needs
-the whole graph raises `IncompleteGraph`, and `BudgetExceeded` where memory ends.
+What a program imports from here: `explore` gives the `ReachabilityGraph` of a net within a `Budget`,
+`explore_symbolically` its `SymbolicSpace`, and `report_on` the `CheckReport` of either, with every verdict and with the
+`Figures` behind them. `p_invariants`, `t_invariants`, `minimal_siphons`, `minimal_traps` and `deadlock_trap` read the
+arcs alone, and may be given a `Deadline`. `eager_run` is the run under the arbiters with all gates open; `isomorphic`
+and `weakly_bisimilar` compare two graphs. What needs the whole graph raises `IncompleteGraph`, and `BudgetExceeded`
+where memory or time ends.
 
     from firable.analysis import Budget, explore, report_on
 
     report = report_on(explore(net, "step", Budget(seconds=60)))
 
 `check` and `net_class` are functions that have the names of their modules, and are imported from there: `from
-firable.analysis.check import check` does both of these steps at once.
+firable.analysis.check import check` chooses among these and all other techniques by itself.
 
 The names are loaded when they are asked for: numpy and z3 take a second, and belong to the extra `prove`.
 """
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from firable.analysis.report import CheckReport, Figures, report_on
     from firable.analysis.spaces.equivalence import isomorphic, weakly_bisimilar
     from firable.analysis.spaces.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
+    from firable.analysis.spaces.symbolic import SymbolicSpace, explore_symbolically
     from firable.analysis.structure.commoner import deadlock_trap
     from firable.analysis.structure.invariants import p_invariants, t_invariants
     from firable.analysis.structure.siphons import minimal_siphons, minimal_traps
@@ -37,9 +39,11 @@ __all__ = [
     "Figures",
     "IncompleteGraph",
     "ReachabilityGraph",
+    "SymbolicSpace",
     "deadlock_trap",
     "eager_run",
     "explore",
+    "explore_symbolically",
     "isomorphic",
     "minimal_siphons",
     "minimal_traps",
@@ -56,6 +60,7 @@ _MODULES: Final = {
     "structure.commoner": ("deadlock_trap",),
     "structure.invariants": ("p_invariants", "t_invariants"),
     "spaces.reachability": ("Budget", "BudgetExceeded", "IncompleteGraph", "ReachabilityGraph", "explore"),
+    "spaces.symbolic": ("SymbolicSpace", "explore_symbolically"),
     "structure.siphons": ("minimal_siphons", "minimal_traps"),
     "verdicts.starvation": ("eager_run",),
 }

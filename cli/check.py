@@ -1,4 +1,4 @@
-"""`firable check`: everything that the reachability graph of a net decides."""
+"""`firable check`: everything that is asked of a net, decided by whichever technique can."""
 
 from __future__ import annotations
 
@@ -112,8 +112,9 @@ def check(
     """Check nets, external gates free, by exploring their markings or by whichever other technique is first.
 
     Deadlock, contact, dead and live transitions, conflicts, gate races, commands, the properties that the file itself
-    states, and queries in CTL, LTL and more (docs/queries.md). Each verdict is proved, violated (with a shortest firing
-    sequence) or unknown (with the bound reached); Ctrl-C ends the exploration and shows what is known so far.
+    states, and queries in CTL, LTL and more (docs/queries.md). Each verdict is proved, violated (with a firing
+    sequence, a shortest one where exploring found it) or unknown (with the bound reached); Ctrl-C ends the search and
+    shows what is known so far.
     """
     allowed = budget(**limits)
     asked = _Asked(discipline, method, allowed, trace_dir, structure, not no_cache, query_file, query_texts, progress)
@@ -138,19 +139,10 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: boo
             cache.write(key, kept)
     files: tuple[str, ...] = ()
     if asked.trace_dir is not None:
-        from pathlib import Path
-
-        from firable.nets.bundle import file_stem
-
-        folder = str(Path(asked.trace_dir) / file_stem(argument)) if many else asked.trace_dir
+        folder = _folder(asked.trace_dir, argument, many=many)
         files = write_folder(folder, _traces(net, kept.verdicts, asked.discipline))
     if evidence_dir is not None:
-        from pathlib import Path
-
-        from firable.nets.bundle import file_stem
-
-        folder = str(Path(evidence_dir) / file_stem(argument)) if many else evidence_dir
-        files += write_folder(folder, _evidence(net, kept.verdicts, asked))
+        files += write_folder(_folder(evidence_dir, argument, many=many), _evidence(net, kept.verdicts, asked))
     return Report(
         "check",
         argument,
@@ -163,6 +155,15 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: boo
         files=files,
         again=again,
     )
+
+
+def _folder(named: str, argument: str, *, many: bool) -> str:
+    """The folder named, or of many nets one in it for each."""
+    from pathlib import Path
+
+    from firable.nets.bundle import file_stem
+
+    return str(Path(named) / file_stem(argument)) if many else named
 
 
 def _queries(loaded: Loaded, asked: _Asked) -> tuple[Query, ...]:

@@ -15,8 +15,9 @@ from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.induction.pdr import decide_by_pdr
 from firable.analysis.spaces.reachability import ReachabilityGraph
+from firable.analysis.structure.contact import decide_contact_by_invariants
 from firable.analysis.structure.state_equation import decide_by_state_equation
-from firable.analysis.verdicts.behaviour import LIVE, REVERSIBLE
+from firable.analysis.verdicts.behaviour import CONTACT_FREE, LIVE, REVERSIBLE
 from firable.analysis.verdicts.goals import goals_of
 from firable.nets.formula import Firable, Formula, Start
 from firable.nets.net import Net, Property, PropertyKind
@@ -132,8 +133,17 @@ def _evidence(
     if (found := evidence_of_graph(graph, claim)) is not None:
         return found
     if claim.kind is ClaimKind.NEVER:
-        return evidence_of_finding(net, claim.goal, _proof(net, claim.goal, limits, discipline), discipline)
+        finding = _contact_excluded(net, verdict, limits) or _proof(net, claim.goal, limits, discipline)
+        return evidence_of_finding(net, claim.goal, finding, discipline)
     return None
+
+
+def _contact_excluded(net: Net, verdict: Verdict, limits: Limits) -> Finding | None:
+    """The invariants that exclude contact, of a net of any size; None where they do not, or another thing is asked."""
+    if verdict.name != CONTACT_FREE.name:
+        return None
+    found = decide_contact_by_invariants(net, limits)
+    return found if found.certificate is not None else None
 
 
 def _proof(net: Net, goal: Formula, limits: Limits, discipline: Discipline) -> Finding:

@@ -26,10 +26,12 @@ from firable.analysis.evidence.certificate import (
 from firable.analysis.evidence.checker import check_evidence
 from firable.analysis.evidence.document import Claim, ClaimKind, Evidence, evidence_from_text, seal
 from firable.analysis.evidence.obligations import obligations, sums_text
-from firable.analysis.evidence.producing import evidence_of_finding, evidence_of_graph
+from firable.analysis.evidence.producing import evidence_of_finding, evidence_of_graph, evidence_of_verdict
 from firable.analysis.goal import Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
-from firable.analysis.spaces.reachability import explore
+from firable.analysis.spaces.reachability import Budget, explore
+from firable.analysis.spaces.symbolic import explore_symbolically
+from firable.analysis.verdicts.behaviour import Behaviour, contact_free
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
@@ -349,3 +351,15 @@ def test_a_sum_that_a_firing_changes_is_refused() -> None:
     assert shows(Inequality((("a", 1), ("b", 2)), 1), goal="not a and not b")
     assert not shows(Inequality((("a", 1),), 1), goal="not a")  # so in M0, and lowered by t
     assert not shows(Inequality((("a", 1), ("b", 1)), 2), goal="not a")
+
+
+def test_contact_of_a_net_too_large_to_list_is_excluded_by_sums_of_tokens() -> None:
+    net = family_net("philosophers_either-40")
+    verdict = contact_free(Behaviour(explore_symbolically(net)))
+    graph = explore(net, budget=Budget(markings=1))
+    assert not graph.complete
+    evidence = evidence_of_verdict(net, verdict, graph, Limits())["contact-free"]
+    assert isinstance(evidence.certificate, InductiveInvariant)
+    # One for each philosopher, who is in one place or none but has one token, and one for each fork.
+    assert len(evidence.certificate.equations) == 80
+    assert check_evidence(evidence).shown
