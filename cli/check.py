@@ -192,7 +192,9 @@ def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> Kept:
         contacts = found.figures.contacts
         contact_free = None if contacts is None else not contacts
         # Anew, since the structure is wanted most where the exploration has used up its own time.
-        figures["structure"] = structure_json(net, contact_free=contact_free, seconds=asked.budget.seconds)
+        figures["structure"] = structure_json(
+            net, contact_free=contact_free, seconds=asked.budget.seconds, discipline=asked.discipline
+        )
     return Kept(found.verdicts, figures, found.course)
 
 

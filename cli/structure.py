@@ -20,9 +20,12 @@ SECONDS_DEFAULT = 30.0
 _SHOWN_MAX = 8
 
 
-def structure_json(net: Net, *, contact_free: bool | None, seconds: float | None) -> dict[str, Any]:
+def structure_json(
+    net: Net, *, contact_free: bool | None, seconds: float | None, discipline: str = "interleaving"
+) -> dict[str, Any]:
     """Net class, invariants, siphons and traps as JSON data; `contact_free` is what is known of that verdict.
 
+    The `discipline` is the one under which deadlock is spoken of.
     Where it is not known, invariants may prove it. All together take `seconds`, by default 30, each a fair part of what
     is left. Where that is too short, or at Ctrl-C, `ended_early` says so and the lists not finished are not `complete`.
     """
@@ -32,6 +35,7 @@ def structure_json(net: Net, *, contact_free: bool | None, seconds: float | None
     from firable.analysis.structure.invariants import Invariants, p_invariants, t_invariants
     from firable.analysis.structure.net_class import net_class
     from firable.analysis.structure.siphons import PlaceSets, minimal_traps
+    from firable.semantics.trace import Discipline
 
     deadline, ended_early, to_come = Deadline.after(SECONDS_DEFAULT if seconds is None else seconds), "", 5
 
@@ -58,7 +62,8 @@ def structure_json(net: Net, *, contact_free: bool | None, seconds: float | None
     of_places = found(lambda until: p_invariants(net, deadline=until), no_vectors)
     of_transitions = found(lambda until: t_invariants(net, deadline=until), no_vectors)
     siphons = found(
-        lambda until: deadlock_trap(net, contact_free=contact_free, deadline=until), DeadlockTrap(None, no_sets, (), ())
+        lambda until: deadlock_trap(net, contact_free=contact_free, discipline=Discipline(discipline), deadline=until),
+        DeadlockTrap(None, no_sets, (), ()),
     )
     traps = found(lambda until: minimal_traps(net, deadline=until), no_sets)
     return {

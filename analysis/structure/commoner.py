@@ -18,7 +18,9 @@ largest trap out of it. That there is none rests on z3.
 
 For the net of this toolkit the argument on deadlock has premises, since the firing rule forbids more than the ordinary
 one: no inhibitive gates, and contact-free. Permissive gates are reads, of which the argument holds, and transitions
-that contradict themselves are no part of the net. External gates are free, as everywhere.
+that contradict themselves are no part of the net. External gates are free, as everywhere. Under synchronous steps a
+token that is read may be taken at the same time, so that a trap that rests on the read runs empty: there the argument
+wants no permissive gates either, and then each step is some order of its firings.
 """
 
 from __future__ import annotations
@@ -42,6 +44,7 @@ from firable.analysis.structure.siphons import (
     trap_rules,
 )
 from firable.nets.net import Net
+from firable.semantics.trace import Discipline
 
 EXCLUDED_MAX: Final = 500
 
@@ -122,11 +125,21 @@ def _by_exclusion(
 
 
 def deadlock_trap(
-    net: Net, *, contact_free: bool | None = None, most: int = SIPHONS_MAX, deadline: Deadline = NEVER
+    net: Net,
+    *,
+    contact_free: bool | None = None,
+    discipline: Discipline = Discipline.INTERLEAVING,
+    most: int = SIPHONS_MAX,
+    deadline: Deadline = NEVER,
 ) -> DeadlockTrap:
-    """Decide the deadlock-trap property; `contact_free` is what is known of that verdict (None: nothing)."""
+    """Decide the deadlock-trap property; `contact_free` is what is known of that verdict (None: nothing).
+
+    The premises are those of a conclusion on deadlock under the discipline.
+    """
     of = ordinary(net)
     premises = tuple(_missing_premises(of, contact_free))
+    if discipline is Discipline.STEP and any(net.transitions[t].permissive for t in of.transitions):
+        premises += ("a step may take a token away from a place while a permissive gate reads it there",)
     property_ = commoner(of, deadline=deadline)
     siphons = minimal_siphons(net, most=most, deadline=deadline)
     traps, bare = trap_rules(of), []

@@ -22,11 +22,23 @@ from firable.analysis.structure.siphons import (
     minimal_siphons,
     minimal_traps,
 )
+from firable.cli.structure import structure_json
 from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
 from firable.nets.verdict import Status
 from firable.semantics.player import Player
+from firable.semantics.trace import Discipline
 
 NETS = st.one_of(dense_nets(), ring_nets())
+READING_EACH_OTHER = Net(  # both leave together in one step, and then neither can go back
+    "reading",
+    (Place("a", marked=True), Place("b"), Place("c", marked=True), Place("d")),
+    (
+        Transition("out1", ("a",), ("b",), permissive=("c",)),
+        Transition("out2", ("c",), ("d",), permissive=("a",)),
+        Transition("back1", ("b",), ("a",), permissive=("c",)),
+        Transition("back2", ("d",), ("c",), permissive=("a",)),
+    ),
+)
 
 
 def subsets(net: Net) -> list[frozenset[str]]:
@@ -110,6 +122,28 @@ def test_the_cell_is_proved_free_of_deadlock_and_the_late_one_shows_the_siphon_t
     net = load_net("cell1_mc_late")
     (deadlock,) = (marking for marking, edges in Player(net).reachable().items() if not edges)
     assert any(not net.marking(siphon) & deadlock for siphon in late.without_marked_trap)
+
+
+@settings(max_examples=60, deadline=None)
+@given(ring_nets(signals=True))
+@example(READING_EACH_OTHER)
+def test_under_steps_the_property_excludes_deadlock_only_without_reads(net: Net) -> None:
+    report = check(net, Discipline.STEP)
+    contact_free = report.verdict("contact-free").holds
+    found = deadlock_trap(net, contact_free=contact_free, discipline=Discipline.STEP)
+    if found.excludes_deadlock:
+        assert report.verdict("deadlock-free").status is Status.PROVED
+
+
+def test_two_that_take_what_the_other_reads_run_a_marked_trap_empty_in_one_step() -> None:
+    net = READING_EACH_OTHER
+    assert deadlock_trap(net, contact_free=True).excludes_deadlock
+    assert check(net).verdict("deadlock-free").status is Status.PROVED
+    assert check(net, Discipline.STEP).verdict("deadlock-free").status is Status.VIOLATED
+    assert not deadlock_trap(net, contact_free=True, discipline=Discipline.STEP).excludes_deadlock
+    for discipline, excluded in (("interleaving", True), ("step", False)):
+        found = structure_json(net, contact_free=True, seconds=None, discipline=discipline)
+        assert found["siphons_exclude_deadlock"] is excluded
 
 
 def test_inhibitive_gates_and_contact_are_missing_premises() -> None:
