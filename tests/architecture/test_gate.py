@@ -103,12 +103,9 @@ def test_a_clippy_warning_in_the_crate_stops_the_gate_also_in_what_only_python_s
     target = ROOT / "analysis" / "engine" / "target"
     text = "\n/// Planted.\npub fn planted(bytes: &Vec<u8>) -> bool {\n    bytes.len() == 0\n}\n"
     crate = planted_crate(target / "planted", text)
-    library = crate / "src" / "lib.rs"
-    outside, feature, inside = library.read_text(encoding="utf-8").partition('#[cfg(feature = "extension-module")]')
-    begin, module, rest = inside.partition("mod python {\n")
-    assert module
-    planted = "    pub fn planted(flag: bool) -> bool {\n        if flag == true { false } else { true }\n    }\n\n"
-    library.write_text(outside + feature + begin + module + planted + rest, encoding="utf-8")
+    inside = crate / "src" / "python" / "mod.rs"
+    planted = "\npub fn planted(flag: bool) -> bool {\n    if flag == true { false } else { true }\n}\n"
+    inside.write_text(inside.read_text(encoding="utf-8") + planted, encoding="utf-8")
     output = make(ROOT, "lint-clippy", f"CRATE={crate}", CARGO_TARGET_DIR=str(target))
     assert "clippy::len-zero" in output
     assert "clippy::ptr-arg" in output
