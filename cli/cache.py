@@ -63,12 +63,13 @@ class Cache:
         return Kept(tuple(record.verdict() for record in records), data["figures"], tuple(data["course"]))
 
     def write(self, key: str, found: Kept) -> None:
-        """Keep what was found, unless a verdict is unknown; the oldest of a thousand makes room."""
+        """Keep what was found, unless something of it is unknown; the oldest of a thousand makes room."""
         from firable.nets.diagnostics import InputError
         from firable.nets.verdict import Status
         from firable.nets.writing import make_folder, write_whole
 
-        if any(verdict.status is Status.UNKNOWN for verdict in found.verdicts):
+        cut_short = found.figures.get("structure", {}).get("ended_early")
+        if cut_short or any(verdict.status is Status.UNKNOWN for verdict in found.verdicts):
             return
         data = {
             "verdicts": [verdict.to_json() for verdict in found.verdicts],
@@ -114,7 +115,7 @@ def _program() -> list[list[Any]]:
     import firable
 
     root = Path(firable.__file__).parent
-    rooms = [room for name in ("nets", "semantics", "analysis") if (room := root / name).is_dir()]
+    rooms = [room for name in ("nets", "semantics", "analysis", "cli") if (room := root / name).is_dir()]
     files = sorted(file for room in rooms for pattern in ("**/*.py", "*.so", "*.pyd") for file in room.glob(pattern))
     return [[str(file.relative_to(root)), file.stat().st_size, file.stat().st_mtime_ns] for file in files]
 

@@ -111,3 +111,17 @@ def test_a_cache_that_cannot_be_written_is_no_reason_to_fail(
     first = checked(folder, NET, capsys)
     assert checked(folder, NET, capsys) == first
     assert len(explored) == 2
+
+
+def test_a_structure_that_its_time_cut_short_is_asked_again(
+    folder: Path, explored: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cut = {"ended_early": "time"}
+    monkeypatch.setattr("firable.cli.check.structure_json", lambda *_, **__: cut)
+    monkeypatch.setattr("firable.cli.check.structure_lines", lambda _: ())
+    path = folder / "net.firable.yaml"
+    path.write_text(NET, encoding="utf-8")
+    for _ in range(2):
+        assert main(["check", str(path), "--structure"]) == 0
+    assert len(explored) == 2
+    assert not (folder / "cache").exists()
