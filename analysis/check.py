@@ -303,7 +303,8 @@ def _share(deadline: Deadline, share: float) -> Deadline:
 
 
 def _size(space: StateSpace[Any]) -> str:
-    size = f"{spelled(space.n_markings)} markings, {spelled(space.n_edges)} edges"
+    edges = "edges not counted" if space.n_edges is None else f"{spelled(space.n_edges)} edges"
+    size = f"{spelled(space.n_markings)} markings, {edges}"
     return size if space.complete else f"{size}, which are not all ({space.bound})"
 
 

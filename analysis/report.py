@@ -50,7 +50,7 @@ class Figures:
     """
 
     markings: int
-    edges: int
+    edges: int | None
     complete: bool
     bytes_per_marking: float | None
     deadlocks: int | None

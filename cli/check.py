@@ -241,10 +241,8 @@ def _show(report: Report, *, verbose: bool) -> None:
     figures = report.figures
     words = {"interleaving": "interleaving", "step": "synchronous steps"}[report.discipline]
     whole = "" if figures["complete"] else " so far"
-    click.echo(
-        f"  {text.counted(figures['markings'], 'marking')}, {text.counted(figures['edges'], 'edge')}{whole}; "
-        f"{words}, external gates free"
-    )
+    edges = "edges not counted" if figures["edges"] is None else text.counted(figures["edges"], "edge")
+    click.echo(f"  {text.counted(figures['markings'], 'marking')}, {edges}{whole}; {words}, external gates free")
     if verbose or len(report.course) > 1:
         for line in (*report.course, *(["taken from the cache: this net was checked before"] if report.again else [])):
             click.echo(f"  {line}")

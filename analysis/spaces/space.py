@@ -78,8 +78,8 @@ class StateSpace(Protocol[S]):
         ...
 
     @property
-    def n_edges(self) -> int:
-        """How many pairs of a marking and what fires in it."""
+    def n_edges(self) -> int | None:
+        """How many pairs of a marking and what fires in it; None where counting them took too long."""
         ...
 
     @property

@@ -17,7 +17,7 @@ saturation lives on does not hold of it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -36,6 +36,8 @@ from firable.semantics.formulas import evaluate
 from firable.semantics.trace import Discipline
 
 METHOD = "decision diagram, interleaving"
+EDGES_SHARE = 0.1
+"""The part of the time left that counting edges may take."""
 
 
 @dataclass(frozen=True)
@@ -43,14 +45,15 @@ class SymbolicSpace(Derived[MarkingSet]):
     """The markings reachable from M0 under interleaving, all of them, as a decision diagram.
 
     What is not done when the `deadline` comes, or memory ends, raises `BudgetExceeded`. The numbers of markings and of
-    edges (pairs of a marking and a transition that may fire in it) are exact, and counted once.
+    edges (pairs of a marking and a transition that may fire in it) are exact, and counted once; a number of edges that
+    was `counted` is known to the same space with another deadline.
     """
 
     net: Net
     engine: _engine.Diagram
     n_markings: int
-    n_edges: int
     deadline: Deadline = NEVER
+    counted: dict[str, int] = field(default_factory=dict, compare=False, repr=False)
     discipline: Discipline = Discipline.INTERLEAVING
     method: str = METHOD
     complete: bool = True
@@ -83,6 +86,25 @@ class SymbolicSpace(Derived[MarkingSet]):
     def cost(self) -> Cost:
         """What finding the markings took."""
         return Cost(self.n_markings, self.n_edges, self.engine.seconds)
+
+    @cached_property
+    def n_edges(self) -> int | None:
+        """How many pairs of a marking and what fires in it, or None where to count them takes too long.
+
+        That may be far longer than the search: a number as long as the net for each of the diagram's nodes. As it is
+        told with every verdict and decides none, it may take but a part of the time that is left.
+        """
+        if "edges" not in self.counted:
+            left = self.deadline.left_seconds
+            share = self.deadline if left is None else Deadline.after(left * EDGES_SHARE, self.deadline.cancelled)
+            self.engine.limit(**engine_limits(share))
+            try:
+                self.counted["edges"] = self.reach.edges()
+            except BudgetExceeded:
+                return None
+            finally:
+                self.engine.limit(**engine_limits(self.deadline))
+        return self.counted["edges"]
 
     @cached_property
     def initial(self) -> MarkingSet:
@@ -210,16 +232,32 @@ class SymbolicSpace(Derived[MarkingSet]):
         return full, [index[place] for place in (*transition.outputs, *transition.inhibitive)]
 
     def contacts(self) -> Sequence[int]:
-        """For each transition, in how many markings it is in contact."""
+        """For each transition, in how many markings it is in contact.
+
+        Whether there are any is asked for all at once; only those where there are cost a set and a count each.
+        """
+        counts = [0] * len(self.net.transitions)
         inside = self.engine.in_contact(self.reach)
         if not inside:
-            return (0,) * len(self.net.transitions)
+            return tuple(counts)
         algebra = Bitwise(true=inside, false=self.none)
+        tests = [(t, test) for t in range(len(counts)) for test in self._contact_tests(t)]
+        met = self.engine.which(inside, [test for _, test in tests])
 
         def holds(place: int) -> MarkingSet:
             return self.engine.having(inside, [place], [])
 
-        return tuple(in_contact(algebra, self.net, t, holds).count() for t in range(len(self.net.transitions)))
+        for t in {t: None for (t, _), here in zip(tests, met, strict=True) if here}:
+            counts[t] = in_contact(algebra, self.net, t, holds).count()
+        return tuple(counts)
+
+    def _contact_tests(self, t: int) -> list[tuple[list[int], list[int]]]:
+        """For each output place outside I(t): what must be full, that place among it, and what must be empty."""
+        transition, index = self.net.transitions[t], self.net.place_index
+        full = [index[place] for place in (*transition.inputs, *transition.permissive)]
+        empty = [index[place] for place in transition.inhibitive]
+        outside = [index[place] for place in transition.outputs if place not in transition.inputs]
+        return [([*full, place], empty) for place in outside]
 
     def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking makes both firable by Eq. (1)."""
@@ -256,4 +294,4 @@ def explore_symbolically(net: Net, limits: Limits | None = None) -> SymbolicSpac
         *rows(net), max_memory_bytes=limits.memory_bytes, **engine_limits(limits.deadline)
     )
     reach = diagram.reach()
-    return SymbolicSpace(net, diagram, reach.count(), reach.edges(), limits.deadline)
+    return SymbolicSpace(net, diagram, reach.count(), limits.deadline)
