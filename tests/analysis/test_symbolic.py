@@ -163,3 +163,12 @@ def test_a_chain_of_twenty_thousand_places_needs_no_deep_stack() -> None:
     assert space.n_markings == len(names)
     assert space.count(space.deadlocks) == 1
     assert space.backward(space.deadlocks) == space.reach
+
+
+def test_edges_not_counted_in_time_are_none_and_counted_edges_are_kept() -> None:
+    space = explore_symbolically(family_net("philosophers-3000"))
+    assert space.until(Deadline.after(0)).n_edges is None
+    again = space.until(Deadline())
+    known = again.n_edges
+    assert known is not None
+    assert again.until(Deadline.after(0)).n_edges == known

@@ -15,6 +15,7 @@ pub mod algebra;
 pub mod cache;
 pub mod count;
 pub mod events;
+mod hubs;
 pub mod image;
 pub mod order;
 pub mod race;

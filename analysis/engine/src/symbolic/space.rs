@@ -11,6 +11,7 @@ use super::events::{Sense, Suffix, Suffixes, Table, contact_literals, literals};
 use super::image::{All, image};
 use super::order::Order;
 use super::saturation::{Saturation, Workshop};
+use super::walk::LAYERS_WORK;
 use super::zdd::{EMPTY, Node};
 use crate::budget::{Memory, Stop, Watch};
 use crate::net::Transition;
@@ -57,6 +58,8 @@ pub struct Symbolic {
     pub fired: u64,
     /// How many nodes were in use when the search ended, dead ones included.
     pub nodes: usize,
+    /// What the next search for a firing sequence may spend on layers.
+    pub(super) layers_work: u64,
 }
 
 impl Ordered {
@@ -145,7 +148,7 @@ impl Symbolic {
         let (fired, nodes) = (search.fired(), ordered.diagram.store.used());
         search.finish(&ordered.diagram);
         ordered.diagram.store.memory.allow(bytes);
-        Symbolic { transitions, ordered, reach, start, initial, fired, nodes }
+        Symbolic { transitions, ordered, reach, start, initial, fired, nodes, layers_work: LAYERS_WORK }
     }
 
     /// Nodes and results.

@@ -24,8 +24,11 @@ use super::space::{Events, Symbolic};
 use super::zdd::{EMPTY, Node, Store, TERMINAL};
 use crate::budget::{Stop, Watch};
 
-/// The results that the first search for layers may compute.
-const LAYERS_WORK: u64 = 20_000_000;
+/// The results that the first search for layers may compute. Where the layers did not lead into one set they hardly lead
+/// into the next, so each search in vain leaves a fraction of it to those after it, down to the least.
+pub(super) const LAYERS_WORK: u64 = 8_000_000;
+const LAYERS_WORK_LEAST: u64 = 250_000;
+const IN_VAIN: u64 = 8;
 /// The markings that one search for a way out of a hollow may look at.
 const HOLLOW_MAX: usize = 20_000;
 
@@ -93,9 +96,10 @@ impl Symbolic {
         }
         let moves = self.transitions.iter().map(|t| literals(t, self.level_of(), Sense::Forward)).collect();
         let moves = Moves(moves);
-        if let Some(walk) = self.by_layers(roots, targets, &moves, LAYERS_WORK, watch)? {
+        if let Some(walk) = self.by_layers(roots, targets, &moves, self.layers_work, watch)? {
             return Ok(Some(walk));
         }
+        self.layers_work = (self.layers_work / IN_VAIN).max(LAYERS_WORK_LEAST);
         match self.downhill(roots, targets, &moves, watch)? {
             Some(walk) => Ok(Some(walk)),
             None => self.by_layers(roots, targets, &moves, u64::MAX, watch),
