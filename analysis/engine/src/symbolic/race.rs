@@ -16,7 +16,7 @@ use super::zdd::Node;
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 
-const FUEL: u64 = 1 << 16;
+const FUEL: u64 = 1 << 17;
 const FUEL_PER_LEVEL: u64 = 64;
 /// The searches that are kept to the end, and how many times less than the first of them the second one gets.
 const FINALISTS: usize = 2;
