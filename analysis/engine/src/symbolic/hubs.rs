@@ -68,12 +68,13 @@ mod tests {
 
     #[test]
     fn who_may_hold_a_resource_stands_below_it_in_one_order() {
-        // Resources 0 to 3 in a row; holder 0 of each is place 4 to 7, holder 1 is 8 to 11.
+        // Resources 0 to 3 in a ring; holder 0 of each is place 4 to 7, holder 1 is 8 to 11. In a row, the resource at an
+        // end would have no more transitions than its holders.
         let moves = |holder: u32, from: u32, to: u32| {
             Transition::new(&[holder + from, to], &[holder + to, from], &[], &[], &[])
         };
         let transitions: Vec<Transition> =
-            (0..3).flat_map(|at| [4, 8].map(|holder| moves(holder, at, at + 1))).collect();
+            (0..4).flat_map(|at| [4, 8].map(|holder| moves(holder, at, (at + 1) % 4))).collect();
         let [up, down] = Graph::new(12, &transitions).by_hub(&transitions).unwrap();
         assert!(up.chunks(3).all(|hub| *hub == [hub[2] + 4, hub[2] + 8, hub[2]]));
         assert!(up.chunks(3).eq(down.rchunks(3)));
