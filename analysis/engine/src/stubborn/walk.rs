@@ -13,6 +13,7 @@
 //! needed is not made false between the firing that makes it and the one that needs it. Then what leads back to a marking
 //! is left out.
 
+use std::cmp::Reverse;
 use std::collections::HashMap;
 
 use super::dependencies::{Dependencies, Literal, is_true, negation};
@@ -251,11 +252,16 @@ fn cut_down(
             literals.iter().for_each(|&l| _ = needed.insert(l));
         }
         Target::Deadlock => {
+            let flips =
+                path.iter().enumerate().flat_map(|(at, &t)| net.flipped(t).iter().map(move |&l| (negation(l), at)));
+            let made: HashMap<Literal, usize> = flips.collect();
             for t in (0..transitions as u32).filter(|&t| net.able(t)) {
                 let mut unmet = net.conditions(t).iter().copied().filter(|&l| !is_true(l, reached)).map(negation);
-                let first = unmet.clone().next();
+                // What was never made costs no firing; of the rest, the last firings are needed most likely anyway.
+                let cheapest =
+                    unmet.clone().min_by_key(|l| made.get(l).map_or((false, Reverse(0)), |&at| (true, Reverse(at))));
                 if !unmet.any(|l| needed.has(l)) {
-                    first.iter().for_each(|&l| _ = needed.insert(l));
+                    cheapest.iter().for_each(|&l| _ = needed.insert(l));
                 }
             }
         }
