@@ -125,7 +125,7 @@ def test_the_evidence_of_ctl_is_a_run_of_the_net(question: tuple[Net, Temporal])
             case Exists(Globally(operand)) if isinstance(operand, Formula):
                 assert satisfies(net, run, Globally(operand)) is (verdict.status is Status.PROVED)
             case TemporalNot(ForAll(Eventually(operand))) if isinstance(operand, Formula):
-                assert satisfies(net, run, Eventually(operand)) is (verdict.status is not Status.VIOLATED)
+                assert not satisfies(net, run, Eventually(operand))  # it shows `not AF`, asked or refuted
 
 
 def some_runs(net: Net, seed: int, n_runs: int = 6) -> list[Run]:
