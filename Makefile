@@ -24,7 +24,8 @@ export PYO3_PYTHON = $(abspath $(BIN)/python)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test fmt bench bench-instructions campaign clean lint lint-python lint-ruff lint-format lint-types lint-types-tests
+.PHONY: help demo test fmt bench bench-instructions campaign mutants clean lint lint-python lint-ruff lint-format
+.PHONY: lint-types lint-types-tests
 .PHONY: lint-rust lint-rust-format lint-clippy test-rust test-python
 
 help: ## these lines
@@ -77,6 +78,10 @@ campaign: $(MADE)/develop ## every property of the tests on FACTOR times as many
 	FIRABLE_CAMPAIGN=$(FACTOR) FIRABLE_SEED=$(SEED) $(BIN)/pytest $(PYTEST_OPTIONS) --dist load \
 		-m "hypothesis or seeds" --hypothesis-seed=$(SEED) $(CAMPAIGN)
 
+mutants: $(MADE)/mutants ## which wrong edits of FILE the tests in TESTS do not notice
+	@test -n "$(FILE)" -a -n "$(TESTS)" || { echo "make mutants FILE=semantics/firing.py TESTS=tests/semantics"; exit 2; }
+	@BIN=$(abspath $(BIN)) sh tests/mutants.sh $(FILE) "$(TESTS)"
+
 bench-instructions: $(MADE)/develop ## count the instructions of the engine's hot loops against the record; needs valgrind
 	$(BIN)/python benchmarks/instructions.py
 
@@ -99,6 +104,10 @@ $(MADE)/install: $(MADE)/venv pyproject.toml $(CRATE)/Cargo.toml $(CRATE)/Cargo.
 
 $(MADE)/develop: $(MADE)/install
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group test --group lint
+	@touch $@
+
+$(MADE)/mutants: $(MADE)/develop
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group mutants
 	@touch $@
 
 # Some distributions package these apart from cargo. Without them the gate would check less than it says.
