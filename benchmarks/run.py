@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Final
 
 import explicit
-import public_nets
 import reading
 import whole_spaces
 from measuring import REPOSITORY, build_examples, is_busy, machine
@@ -21,7 +20,6 @@ BENCHMARKS: Final = {
     "explicit": explicit.tables,
     "whole_spaces": whole_spaces.tables,
     "reading": reading.tables,
-    "public_nets": public_nets.tables,
 }
 
 BUSY: Final = (

@@ -132,8 +132,7 @@ def _kept_apart(space: StateSpace[S], question: Question, clashes: Sequence[Clas
                 found.append(clash)
                 together = algebra.disjunction([together, both])
         if not found:
-            if clashes:
-                space.require_complete()
+            space.require_complete()
             return yes()
         witness = space.witness(together)
         if witness is None:
@@ -175,8 +174,7 @@ def machines_stopped(space: StateSpace[Any]) -> Verdict:
                 break
             found += [(machine, name, names[name]) for name in _unanswered(space, names)]
         if not found:
-            if machines(net):
-                space.require_complete()
+            space.require_complete()
             return yes()
         machine, name, sending = found[0]
         others = listed(f"{machine} {name}" for machine, name, _ in found)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from itertools import combinations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
-from support.examples import examples
 from support.reference import cases
 from support.ring_nets import ring_nets
 
@@ -90,7 +89,7 @@ class Truth:
             assert len(verdict.witness.firings) == distance(self.graph, self.net.initial_marking, targets)
 
 
-@examples(250)
+@settings(max_examples=250)
 @given(NETS, DISCIPLINES)
 def test_figures_and_witnesses_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     truth = Truth(net, discipline)
@@ -130,7 +129,7 @@ def test_figures_and_witnesses_are_those_of_the_definitions(net: Net, discipline
     truth.shortest("home-markings", set() if home else sinks)
 
 
-@examples(250)
+@settings(max_examples=250)
 @given(NETS, DISCIPLINES)
 def test_conflicts_and_races_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     truth = Truth(net, discipline)

@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from support.examples import examples
+from hypothesis import given, settings
 from support.reference import load_net, reference_names
 from support.whole_nets import whole_nets
 
@@ -307,7 +306,7 @@ def test_a_net_of_the_field_survives_pnml(name: str) -> None:
 
 
 @given(whole_nets())
-@examples(150)
+@settings(max_examples=150)
 def test_any_net_survives_pnml_up_to_its_names(net: Net) -> None:
     text, notes = write_pnml(net)
     back = parse_pnml(text).net

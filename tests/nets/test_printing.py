@@ -3,9 +3,8 @@
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.examples import examples
 from support.reference import cases, load_net, reference_names
 from support.whole_nets import whole_nets
 
@@ -42,7 +41,7 @@ def test_a_reference_net_survives_printing(name: str) -> None:
 
 
 @given(whole_nets())
-@examples(300)
+@settings(max_examples=300)
 def test_any_net_survives_printing(net: Net) -> None:
     back = parse_net(format_net(net))
     assert back == in_file_order(net)
@@ -51,7 +50,7 @@ def test_any_net_survives_printing(net: Net) -> None:
 
 
 @given(whole_nets())
-@examples(100)
+@settings(max_examples=100)
 def test_file_order_only_reorders(net: Net) -> None:
     ordered = in_file_order(net)
     assert set(ordered.places) == set(net.places)

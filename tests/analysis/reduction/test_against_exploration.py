@@ -6,11 +6,10 @@ import random
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.cell_nets import cell_nets
 from support.dense_nets import dense_nets
-from support.examples import examples, seeds
 from support.lively_nets import lively_net, lively_nets, part_of
 from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
@@ -67,10 +66,9 @@ def check(net: Net, goal: Formula) -> Reduced:
     return reduced
 
 
-@pytest.mark.seeds
 @pytest.mark.parametrize("chunk", range(4))
 def test_goals_of_nets_whose_transitions_compete_are_kept(chunk: int) -> None:
-    for seed in seeds(60, chunk):
+    for seed in range(60 * chunk, 60 * (chunk + 1)):
         draw = random.Random(seed)
         net = lively_net(draw, 10)
         check(net, Deadlock())
@@ -78,20 +76,20 @@ def test_goals_of_nets_whose_transitions_compete_are_kept(chunk: int) -> None:
         check(net, part_of(draw, net, draw.getrandbits(len(net.places)), 4))
 
 
-@examples(150)
+@settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_a_goal_is_reachable_in_the_reduced_net_exactly_if_it_is_in_the_original(data: st.DataObject) -> None:
     net = data.draw(NETS)
     check(net, data.draw(goals(net)))
 
 
-@examples(100)
+@settings(max_examples=100, deadline=None)
 @given(NETS)
 def test_there_is_a_deadlock_in_the_reduced_net_exactly_if_there_is_one_in_the_original(net: Net) -> None:
     check(net, Deadlock())
 
 
-@examples(60)
+@settings(max_examples=60, deadline=None)
 @given(NETS)
 def test_a_transition_is_live_or_dead_exactly_if_its_image_is(net: Net) -> None:
     original, reduced = NaiveSpace(net), reduce_for_liveness(net)
@@ -105,7 +103,7 @@ def test_a_transition_is_live_or_dead_exactly_if_its_image_is(net: Net) -> None:
     assert (original.count(original.deadlocks) > 0) == (space.count(space.deadlocks) > 0)
 
 
-@examples(60)
+@settings(max_examples=60, deadline=None)
 @given(NETS)
 def test_literals_that_are_true_together_somewhere_are_not_said_to_exclude_each_other(net: Net) -> None:
     facts = pairs(Draft(net, None), None, NEVER)
@@ -166,7 +164,7 @@ def test_where_the_deadline_is_over_nothing_but_what_cannot_fire_is_gone() -> No
     assert len(reduced.net.places) == 2
 
 
-@examples(60)
+@settings(max_examples=60, deadline=None)
 @given(cell_nets(), st.integers(1, 12))
 def test_whatever_the_deadline_interrupts_the_result_is_sound(net: Net, polls: int) -> None:
     class Clock(Deadline):

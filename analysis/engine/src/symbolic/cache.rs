@@ -10,6 +10,7 @@
 
 use super::zdd::{EMPTY, Marks, Node};
 use crate::budget::{Memory, Stop};
+use crate::region::Region;
 
 /// Which operation a result belongs to; the upper four bits of a key's first word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,22 +43,19 @@ pub const OPERAND_MAX: u32 = (1 << 28) - 1;
 /// No constraint, in the place of a node.
 pub const ANY: Node = u32::MAX;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Entry {
-    key: [u32; 3],
-    result: Node,
-}
+/// The key of an operation and its operands, and the result.
+type Entry = [u32; 4];
 
 const WAYS: usize = 4;
 const LINES: usize = 1 << 8;
 /// How often over a cache that cannot grow may be filled anew.
 const FORGOTTEN_MAX: usize = 64;
-const BLANK: Entry = Entry { key: [0; 3], result: 0 };
+const BLANK: Entry = [0; 4];
 
 /// Results by operation and operands.
 #[derive(Debug)]
 pub struct Cache {
-    lines: Vec<[Entry; WAYS]>,
+    lines: Region<[Entry; WAYS]>,
     inserted: usize,
     grow_at: usize,
     bytes_max: usize,
@@ -78,10 +76,17 @@ fn hash(key: [u32; 3]) -> usize {
     (mixed ^ mixed >> 32) as usize
 }
 
+/// Empty lines, claimed.
+fn blank(memory: &Memory, lines: usize) -> Result<Region<[Entry; WAYS]>, Stop> {
+    let bytes = lines * size_of::<[Entry; WAYS]>();
+    memory.claim(bytes)?;
+    Region::zeroed(lines).ok_or(Stop::Memory).inspect_err(|_| memory.release(bytes))
+}
+
 impl Cache {
     /// An empty cache that may take so many bytes.
     pub fn new(memory: &Memory, bytes_max: usize) -> Result<Self, Stop> {
-        let lines = memory.filled([BLANK; WAYS], LINES)?;
+        let lines = blank(memory, LINES)?;
         Ok(Cache { lines, inserted: 0, grow_at: LINES * WAYS / 2, bytes_max, work: 0 })
     }
 
@@ -89,8 +94,9 @@ impl Cache {
     #[inline]
     pub fn get(&self, op: Op, operand: u32, a: u32, b: u32) -> Option<Node> {
         let key = key(op, operand, a, b);
-        let line = &self.lines[hash(key) & (self.lines.len() - 1)];
-        line.iter().find(|entry| entry.key == key).map(|entry| entry.result)
+        let lines = self.lines.all();
+        let line = &lines[hash(key) & (lines.len() - 1)];
+        line.iter().find(|entry| entry[..3] == key).map(|entry| entry[3])
     }
 
     /// Remembers a result; an operand or result that is a node must be one.
@@ -101,22 +107,24 @@ impl Cache {
         if self.inserted > self.grow_at {
             self.grow(memory)?;
         }
-        self.place(Entry { key: key(op, operand, a, b), result });
+        let [op, a, b] = key(op, operand, a, b);
+        self.place([op, a, b, result]);
         Ok(())
     }
 
     #[inline]
     fn place(&mut self, entry: Entry) {
-        let mask = self.lines.len() - 1;
-        let line = &mut self.lines[hash(entry.key) & mask];
+        let lines = self.lines.all_mut();
+        let mask = lines.len() - 1;
+        let line = &mut lines[hash([entry[0], entry[1], entry[2]]) & mask];
         line.copy_within(..WAYS - 1, 1);
         line[0] = entry;
     }
 
     #[cold]
     fn grow(&mut self, memory: &Memory) -> Result<(), Stop> {
-        let (old, line) = (self.lines.len(), size_of::<[Entry; WAYS]>());
-        let lines = if 2 * old * line <= self.bytes_max { memory.filled([BLANK; WAYS], 2 * old).ok() } else { None };
+        let (old, line) = (self.lines.all().len(), size_of::<[Entry; WAYS]>());
+        let lines = if 2 * old * line <= self.bytes_max { blank(memory, 2 * old).ok() } else { None };
         let Some(lines) = lines else {
             // No more room: from now on it forgets, for a while.
             let patience = FORGOTTEN_MAX * old * WAYS;
@@ -127,7 +135,7 @@ impl Cache {
             return Ok(());
         };
         let before = std::mem::replace(&mut self.lines, lines);
-        for entry in before.iter().flat_map(|line| line.iter().rev()).filter(|&&entry| entry != BLANK) {
+        for entry in before.all().iter().flat_map(|line| line.iter().rev()).filter(|&&entry| entry != BLANK) {
             self.place(*entry);
         }
         memory.release(old * line);
@@ -138,9 +146,9 @@ impl Cache {
 
     /// Forgets every result that speaks of a node no longer in use.
     pub fn sweep(&mut self, marks: &Marks) {
-        for entry in self.lines.iter_mut().flatten() {
+        for entry in self.lines.all_mut().iter_mut().flatten() {
             let known = |node: u32| node == ANY || marks.has(node);
-            if !(known(entry.key[1]) && known(entry.key[2]) && known(entry.result)) {
+            if !entry[1..].iter().all(|&node| known(node)) {
                 *entry = BLANK;
             }
         }

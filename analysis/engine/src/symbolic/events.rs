@@ -248,19 +248,19 @@ impl Table {
 
     /// How many bytes the table takes.
     pub fn bytes(&self) -> usize {
-        4 * (self.offsets.capacity() + self.heads.capacity() + self.wakeful.minima.capacity())
+        4 * (self.offsets.capacity() + self.heads.capacity()) + self.wakeful.bytes()
     }
 }
 
-/// A tree of minima over the levels.
+/// A tree of minima over the levels, or over blocks of them.
 #[derive(Debug)]
-struct Wakeful {
+pub(super) struct Wakeful {
     size: usize,
     minima: Vec<u32>,
 }
 
 impl Wakeful {
-    fn new(values: &[u32]) -> Self {
+    pub(super) fn new(values: &[u32]) -> Self {
         let size = values.len().next_power_of_two();
         let mut minima = vec![u32::MAX; 2 * size];
         minima[size..size + values.len()].copy_from_slice(values);
@@ -270,9 +270,14 @@ impl Wakeful {
         Wakeful { size, minima }
     }
 
+    /// How many bytes the tree takes.
+    pub(super) fn bytes(&self) -> usize {
+        4 * self.minima.capacity()
+    }
+
     /// The first index from `from` to `to` whose value is at most `value`.
     #[inline]
-    fn first(&self, from: usize, to: usize, value: u32) -> Option<usize> {
+    pub(super) fn first(&self, from: usize, to: usize, value: u32) -> Option<usize> {
         let mut at = from + self.size;
         while self.minima[at] > value {
             // The next subtree to the right, which is a root of one as large as can be.

@@ -10,8 +10,9 @@ use std::cmp::Reverse;
 
 use super::cache::ANY;
 use super::order::{Order, candidates};
+use super::ordered::Ordered;
 use super::saturation::{Saturation, Workshop};
-use super::space::{Events, Ordered, Symbolic};
+use super::space::Symbolic;
 use super::zdd::Node;
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
@@ -36,7 +37,7 @@ impl Racer {
     /// Levels done (more is better), and nodes made.
     fn standing(&self) -> (Reverse<u32>, usize) {
         self.begun.as_ref().map_or((Reverse(0), 0), |(ordered, search, _)| {
-            (Reverse(search.reached(&ordered.diagram)), ordered.diagram.store.used())
+            (Reverse(search.reached(&ordered.blocks, &ordered.diagram)), ordered.diagram.store.used())
         })
     }
 
@@ -51,16 +52,16 @@ impl Racer {
         let (ordered, search, start) = match &mut self.begun {
             Some(begun) => begun,
             none => {
-                let mut ordered = Ordered::new(self.order.len(), transitions, &self.order, room)?;
+                let mut ordered = Ordered::new(transitions, initial, &self.order, room)?;
                 let start = ordered.single(initial)?;
-                let search = Saturation::new(&ordered.diagram, start, ANY, ordered.levels(), false)?;
+                let search = Saturation::new(&ordered.diagram, &ordered.blocks, start, ANY, false)?;
                 none.insert((ordered, search, start))
             }
         };
         ordered.diagram.store.memory.allow(room);
-        let Ordered { diagram, suffixes, tables, .. } = ordered;
-        let Some(table) = &tables[Events::Forward as usize] else { return Ok(None) };
-        search.run(&mut Workshop { diagram, suffixes, table, roots: &[*start] }, fuel, watch)
+        let Ordered { diagram, blocks, parts, agendas, .. } = ordered;
+        let Some(agenda) = &agendas[0] else { return Ok(None) };
+        search.run(&mut Workshop { diagram, blocks, parts, agenda, roots: &[*start] }, fuel, watch)
     }
 }
 

@@ -1,46 +1,20 @@
 //! The markings that a net reaches, as a diagram, and the operators of temporal logic on its sets.
 //!
-//!
 //! An operation that ends for want of memory is tried once more with the garbage gone. The nodes in use are the caller's to
 //! name, as it is the caller who knows which sets are still wanted.
 
 use super::algebra::{Binary, Diagram};
 use super::cache::ANY;
 use super::count::{self, Natural};
-use super::events::{Sense, Suffix, Suffixes, Table, contact_literals, literals};
+use super::events::{Suffix, Table};
 use super::image::{All, image};
-use super::order::Order;
+pub use super::ordered::Events;
+use super::ordered::Ordered;
 use super::saturation::{Saturation, Workshop};
 use super::walk::LAYERS_WORK;
 use super::zdd::{EMPTY, Node};
-use crate::budget::{Memory, Stop, Watch};
+use crate::budget::{Stop, Watch};
 use crate::net::Transition;
-
-/// The tables of events that are made when they are first needed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Events {
-    /// The firings.
-    Forward,
-    /// The firings, from the marking after to the one before.
-    Backward,
-    /// The conditions of firing.
-    Tests,
-    /// The conditions of contact.
-    Contacts,
-}
-
-/// An order of places, and the diagram in it.
-#[derive(Debug)]
-pub(super) struct Ordered {
-    /// The level of each place.
-    level_of: Vec<u32>,
-    /// The place of each level but 0.
-    place_at: Vec<u32>,
-    pub(super) diagram: Diagram,
-    pub(super) suffixes: Suffixes,
-    pub(super) tables: [Option<Table>; 4],
-    claimed: usize,
-}
 
 /// A net with the markings that it reaches.
 #[derive(Debug)]
@@ -60,80 +34,6 @@ pub struct Symbolic {
     pub nodes: usize,
     /// What the next search for a firing sequence may spend on layers.
     pub(super) layers_work: u64,
-}
-
-impl Ordered {
-    /// An empty diagram, and the firings in it.
-    pub(super) fn new(places: usize, transitions: &[Transition], order: &Order, bytes: usize) -> Result<Self, Stop> {
-        let mut level_of = vec![0; places];
-        let mut place_at = vec![0; places + 1];
-        for (at, &place) in order.iter().enumerate() {
-            level_of[place as usize] = at as u32 + 1;
-            place_at[at + 1] = place;
-        }
-        let diagram = Diagram::new(Memory::new(bytes), bytes)?;
-        let tables = [const { None }; 4];
-        let mut ordered = Ordered { level_of, place_at, diagram, suffixes: Suffixes::default(), tables, claimed: 0 };
-        ordered.table(Events::Forward, transitions)?;
-        Ok(ordered)
-    }
-
-    pub(super) fn levels(&self) -> u32 {
-        self.level_of.len() as u32
-    }
-
-    fn table(&mut self, which: Events, transitions: &[Transition]) -> Result<(), Stop> {
-        if self.tables[which as usize].is_some() {
-            return Ok(());
-        }
-        let mut events = Vec::new();
-        for transition in transitions {
-            match which {
-                Events::Contacts => {
-                    for output in transition.outputs.iter().filter(|place| !transition.inputs.contains(place)) {
-                        if let Some(found) = contact_literals(transition, *output, &self.level_of) {
-                            events.push(self.suffixes.whole(&found)?);
-                        }
-                    }
-                }
-                Events::Forward | Events::Backward => {
-                    // What changes nothing adds no marking.
-                    if !(transition.inputs.is_empty() && transition.outputs.is_empty()) {
-                        events.extend(self.event(transition, which)?);
-                    }
-                }
-                Events::Tests => events.extend(self.event(transition, which)?),
-            }
-        }
-        if which != Events::Tests {
-            events.sort_unstable();
-            events.dedup();
-        }
-        let table = Table::new(&self.suffixes, events, self.levels());
-        let bytes =
-            self.suffixes.bytes() + self.tables.iter().flatten().chain([&table]).map(Table::bytes).sum::<usize>();
-        let more = bytes.saturating_sub(self.claimed);
-        self.diagram.store.memory.claim(more)?;
-        self.claimed += more;
-        self.tables[which as usize] = Some(table);
-        Ok(())
-    }
-
-    fn event(&mut self, transition: &Transition, which: Events) -> Result<Option<Suffix>, Stop> {
-        let sense = match which {
-            Events::Forward => Sense::Forward,
-            Events::Backward => Sense::Backward,
-            Events::Tests | Events::Contacts => Sense::Test,
-        };
-        literals(transition, &self.level_of, sense).map(|found| self.suffixes.whole(&found)).transpose()
-    }
-
-    pub(super) fn single(&mut self, marked: &[u32]) -> Result<Node, Stop> {
-        let mut levels: Vec<u32> = marked.iter().map(|&place| self.level_of[place as usize]).collect();
-        levels.sort_unstable();
-        levels.dedup();
-        self.diagram.single(&levels)
-    }
 }
 
 impl Symbolic {
@@ -352,13 +252,11 @@ impl Symbolic {
     ) -> Result<Node, Stop> {
         let held = [set, if within == ANY { EMPTY } else { within }];
         self.again(roots, &held, |space, roots| {
-            let which = if back { Events::Backward } else { Events::Forward };
-            space.ordered.table(which, &space.transitions)?;
-            let levels = space.ordered.levels();
-            let Ordered { diagram, suffixes, tables, .. } = &mut space.ordered;
-            let Some(table) = &tables[which as usize] else { return Ok(EMPTY) };
-            let mut search = Saturation::new(diagram, set, within, levels, back)?;
-            let mut shop = Workshop { diagram, suffixes, table, roots };
+            space.ordered.agenda(back, &space.transitions)?;
+            let Ordered { diagram, blocks, parts, agendas, .. } = &mut space.ordered;
+            let Some(agenda) = &agendas[usize::from(back)] else { return Ok(EMPTY) };
+            let mut search = Saturation::new(diagram, blocks, set, within, back)?;
+            let mut shop = Workshop { diagram, blocks, parts, agenda, roots };
             let result = search.run(&mut shop, u64::MAX, watch);
             search.finish(diagram);
             Ok(result?.unwrap_or(EMPTY))

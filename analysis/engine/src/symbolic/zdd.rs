@@ -10,6 +10,7 @@
 //! references of every node, writes to two children for each node made, and nearly all of them die within the operation.
 
 use crate::budget::{Memory, Stop};
+use crate::region::Region;
 
 /// A set of markings: the number of its node.
 pub type Node = u32;
@@ -22,10 +23,13 @@ pub const UNIT: Node = 1;
 /// The level of the two terminal nodes; places have levels from 1, the top is the highest.
 pub const TERMINAL: u32 = 0;
 const FREE: u32 = u32::MAX;
-const NIL: u32 = u32::MAX;
+/// No node: a terminal is in no chain.
+const NIL: u32 = 0;
 const NODES_MAX: usize = (1 << 31) - 1;
 /// Below this number of nodes nothing is collected.
 const COLLECT_FROM: usize = 1 << 20;
+/// How many nodes there are for each that is remembered as the last of its hash.
+const PER_LAST: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 struct Cell {
@@ -39,7 +43,9 @@ struct Cell {
 #[derive(Debug)]
 pub struct Store {
     cells: Vec<Cell>,
-    buckets: Vec<u32>,
+    buckets: Region<u32>,
+    /// The node that was last made in several steps, by a hash of what it was made of; it may be another one since.
+    last: Region<u32>,
     free: u32,
     used: usize,
     collect_at: usize,
@@ -73,12 +79,20 @@ fn hash(level: u32, lo: Node, hi: Node) -> u64 {
     mixed ^ mixed >> 32
 }
 
+/// Empty chains, claimed.
+fn buckets(memory: &Memory, size: usize) -> Result<Region<u32>, Stop> {
+    let bytes = size * size_of::<u32>();
+    memory.claim(bytes)?;
+    Region::zeroed(size).ok_or(Stop::Memory).inspect_err(|_| memory.release(bytes))
+}
+
 impl Store {
     /// The two terminals alone.
     pub fn new(memory: Memory) -> Result<Self, Stop> {
         let mut store = Store {
             cells: Vec::new(),
-            buckets: memory.filled(NIL, 1 << 10)?,
+            buckets: buckets(&memory, 1 << 10)?,
+            last: buckets(&memory, (1 << 10) / PER_LAST)?,
             free: NIL,
             used: 2,
             collect_at: COLLECT_FROM,
@@ -135,8 +149,8 @@ impl Store {
             return Ok(lo);
         }
         debug_assert!(self.level(lo) < level && self.level(hi) < level);
-        let bucket = hash(level, lo, hi) as usize & (self.buckets.len() - 1);
-        let mut at = self.buckets[bucket];
+        let bucket = hash(level, lo, hi) as usize & (self.buckets.all().len() - 1);
+        let mut at = self.buckets.all()[bucket];
         while at != NIL {
             let cell = &self.cells[at as usize];
             if cell.lo == lo && cell.hi == hi && cell.level == level {
@@ -147,8 +161,23 @@ impl Store {
         self.insert(bucket, level, lo, hi)
     }
 
+    /// The node that was last made from values of a hash; the caller looks whether it is what is wanted.
+    #[inline]
+    pub(super) fn last_of(&self, hash: u64) -> Node {
+        let last = self.last.all();
+        last[hash as usize & (last.len() - 1)]
+    }
+
+    /// Remembers the node made from values of a hash.
+    #[inline]
+    pub(super) fn set_last_of(&mut self, hash: u64, node: Node) {
+        let last = self.last.all_mut();
+        let at = hash as usize & (last.len() - 1);
+        last[at] = node;
+    }
+
     fn insert(&mut self, bucket: usize, level: u32, lo: Node, hi: Node) -> Result<Node, Stop> {
-        let cell = Cell { level, lo, hi, next: self.buckets[bucket] };
+        let cell = Cell { level, lo, hi, next: self.buckets.all()[bucket] };
         let at = if self.free != NIL {
             let at = self.free;
             self.free = self.cells[at as usize].next;
@@ -162,27 +191,27 @@ impl Store {
             self.cells.len() as u32 - 1
         };
         self.used += 1;
-        self.buckets[bucket] = at;
-        if self.used > self.buckets.len() {
-            self.rehash(self.buckets.len() * 2)?;
+        self.buckets.all_mut()[bucket] = at;
+        if self.used > self.buckets.all().len() {
+            self.rehash(self.buckets.all().len() * 2)?;
         }
         Ok(at)
     }
 
     fn rehash(&mut self, size: usize) -> Result<(), Stop> {
-        let buckets = self.memory.filled(NIL, size)?;
-        self.memory.release(self.buckets.len() * size_of::<u32>());
-        self.buckets = buckets;
+        let (new, last) = (buckets(&self.memory, size)?, buckets(&self.memory, size / PER_LAST)?);
+        self.memory.release((self.buckets.all().len() + self.last.all().len()) * size_of::<u32>());
+        (self.buckets, self.last) = (new, last);
         self.chain();
         Ok(())
     }
 
     fn chain(&mut self) {
-        let mask = self.buckets.len() - 1;
+        let buckets = self.buckets.all_mut();
+        let mask = buckets.len() - 1;
         for (at, cell) in self.cells.iter_mut().enumerate().skip(2).filter(|(_, cell)| cell.level != FREE) {
             let bucket = hash(cell.level, cell.lo, cell.hi) as usize & mask;
-            cell.next = self.buckets[bucket];
-            self.buckets[bucket] = at as u32;
+            cell.next = std::mem::replace(&mut buckets[bucket], at as u32);
         }
     }
 
@@ -213,7 +242,7 @@ impl Store {
             self.done(marks);
             return Err(stop);
         }
-        self.buckets.fill(NIL);
+        self.buckets.all_mut().fill(NIL);
         self.free = NIL;
         self.used = 2;
         for (at, cell) in self.cells.iter_mut().enumerate().skip(2).rev() {

@@ -1,0 +1,226 @@
+//! Blocks: neighbouring places that answer each other, taken as one level of the search.
+//!
+//! Of five places of a machine one holds a token. One place a level, the diagram says so in a chain of nodes, and a
+//! search that goes by places fires each event of the machine at whichever of its places stands highest, on nodes that
+//! know only some of the others. So the search goes by blocks: a node of a block is opened into its *values* (which of
+//! its places hold a token) and what is below each, events are fired from value to value, and the chain of nodes is made
+//! when all has been found. The diagram itself keeps one place a level, so that nothing else knows of blocks.
+//!
+//! This is the multi-valued diagram of Ciardo's saturation, stored as a zero-suppressed one: a machine of k places takes
+//! k nodes of 16 bytes in either, and nodes of one size need no allocator. Which places make a block is found by playing
+//! the net on them alone, whatever the other places say: that gives at least the values there are, without invariants,
+//! and a block ends where another place would add more values than it saves levels.
+
+use std::collections::HashMap;
+
+use super::events::{Kind, Mixed, Sense, literals};
+use super::zdd::{EMPTY, Node, Store};
+use crate::net::Transition;
+
+/// The most places of a block.
+const WIDTH_MAX: usize = 16;
+/// The most values that a block may have.
+const VALUES_MAX: usize = 24;
+/// What a block costs besides its values, in values.
+const OVERHEAD: usize = 6;
+
+/// The literals of transitions in descending order of level; without those that never fire or change nothing.
+#[derive(Debug)]
+pub(super) struct Literals {
+    offsets: Vec<u32>,
+    all: Vec<(u32, Kind)>,
+}
+
+impl Literals {
+    /// Those of these transitions, where each place has its level.
+    pub(super) fn new(transitions: &[Transition], level_of: &[u32], sense: Sense) -> Self {
+        let mut found = Literals { offsets: vec![0], all: Vec::new() };
+        for transition in transitions.iter().filter(|t| !(t.inputs.is_empty() && t.outputs.is_empty())) {
+            if let Some(own) = literals(transition, level_of, sense) {
+                found.all.extend(own);
+                found.offsets.push(found.all.len() as u32);
+            }
+        }
+        found
+    }
+
+    /// How many transitions.
+    pub(super) fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// Those of one transition.
+    pub(super) fn get(&self, at: usize) -> &[(u32, Kind)] {
+        &self.all[self.offsets[at] as usize..self.offsets[at + 1] as usize]
+    }
+
+    /// For each level, the transitions that have a literal there.
+    fn by_level(&self, levels: usize) -> (Vec<u32>, Vec<u32>) {
+        let mut offsets = vec![0; levels + 2];
+        for &(level, _) in &self.all {
+            offsets[level as usize + 1] += 1;
+        }
+        for at in 1..offsets.len() {
+            offsets[at] += offsets[at - 1];
+        }
+        let mut next = offsets.clone();
+        let mut joined = vec![0; self.all.len()];
+        for at in 0..self.len() {
+            for &(level, _) in self.get(at) {
+                joined[next[level as usize] as usize] = at as u32;
+                next[level as usize] += 1;
+            }
+        }
+        (offsets, joined)
+    }
+}
+
+/// What a transition wants and changes in a window of places, as bits.
+type Local = [u32; 3];
+
+/// The levels cut into blocks.
+#[derive(Debug)]
+pub(super) struct Blocks {
+    /// The block of each level; 0 for level 0.
+    of: Vec<u32>,
+    /// The lowest level of each block, and one more at the end.
+    low: Vec<u32>,
+}
+
+impl Blocks {
+    /// Blocks that have few values in what can be reached from a marking, given by level.
+    pub(super) fn new(literals: &Literals, marked: &[bool]) -> Self {
+        let levels = marked.len() - 1;
+        let (offsets, joined) = literals.by_level(levels);
+        let mut widths: HashMap<(u32, Vec<Local>), usize, Mixed> = HashMap::default();
+        let mut seen = vec![0_u32; literals.len()];
+        let (mut of, mut low) = (vec![0], vec![0]);
+        let mut start = 1;
+        while start <= levels {
+            let most = WIDTH_MAX.min(levels + 1 - start);
+            let mut window: Vec<Local> = Vec::new();
+            for &t in &joined[offsets[start] as usize..offsets[start + most] as usize] {
+                if std::mem::replace(&mut seen[t as usize], start as u32) != start as u32 {
+                    window.push(local(literals.get(t as usize), start as u32, most as u32));
+                }
+            }
+            window.sort_unstable();
+            window.dedup();
+            let first = (0..most).fold(0, |value, at| value | u32::from(marked[start + at]) << at);
+            let width =
+                *widths.entry((first, window)).or_insert_with_key(|(first, window)| width(*first, window, most));
+            of.resize(start + width, low.len() as u32);
+            low.push(start as u32);
+            start += width;
+        }
+        low.push(levels as u32 + 1);
+        Blocks { of, low }
+    }
+
+    /// The block of a level; 0 for level 0.
+    #[inline(always)]
+    pub(super) fn of(&self, level: u32) -> u32 {
+        self.of[level as usize]
+    }
+
+    /// The lowest level of a block.
+    #[inline(always)]
+    pub(super) fn low(&self, block: u32) -> u32 {
+        self.low[block as usize]
+    }
+
+    /// How many blocks there are; they are numbered from 1.
+    pub(super) fn len(&self) -> usize {
+        self.low.len() - 2
+    }
+
+    /// How many bytes the blocks take.
+    pub(super) fn bytes(&self) -> usize {
+        4 * (self.of.capacity() + self.low.capacity())
+    }
+
+    /// What is below a value of a block in a set whose node lies at the block or below.
+    pub(super) fn child(&self, store: &Store, mut node: Node, block: u32, mut value: u32) -> Node {
+        let low = self.low(block);
+        while store.level(node) >= low {
+            let at = store.level(node) - low;
+            if value >> at > 1 {
+                return EMPTY;
+            }
+            node = if value >> at == 1 { store.hi(node) } else { store.lo(node) };
+            value &= !(1 << at);
+        }
+        if value == 0 { node } else { EMPTY }
+    }
+}
+
+fn local(literals: &[(u32, Kind)], start: u32, width: u32) -> Local {
+    let mut found = [0; 3];
+    for &(level, kind) in literals.iter().filter(|(level, _)| (start..start + width).contains(level)) {
+        let bit = 1 << (level - start);
+        found[usize::from(!kind.wants())] |= bit;
+        if kind.wants() != kind.leaves() {
+            found[2] |= bit;
+        }
+    }
+    found
+}
+
+/// How many places from the first of a window make the best block.
+fn width(first: u32, window: &[Local], most: usize) -> usize {
+    let (mut best, mut width) = (usize::MAX, 1);
+    for places in 1..=most {
+        let mask = u32::MAX >> (32 - places);
+        let mut moves: Vec<Local> = window.iter().map(|local| local.map(|bits| bits & mask)).collect();
+        moves.retain(|local| local[2] != 0);
+        moves.sort_unstable();
+        moves.dedup();
+        let mut values = vec![first & mask];
+        let mut at = 0;
+        while at < values.len() && values.len() <= VALUES_MAX {
+            let value = values[at];
+            at += 1;
+            for [full, empty, flip] in &moves {
+                if value & full == *full && value & empty == 0 && !values.contains(&(value ^ flip)) {
+                    values.push(value ^ flip);
+                }
+            }
+        }
+        if values.len() > VALUES_MAX {
+            continue;
+        }
+        let cost = (values.len() + OVERHEAD) * 1000 / places;
+        if cost <= best {
+            (best, width) = (cost, places);
+        }
+    }
+    width
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn widths(marked: &[bool], transitions: &[Transition]) -> Vec<u32> {
+        let level_of: Vec<u32> = (1..marked.len() as u32).collect();
+        let blocks = Blocks::new(&Literals::new(transitions, &level_of, Sense::Forward), marked);
+        (1..=blocks.len() as u32).map(|block| blocks.low(block + 1) - blocks.low(block)).collect()
+    }
+
+    #[test]
+    fn the_places_of_a_machine_are_one_block() {
+        // Two machines of eight places side by side, which meet in one transition.
+        let moves = |from: u32, to: u32| Transition::new(&[from], &[to], &[], &[], &[]);
+        let mut all: Vec<Transition> =
+            [0, 8].into_iter().flat_map(|first| (0..7).map(move |at| moves(first + at, first + at + 1))).collect();
+        all.push(Transition::new(&[7, 15], &[0, 8], &[], &[], &[]));
+        let marked: Vec<bool> = (0..17).map(|level| level == 1 || level == 9).collect();
+        assert_eq!(widths(&marked, &all), [8, 8]);
+    }
+
+    #[test]
+    fn a_block_ends_where_its_values_would_be_too_many() {
+        let all: Vec<Transition> = (0..12).map(|at| Transition::new(&[], &[at], &[], &[], &[])).collect();
+        assert!(widths(&[false; 13], &all).iter().all(|&width| 1 << width <= VALUES_MAX));
+    }
+}
