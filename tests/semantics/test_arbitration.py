@@ -45,18 +45,43 @@ def test_an_uncontested_grant_does_not_turn_the_rotation() -> None:
     assert arbitration.decide([0], arbitration.first_turns)[1] == arbitration.first_turns
 
 
+def test_who_wins_beside_the_conflict_does_not_turn_the_rotation() -> None:
+    # t and u want p; z, which would compete with x for r, is not enabled, so x has beaten nobody.
+    shapes = {"t": ("p",), "x": ("r",), "u": ("p", "q"), "z": ("q", "r")}
+    transitions = tuple(Transition(name, inputs) for name, inputs in shapes.items())
+    rotation = Arbiter("a", tuple(shapes), ArbitrationRule.ROTATION)
+    arbitration = Arbitration.of(Net("n", tuple(map(Place, "pqr")), transitions, arbiters=(rotation,)))
+    assert arbitration.decide([0, 1, 2], arbitration.first_turns) == ((0, 1), (1,))
+
+
+def test_a_conflict_over_an_output_does_not_turn_the_rotation() -> None:
+    transitions = (Transition("t", ("p",), ("s",)), Transition("u", ("q",), ("s",)))
+    rotation = Arbiter("a", ("t", "u"), ArbitrationRule.ROTATION)
+    arbitration = Arbitration.of(Net("n", tuple(map(Place, "pqs")), transitions, arbiters=(rotation,)))
+    assert arbitration.decide([0, 1], arbitration.first_turns) == ((0,), (0,))
+
+
+def test_components_without_an_arbiter_are_numbered_from_one_and_decided_in_the_order_of_the_file() -> None:
+    places = (Place("p"), Place("q"))
+    transitions = tuple(Transition(t, (p,)) for t, p in (("t", "p"), ("u", "p"), ("v", "q"), ("w", "q")))
+    arbitration = Arbitration.of(Net("n", places, transitions, arbiters=(Arbiter("a", ("u", "t")),)))
+    assert [group.name for group in arbitration.groups] == ["a", "conflict-2"]
+    assert arbitration.decide([0, 1, 2, 3], arbitration.first_turns)[0] == (1, 2)
+
+
 def test_an_arbiter_over_two_components_is_refused() -> None:
     places = (Place("p"), Place("q"))
     transitions = tuple(Transition(t, (p,)) for t, p in (("t", "p"), ("u", "p"), ("v", "q"), ("w", "q")))
-    net = Net("n", places, transitions, arbiters=(Arbiter("a", ("t", "v")),))
-    with pytest.raises(InputError, match="F2013"):
+    net = Net("n", places, transitions, arbiters=(Arbiter("a", ("t", "u", "v")),))
+    with pytest.raises(InputError, match="F2013") as refusal:
         Arbitration.of(net)
+    assert refusal.value.diagnostics[0].hint == "leave out v, or check the arcs"
 
 
 def test_two_arbiters_of_one_component_are_refused() -> None:
     transitions = tuple(Transition(t, ("p",)) for t in "tuvw")
     arbiters = (Arbiter("a", ("t", "u")), Arbiter("b", ("v", "w")))
-    with pytest.raises(InputError, match="F2013"):
+    with pytest.raises(InputError, match="'b' and 'a' decide the same conflict component"):
         Arbitration.of(Net("n", (Place("p"),), transitions, arbiters=arbiters))
 
 
