@@ -9,6 +9,10 @@ MADE := $(VENV)/made
 CRATE := analysis/engine
 CARGO_OPTIONS := --locked --manifest-path $(CRATE)/Cargo.toml
 PYTEST_OPTIONS ?= -q -n auto --dist loadfile
+# A campaign: how many times the examples of a test run, from which seed, and in which folder of tests.
+FACTOR ?= 20
+SEED := $(shell date +%s)
+CAMPAIGN ?= tests
 
 # Public nets to test against, where they stand beside the checkout; tests that miss them say so.
 ifneq ($(wildcard ../shared/nets),)
@@ -20,7 +24,8 @@ export PYO3_PYTHON = $(abspath $(BIN)/python)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test fmt bench bench-instructions clean lint lint-python lint-ruff lint-format lint-types lint-types-tests
+.PHONY: help demo test fmt bench bench-instructions campaign mutants clean lint lint-python lint-ruff lint-format
+.PHONY: lint-types lint-types-tests
 .PHONY: lint-rust lint-rust-format lint-clippy test-rust test-python
 
 help: ## these lines
@@ -69,6 +74,14 @@ fmt: $(MADE)/develop $(MADE)/rust-tools ## format all code, and repair what the 
 bench: $(MADE)/develop ## measure, as ratios to yardsticks in the same run; writes benchmarks/RESULTS.md
 	$(BIN)/python benchmarks/run.py
 
+campaign: $(MADE)/develop ## every property of the tests on FACTOR times as many drawn nets; SEED brings a campaign back
+	FIRABLE_CAMPAIGN=$(FACTOR) FIRABLE_SEED=$(SEED) $(BIN)/pytest $(PYTEST_OPTIONS) --dist load \
+		-m "hypothesis or seeds" --hypothesis-seed=$(SEED) $(CAMPAIGN)
+
+mutants: $(MADE)/mutants ## which wrong edits of FILE the tests in TESTS do not notice
+	@test -n "$(FILE)" -a -n "$(TESTS)" || { echo "make mutants FILE=semantics/firing.py TESTS=tests/semantics"; exit 2; }
+	@BIN=$(abspath $(BIN)) sh tests/mutants.sh $(FILE) "$(TESTS)"
+
 bench-instructions: $(MADE)/develop ## count the instructions of the engine's hot loops against the record; needs valgrind
 	$(BIN)/python benchmarks/instructions.py
 
@@ -91,6 +104,10 @@ $(MADE)/install: $(MADE)/venv pyproject.toml $(CRATE)/Cargo.toml $(CRATE)/Cargo.
 
 $(MADE)/develop: $(MADE)/install
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group test --group lint
+	@touch $@
+
+$(MADE)/mutants: $(MADE)/develop
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group mutants
 	@touch $@
 
 # Some distributions package these apart from cargo. Without them the gate would check less than it says.

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final
 
 import explicit
+import public_nets
 import reading
 import whole_spaces
 from measuring import REPOSITORY, build_examples, is_busy, machine
@@ -20,6 +21,7 @@ BENCHMARKS: Final = {
     "explicit": explicit.tables,
     "whole_spaces": whole_spaces.tables,
     "reading": reading.tables,
+    "public_nets": public_nets.tables,
 }
 
 BUSY: Final = (

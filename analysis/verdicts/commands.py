@@ -132,7 +132,8 @@ def _kept_apart(space: StateSpace[S], question: Question, clashes: Sequence[Clas
                 found.append(clash)
                 together = algebra.disjunction([together, both])
         if not found:
-            space.require_complete()
+            if clashes:
+                space.require_complete()
             return yes()
         witness = space.witness(together)
         if witness is None:
@@ -174,7 +175,8 @@ def machines_stopped(space: StateSpace[Any]) -> Verdict:
                 break
             found += [(machine, name, names[name]) for name in _unanswered(space, names)]
         if not found:
-            space.require_complete()
+            if machines(net):
+                space.require_complete()
             return yes()
         machine, name, sending = found[0]
         others = listed(f"{machine} {name}" for machine, name, _ in found)

@@ -28,6 +28,13 @@ from firable.semantics.conflict import jointly_openable
 from firable.semantics.player import FiringSet, Player
 from firable.semantics.trace import Discipline
 
+STARVATION: Final = Question(
+    "starvation",
+    "every live transition fires again and again in the arbitrated run with all external gates open",
+    Weight.WARNING,
+    hint="let the arbiter go by `order` or `rotation`, or accept that these wait for a slower cycle",
+    method="eager run of synchronous steps under the arbiters",
+)
 STEPS_MAX: Final = 100_000
 
 
@@ -113,13 +120,6 @@ def starvation_free(behaviour: Behaviour[Any]) -> Verdict:
 
     Raises `InputError` F2013 where the arbiters do not fit the conflicts.
     """
-    question = Question(
-        "starvation",
-        "every live transition fires again and again in the arbitrated run with all external gates open",
-        Weight.WARNING,
-        hint="let the arbiter go by `order` or `rotation`, or accept that these wait for a slower cycle",
-        method="eager run of synchronous steps under the arbiters",
-    )
 
     def find() -> Answer:
         space = behaviour.space
@@ -135,7 +135,7 @@ def starvation_free(behaviour: Behaviour[Any]) -> Verdict:
             return yes()
         return no(hungry, _witness(space.net, space.discipline, run, f"{hungry[0]} never fires in the cycle"))
 
-    return question.ask(behaviour.space, find)
+    return STARVATION.ask(behaviour.space, find)
 
 
 def _witness(net: Net, discipline: Discipline, run: EagerRun, note: str) -> Witness | None:

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from firable.analysis import check as module
+from firable.analysis._engine import IncompleteGraph
 from firable.analysis.check import check
 from firable.analysis.methods import GOALS, KNOWERS, SPACES, Method
 from firable.analysis.report import CheckReport, report_on
@@ -94,3 +95,19 @@ def test_interrupted_twice_ends_all(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("firable.analysis.check.report_on", interrupted)
     with pytest.raises(KeyboardInterrupt):
         check(catalogue_net("one_robot"))
+
+
+def test_what_no_space_holds_follows_from_a_deadlock_that_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "FIRST_MARKINGS", 5)
+    monkeypatch.setattr(module._Check, "_held_explicitly", _gives_up)
+    monkeypatch.setattr(module, "SPACES", {})
+    report = check(catalogue_net("one_robot_mc_late"))
+    for name in ("live", "reversible", "doomed-markings"):
+        verdict = report.verdict(name)
+        assert verdict.status is Status.VIOLATED
+        assert verdict.method.startswith("follows from deadlock-free: ")
+        assert verdict.witness is not None
+
+
+def _gives_up(*_: object) -> None:
+    raise IncompleteGraph("no room")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.reference import load_net, reference_names
 from support.ring_nets import ring_nets
 
@@ -83,7 +84,7 @@ def places_of(net: Net) -> dict[str, Command]:
     return {place.name: place.command for place in net.places if place.command is not None}
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(ring_nets(commands=True), st.sampled_from(Discipline))
 def test_verdicts_on_commands_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     sent, graph = places_of(net), Player(net).reachable(step=discipline is Discipline.STEP)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from threading import Event
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import examples
 from support.inductive import check_finding
 from support.reference import load_net, reference_names
 from support.ring_nets import ring_nets
@@ -21,7 +22,7 @@ from firable.nets.net import Net, Place, Transition
 from firable.semantics.player import Player
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(st.one_of(ring_nets(signals=True), dense_nets(most_transitions=3)))
 def test_where_contact_is_excluded_no_marking_is_in_contact_and_the_certificate_shows_it(net: Net) -> None:
     found = decide_contact_by_invariants(net, Limits())

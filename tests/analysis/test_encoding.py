@@ -6,8 +6,9 @@ The nets of a small scope are in `tests/conformance`; here are gates, models and
 from collections.abc import Callable, Iterator
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from support.dense_nets import dense_nets
+from support.examples import examples
 
 from firable.analysis.induction.encoding import Relation, interleaving_relation, step_relation
 from firable.analysis.induction.smt import Answer, Term, Terms, decide, value
@@ -43,7 +44,7 @@ def solved(relation: Relation) -> Iterator[Edge]:
 
 @pytest.mark.parametrize(("encode", "step"), DISCIPLINES)
 @given(net=dense_nets(signals=True))
-@settings(max_examples=60)
+@examples(60)
 def test_models_of_a_relation_are_the_edges_of_the_player(encode: Encoder, step: bool, net: Net) -> None:
     found = list(solved(encode(net, None)))
     assert len(set(found)) == len(found)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.reference import load_net
 from support.ring_nets import ring_nets
 
@@ -84,7 +85,7 @@ def test_graphs_that_join_in_different_places_are_not_isomorphic() -> None:
     assert not isomorphic(b, a)
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(ring_nets(), st.sampled_from(Discipline), st.data())
 def test_a_complement_gives_an_isomorphic_graph_in_either_discipline(
     net: Net, discipline: Discipline, data: st.DataObject
@@ -97,7 +98,7 @@ def test_a_complement_gives_an_isomorphic_graph_in_either_discipline(
     assert weakly_bisimilar(a, b, everything, everything)
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(ring_nets(), st.data())
 def test_a_gate_more_is_isomorphic_only_if_it_forbids_nothing(net: Net, data: st.DataObject) -> None:
     t = data.draw(st.integers(0, len(net.transitions) - 1))

@@ -8,9 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import PLACES, dense_nets
+from support.examples import examples
 from support.second_solver import by_cvc5
 from support.whole_nets import formulas
 
@@ -87,7 +88,7 @@ def questions(draw: st.DrawFn) -> tuple[Net, Formula]:
 
 @pytest.mark.parametrize("discipline", DISCIPLINES)
 @given(question=questions())
-@settings(max_examples=25, deadline=None)
+@examples(25)
 def test_all_that_induction_finds_is_shown_to_two_solvers(
     discipline: Discipline, question: tuple[Net, Formula]
 ) -> None:
@@ -102,7 +103,7 @@ def test_all_that_induction_finds_is_shown_to_two_solvers(
 
 @pytest.mark.parametrize("discipline", DISCIPLINES)
 @given(question=questions(), kind=st.sampled_from([ClaimKind.NEVER, ClaimKind.ALWAYS_POSSIBLE]))
-@settings(max_examples=25, deadline=None)
+@examples(25)
 def test_the_markings_of_a_net_show_a_claim_iff_it_is_true(
     discipline: Discipline, question: tuple[Net, Formula], kind: ClaimKind
 ) -> None:
@@ -118,7 +119,7 @@ def test_the_markings_of_a_net_show_a_claim_iff_it_is_true(
 
 
 @given(question=questions(), data=st.data(), discipline=st.sampled_from(DISCIPLINES))
-@settings(max_examples=80, deadline=None)
+@examples(80)
 def test_no_certificate_shows_a_claim_that_is_false(
     question: tuple[Net, Formula], data: st.DataObject, discipline: Discipline
 ) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
 
@@ -24,7 +25,7 @@ FORMULAS = st.sampled_from(TEXTS).map(parse_formula)
 
 @pytest.mark.parametrize("fairness", Fairness)
 @pytest.mark.parametrize("discipline", Discipline)
-@settings(max_examples=60)
+@examples(60)
 @given(net=ring_nets(signals=True).filter(lambda net: len(net.transitions) > 1), data=st.data())
 def test_sets_decide_response_as_components_do(
     discipline: Discipline, fairness: Fairness, net: Net, data: st.DataObject

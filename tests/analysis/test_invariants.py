@@ -6,9 +6,10 @@ from fractions import Fraction
 from itertools import count, product
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import examples
 from support.reference import load_net, reference_names
 from support.ring_nets import ring_nets
 
@@ -83,13 +84,13 @@ def dominated(y: tuple[int, ...], vectors: set[tuple[int, ...]]) -> bool:
     return any(max(v) > 1 and {i for i, x in enumerate(v) if x} < support for v in vectors)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(dense_nets(most_transitions=4))
 def test_minimal_invariants_are_those_that_exhaustive_search_finds(net: Net) -> None:
     check_both_kinds(net, 3)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(ring_nets())
 def test_minimal_invariants_of_rings_are_those_that_exhaustive_search_finds(net: Net) -> None:
     check_both_kinds(net, 1 if len(net.places) + len(net.transitions) > 12 else 2)
@@ -147,7 +148,7 @@ def test_the_empty_net_has_no_invariants() -> None:
         assert (found.minimal, found.dimension, found.complete) == ((), 0, True)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(st.one_of(dense_nets(), ring_nets()))
 def test_a_basis_has_as_many_independent_vectors_as_the_space_has_dimensions(net: Net) -> None:
     matrix = incidence(net)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import networkx as nx
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from support.dense_nets import dense_nets
+from support.examples import examples
 from support.reference import load_net
 
 from firable.analysis.structure.net_class import net_class
@@ -39,7 +40,7 @@ def test_each_class_is_recognised(net: Net, name: str) -> None:
     assert net_class(net, contact_free=True).outside == ()
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(dense_nets())
 def test_each_class_is_contained_in_the_wider_ones(net: Net) -> None:
     found = net_class(net)
@@ -79,7 +80,7 @@ def test_gates_are_no_arcs_of_the_graph() -> None:
     assert not net_class(read).strongly_connected
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(dense_nets())
 def test_the_graph_of_arcs_is_connected_as_networkx_says(net: Net) -> None:
     graph: nx.DiGraph[str] = nx.DiGraph()

@@ -7,8 +7,9 @@ from itertools import chain, combinations
 
 import networkx as nx
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.ring_nets import ring_nets
 
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
@@ -48,7 +49,7 @@ def graph_of(net: Net, discipline: Discipline) -> nx.MultiDiGraph[Marking]:
     return graph
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(SITUATIONS, FORMULAS)
 def test_properties_of_markings_are_decided_by_their_definitions(
     situation: tuple[Net, Discipline], formula: Formula
@@ -101,7 +102,7 @@ def fails(net: Net, truth: nx.MultiDiGraph[Marking], p: Formula, q: Formula, fai
 
 
 @pytest.mark.parametrize("fairness", Fairness)
-@settings(max_examples=120)
+@examples(120)
 @given(situation=SITUATIONS, p=FORMULAS, q=FORMULAS)
 def test_leads_to_fails_iff_some_set_of_markings_recurs_fairly(
     fairness: Fairness, situation: tuple[Net, Discipline], p: Formula, q: Formula

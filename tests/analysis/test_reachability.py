@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.reference import load_net
 from support.ring_nets import ring_nets
 
@@ -22,7 +23,7 @@ from firable.semantics.player import Player, holds_in
 from firable.semantics.trace import Discipline
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(ring_nets(signals=True), st.sampled_from(Discipline))
 def test_columns_agree_with_single_markings(net: Net, discipline: Discipline) -> None:
     graph, player = explore(net, discipline), Player(net)

@@ -6,9 +6,10 @@ from itertools import chain, combinations, count
 
 import pytest
 import z3
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import examples
 from support.reference import load_net, reference_names
 from support.ring_nets import ring_nets
 
@@ -70,7 +71,7 @@ def minimal(sets: list[frozenset[str]]) -> set[frozenset[str]]:
     return {s for s in sets if s and not any(other < s for other in sets if other)}
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(NETS)
 def test_minimal_siphons_and_traps_are_those_among_all_sets_of_places(net: Net) -> None:
     siphons, traps = minimal_siphons(net), minimal_traps(net)
@@ -80,7 +81,7 @@ def test_minimal_siphons_and_traps_are_those_among_all_sets_of_places(net: Net) 
     assert {frozenset(s) for s in traps.minimal} == minimal([s for s in subsets(net) if is_trap(net, s)])
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(NETS)
 def test_the_largest_siphon_and_trap_are_the_union_of_all_within(net: Net) -> None:
     for places in subsets(net)[:16]:
@@ -91,7 +92,7 @@ def test_the_largest_siphon_and_trap_are_the_union_of_all_within(net: Net) -> No
         assert set(net.names(largest_siphon(net, net.marking(places)))) == siphon
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(ring_nets(signals=True))
 def test_where_the_premises_hold_the_property_excludes_deadlock(net: Net) -> None:
     report = check(net)
@@ -124,7 +125,7 @@ def test_the_cell_is_proved_free_of_deadlock_and_the_late_one_shows_the_siphon_t
     assert any(not net.marking(siphon) & deadlock for siphon in late.without_marked_trap)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(ring_nets(signals=True))
 @example(READING_EACH_OTHER)
 def test_under_steps_the_property_excludes_deadlock_only_without_reads(net: Net) -> None:
@@ -238,7 +239,7 @@ SIPHON_WITH_AN_EMPTY_TRAP = Net(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(NETS)
 @example(SIPHON_WITH_AN_EMPTY_TRAP)
 def test_exclusion_and_ranks_decide_the_property_as_all_sets_of_places_do(net: Net) -> None:
@@ -260,7 +261,7 @@ def test_exclusion_and_ranks_decide_the_property_as_all_sets_of_places_do(net: N
     assert not expected or all(any(trap <= s for trap in traps) for s in siphons)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(NETS)
 def test_places_that_cannot_be_marked_are_the_largest_siphon_that_is_empty_and_stay_so(net: Net) -> None:
     never = set(range(len(net.places))) - markable(ordinary(net))

@@ -77,7 +77,7 @@ def test_text_is_strict(term: Term) -> None:
     assert text.startswith("; head\n(set-logic QF_UF)\n")
     assert text.endswith(")\n(check-sat)\n")
     assert all(len(t.operands) >= 2 for t in subterms([term]) if t.operator in {Operator.AND, Operator.OR})
-    used = set(re.findall(r"\(([^ ()]+)", re.sub(r"\|[^|]*\|", "x", text)))
+    used = set(re.findall(r"\(([^\s()]+)", re.sub(r"\|[^|]*\|", "x", text)))
     assert used <= {"and", "or", "not", "=", "set-logic", "declare-const", "define-fun", "assert", "check-sat"}
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
@@ -91,7 +92,7 @@ def test_a_run_that_was_cut_off_and_a_graph_that_was_leave_starvation_unknown(mo
     assert of_graph.cost.markings == 1
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(ring_nets(), st.sampled_from(Discipline))
 def test_the_witness_of_starvation_is_a_run_of_the_graph_that_recurs_without_the_starved(
     net: Net, discipline: Discipline

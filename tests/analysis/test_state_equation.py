@@ -5,9 +5,10 @@ from __future__ import annotations
 from threading import Event
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import examples
 from support.inductive import check_finding, holds
 from support.reference import load_net, reference_names
 from support.ring_nets import ring_nets
@@ -29,7 +30,7 @@ def nets_with_goals(draw: st.DrawFn) -> tuple[Net, Formula]:
     return net, goal
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(nets_with_goals())
 def test_what_is_refuted_is_not_reachable_and_the_certificate_is_an_inductive_invariant(
     drawn: tuple[Net, Formula],

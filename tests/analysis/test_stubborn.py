@@ -8,9 +8,10 @@ from threading import Event
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import examples, seeds
 from support.lively_nets import lively_net, lively_nets, part_of
 from support.ring_nets import ring_nets
 from support.searched import distance_to, goals, played, satisfies
@@ -39,7 +40,7 @@ def deadlocks_of(net: Net, *, thorough: bool) -> set[int]:
     return set(found)
 
 
-@settings(max_examples=120)
+@examples(120)
 @given(NETS, st.booleans())
 def test_exactly_the_deadlocks_of_the_whole_graph_are_found(net: Net, thorough: bool) -> None:
     graph = explore(net)
@@ -55,7 +56,7 @@ def test_exactly_the_deadlocks_of_the_whole_graph_are_found(net: Net, thorough: 
         assert found.witness is None
 
 
-@settings(max_examples=120)
+@examples(120)
 @given(st.data())
 def test_a_goal_is_reachable_iff_the_whole_graph_reaches_it_and_at_the_same_distance(data: st.DataObject) -> None:
     net = data.draw(NETS)
@@ -69,7 +70,7 @@ def test_a_goal_is_reachable_iff_the_whole_graph_reaches_it_and_at_the_same_dist
             assert len(found.witness.firings) == distance
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(NETS)
 def test_exactly_the_transitions_that_fire_in_the_whole_graph_are_found_firing(net: Net) -> None:
     fired = explore(net).engine.fired()
@@ -84,9 +85,10 @@ def test_exactly_the_transitions_that_fire_in_the_whole_graph_are_found_firing(n
             played(net, witness)
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize("chunk", range(4))
 def test_no_order_that_matters_is_left_out_of_nets_whose_transitions_compete(chunk: int) -> None:
-    for seed in range(400 * chunk, 400 * (chunk + 1)):
+    for seed in seeds(400, chunk):
         draw = random.Random(seed)
         net = lively_net(draw)
         graph, engine = explore(net), _engine.Stubborn(*rows(net))
@@ -264,7 +266,7 @@ def test_a_callable_that_raises_comes_out() -> None:
         engine.deadlocks(max_markings=1 << 30, max_memory_bytes=1 << 30, max_seconds=None, cancelled=cancelled)
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(ring_nets())
 def test_the_markings_of_a_reduced_graph_are_reachable_ones(net: Net) -> None:
     reachable = Player(net).reachable()

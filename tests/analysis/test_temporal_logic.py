@@ -3,8 +3,9 @@
 import random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.naive_space import Markings, NaiveSpace
 from support.ring_nets import ring_nets
 from support.temporal_formulas import ctl_formulas, ltl_formulas
@@ -95,7 +96,7 @@ def markings_of(graph: ReachabilityGraph, column: Column) -> Markings:
     return frozenset(graph.marking(index) for index in indexes(column))
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(asked(linear=False), st.sampled_from(Discipline))
 def test_ctl_holds_where_its_definition_says_over_both_spaces(question: tuple[Net, Temporal], how: Discipline) -> None:
     net, formula = question
@@ -105,7 +106,7 @@ def test_ctl_holds_where_its_definition_says_over_both_spaces(question: tuple[Ne
     assert markings_of(graph, Ctl(Sets(graph)).of(formula)) == expected
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(asked(linear=False))
 def test_the_evidence_of_ctl_is_a_run_of_the_net(question: tuple[Net, Temporal]) -> None:
     net, formula = question
@@ -144,7 +145,7 @@ def some_runs(net: Net, seed: int, n_runs: int = 6) -> list[Run]:
     return runs
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(asked(linear=True), st.integers(0, 2**16))
 def test_ltl_fails_where_a_run_refutes_it_over_both_spaces(question: tuple[Net, Temporal], seed: int) -> None:
     net, formula = question
@@ -160,7 +161,7 @@ def test_ltl_fails_where_a_run_refutes_it_over_both_spaces(question: tuple[Net, 
             assert not satisfies(net, run, formula)
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(asked(linear=True))
 def test_a_formula_and_its_negation_are_not_both_refuted_by_one_run_nor_both_kept(
     question: tuple[Net, Temporal],
@@ -171,7 +172,7 @@ def test_a_formula_and_its_negation_are_not_both_refuted_by_one_run_nor_both_kep
     assert kept != [True, True]  # there is a run
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(st.data(), ring_nets())
 def test_the_decision_diagram_answers_like_the_definitions(data: st.DataObject, net: Net) -> None:
     places, transitions = names(net)
@@ -198,7 +199,7 @@ LAWS = [
 
 
 @pytest.mark.parametrize(("one", "same"), LAWS)
-@settings(max_examples=10)
+@examples(10)
 @given(ring_nets())
 def test_the_laws_of_ltl_hold(one: str, same: str, net: Net) -> None:
     places, sets = names(net)[0], Sets(NaiveSpace(net))
@@ -212,7 +213,7 @@ def test_the_laws_of_ltl_hold(one: str, same: str, net: Net) -> None:
     assert holds(f"({same}) -> ({one})")
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(ring_nets())
 def test_what_both_logics_say_they_decide_alike(net: Net) -> None:
     places, space = names(net)[0], NaiveSpace(net)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from itertools import combinations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import examples
 from support.reference import cases
 from support.ring_nets import ring_nets
 
@@ -89,7 +90,7 @@ class Truth:
             assert len(verdict.witness.firings) == distance(self.graph, self.net.initial_marking, targets)
 
 
-@settings(max_examples=250)
+@examples(250)
 @given(NETS, DISCIPLINES)
 def test_figures_and_witnesses_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     truth = Truth(net, discipline)
@@ -129,7 +130,7 @@ def test_figures_and_witnesses_are_those_of_the_definitions(net: Net, discipline
     truth.shortest("home-markings", set() if home else sinks)
 
 
-@settings(max_examples=250)
+@examples(250)
 @given(NETS, DISCIPLINES)
 def test_conflicts_and_races_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     truth = Truth(net, discipline)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from threading import Event
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import examples
 from support.lively_nets import lively_nets
 from support.ring_nets import ring_nets
 from support.searched import distance_to, goals, played, satisfies
@@ -23,7 +24,7 @@ from firable.nets.net import Net, Place, Transition
 NETS = st.one_of(lively_nets(), ring_nets(signals=True), dense_nets(signals=True))
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(st.data())
 def test_what_a_walk_finds_is_reachable_and_small_nets_are_walked_all_over(data: st.DataObject) -> None:
     net = data.draw(NETS)

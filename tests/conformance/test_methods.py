@@ -6,9 +6,10 @@ Not to decide is allowed here; what a technique must decide is said by the tests
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import examples
 from support.lively_nets import lively_nets
 from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
@@ -53,7 +54,7 @@ def decides_as_the_oracle(method: Method, net: Net, goal: Formula) -> None:
 
 
 @pytest.mark.parametrize("method", GOALS)
-@settings(max_examples=12)
+@examples(12)
 @given(net=SMALL_NETS, data=st.data())
 def test_a_technique_decides_goals_as_the_oracle_does(method: Method, net: Net, data: st.DataObject) -> None:
     goal = data.draw(formulas([place.name for place in net.places], [t.name for t in net.transitions]))
@@ -62,7 +63,7 @@ def test_a_technique_decides_goals_as_the_oracle_does(method: Method, net: Net, 
 
 
 @pytest.mark.parametrize("method", [method for method in Method if method not in (Method.AUTO, Method.EXPLICIT)])
-@settings(max_examples=6)
+@examples(6)
 @given(net=SMALL_NETS)
 def test_check_by_one_technique_never_contradicts_exploration(method: Method, net: Net) -> None:
     known = {verdict.name: verdict for verdict in report_on(explore(net)).verdicts}

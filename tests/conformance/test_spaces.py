@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import seeds
 from support.lively_nets import lively_net, lively_nets
 from support.naive_space import Markings, NaiveSpace
 from support.ring_nets import ring_nets
@@ -104,9 +105,10 @@ def test_a_space_has_the_sets_of_the_oracle(name: str, net: Net, data: st.DataOb
 
 
 @pytest.mark.parametrize("method", SPACES)
+@pytest.mark.seeds
 @pytest.mark.parametrize("chunk", range(4))
 def test_a_space_agrees_with_the_table_on_nets_whose_transitions_compete(method: Method, chunk: int) -> None:
-    for seed in range(150 * chunk, 150 * (chunk + 1)):
+    for seed in seeds(150, chunk):
         net = lively_net(random.Random(seed))
         told = []
         spaces: tuple[StateSpace[Any], ...] = (explore(net), held_by(method, net))

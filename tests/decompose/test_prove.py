@@ -7,8 +7,9 @@ from typing import Any
 
 import cvc5
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.reference import load_net
 
 from firable.analysis.check import check
@@ -322,7 +323,7 @@ def test_out_of_time_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @given(st.data())
-@settings(max_examples=100)
+@examples(100)
 def test_granted_term_is_what_the_arbiter_decides(data: st.DataObject) -> None:
     sets = st.frozensets(st.sampled_from("pqr"), min_size=1, max_size=2).map(sorted).map(tuple)
     transitions = tuple(Transition(f"t{i}", data.draw(sets)) for i in range(4))

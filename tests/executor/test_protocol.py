@@ -5,8 +5,9 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples, seeds
 from support.owned_nets import owned_net, owned_nets
 from support.reference import load_net
 
@@ -67,26 +68,29 @@ def check(simulation: Simulation, steps: int) -> int:
     return replay(simulation.net, simulation.run(steps)).firings
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize("network", NETWORKS, ids=str)
 @pytest.mark.parametrize("name", SMALL)
 def test_joint_traces_of_the_small_nets_are_traces_of_the_central_net(name: str, network: Network) -> None:
-    assert sum(check(Simulation(decomposition_of(name), seed, network), 150) for seed in range(40)) >= 40
+    assert sum(check(Simulation(decomposition_of(name), seed, network), 150) for seed in seeds(40)) >= 40
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize("network", NETWORKS, ids=str)
 @pytest.mark.parametrize("name", CELLS + CATALOGUE)
 def test_joint_traces_of_the_cells_are_traces_of_the_central_net(name: str, network: Network) -> None:
-    assert sum(check(Simulation(decomposition_of(name), seed, network), 3000) for seed in range(4)) > 40
+    assert sum(check(Simulation(decomposition_of(name), seed, network), 3000) for seed in seeds(4)) > 40
 
 
-@settings(max_examples=400, deadline=None)
+@examples(400)
 @given(owned_nets(), st.integers(0, 2**16), st.sampled_from(NETWORKS))
 def test_joint_traces_of_random_nets_are_traces_of_the_central_net(net: Net, seed: int, network: Network) -> None:
     check(Simulation(split(net), seed, network), 400)
 
 
+@pytest.mark.seeds
 def test_random_nets_fire() -> None:
-    assert sum(check(Simulation(split(owned_net(seed)), seed), 400) for seed in range(40)) > 200
+    assert sum(check(Simulation(split(owned_net(seed)), seed), 400) for seed in seeds(40)) > 200
 
 
 def test_one_seed_is_one_run() -> None:
@@ -125,9 +129,10 @@ GATE_MOVED_BY_A_LOCAL = net_of(
 """A gate elsewhere opens and closes by a local transition, of which the coordinator hears only later."""
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize("net", [GATE_OF_A_LOCAL, GATE_MOVED_BY_A_LOCAL], ids=["reads", "moves"])
 def test_joint_traces_of_nets_with_gates_at_local_transitions_are_traces_of_the_central_net(net: Net) -> None:
-    assert sum(check(Simulation(split(net), seed, NETWORKS[seed % 4]), 150) for seed in range(40)) >= 40
+    assert sum(check(Simulation(split(net), seed, NETWORKS[seed % 4]), 150) for seed in seeds(40)) >= 40
 
 
 # Planted faults: each is one way to forget an obligation, and must be found by the checks above.
@@ -438,7 +443,7 @@ def test_value_from_before_a_command_is_not_taken_for_its_completion() -> None:
     assert controller.fire() == [Firing("back")]
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(owned_nets(), st.integers(0, 2**16), st.sampled_from(NETWORKS))
 def test_rounds_side_by_side_never_meet_at_a_promise(net: Net, seed: int, network: Network) -> None:
     class Alone(LocalController):
@@ -498,7 +503,7 @@ def test_closed_rounds_are_forgotten() -> None:
     assert max(len(controller.closed) for controller in simulation.controllers.values()) <= 2
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(owned_nets(), st.data())
 def test_compiled_transitions_are_enabled_and_fire_as_the_reference_says(net: Net, data: st.DataObject) -> None:
     player, reference = TokenPlayer.of(net), Player(net)

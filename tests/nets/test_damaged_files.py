@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
@@ -106,18 +107,18 @@ def read_or_refused(read: Callable[[str], Net], text: str) -> None:
 
 
 @given(st.one_of(damaged(SHORT), damaged(TEXT), shuffled_lines(TEXT)))
-@settings(max_examples=400)
+@examples(400)
 def test_a_damaged_net_file_is_read_or_refused(text: str) -> None:
     read_or_refused(parse_net, text)
 
 
 @given(st.one_of(damaged(PNML), shuffled_lines(PNML)))
-@settings(max_examples=200)
+@examples(200)
 def test_damaged_pnml_is_read_or_refused(text: str) -> None:
     read_or_refused(lambda data: parse_pnml(data).net, text)
 
 
 @given(st.text(max_size=200))
-@settings(max_examples=200)
+@examples(200)
 def test_noise_is_refused(text: str) -> None:
     read_or_refused(parse_net, f"firable: 1\ncell: c\n{text}")

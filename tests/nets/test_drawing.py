@@ -3,7 +3,8 @@
 import xml.etree.ElementTree as ET
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
+from support.examples import examples
 from support.whole_nets import whole_nets
 
 from firable.nets.catalogue import catalogue_names, catalogue_net
@@ -43,7 +44,7 @@ def test_the_same_net_gives_the_same_picture() -> None:
     assert draw_net(net) == draw_net(net)
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(whole_nets())
 def test_no_arc_passes_through_a_place_or_a_bar_that_it_does_not_join(net: Net) -> None:
     ET.fromstring(draw_net(net))
@@ -60,7 +61,7 @@ def test_no_arc_passes_through_a_place_or_a_bar_that_it_does_not_join(net: Net) 
                 assert not any(start - 2 < edge.x < end + 2 for start, end in other_bar.segments)
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(whole_nets())
 def test_places_and_bars_never_overlap_and_stay_in_their_lanes(net: Net) -> None:
     where = layout(net)

@@ -5,7 +5,8 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
+from support.examples import examples
 from support.reference import load_net, reference_names
 from support.whole_nets import whole_nets
 
@@ -16,7 +17,7 @@ from firable.nets.net import Net, Place
 
 
 @given(whole_nets())
-@settings(max_examples=150)
+@examples(150)
 def test_any_net_survives_json(net: Net) -> None:
     back = net_from_json(json.loads(canonical_json(net_to_json(net))))
     assert back == net

@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
+from support.examples import examples
 from support.reference import load_net, reference_names
 from support.whole_nets import whole_nets
 
@@ -306,7 +307,7 @@ def test_a_net_of_the_field_survives_pnml(name: str) -> None:
 
 
 @given(whole_nets())
-@settings(max_examples=150)
+@examples(150)
 def test_any_net_survives_pnml_up_to_its_names(net: Net) -> None:
     text, notes = write_pnml(net)
     back = parse_pnml(text).net

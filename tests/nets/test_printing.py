@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from support.examples import examples
 from support.reference import cases, load_net, reference_names
 from support.whole_nets import whole_nets
 
@@ -41,7 +42,7 @@ def test_a_reference_net_survives_printing(name: str) -> None:
 
 
 @given(whole_nets())
-@settings(max_examples=300)
+@examples(300)
 def test_any_net_survives_printing(net: Net) -> None:
     back = parse_net(format_net(net))
     assert back == in_file_order(net)
@@ -50,7 +51,7 @@ def test_any_net_survives_printing(net: Net) -> None:
 
 
 @given(whole_nets())
-@settings(max_examples=100)
+@examples(100)
 def test_file_order_only_reorders(net: Net) -> None:
     ordered = in_file_order(net)
     assert set(ordered.places) == set(net.places)

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import examples
 from support.ring_nets import ring_nets
 
 from firable.nets.net import ExternalGate, Marking, Net, Place, Signal, Transition
@@ -152,7 +153,7 @@ def test_a_step_is_serialisable_iff_some_order_replays_it(net: Net, marking: int
         )
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(ring_nets(signals=True), st.data())
 def test_a_set_is_a_step_iff_the_player_lists_it(net: Net, data: st.DataObject) -> None:
     player = Player(net)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import dense_nets
+from support.examples import examples
 
 from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
 from firable.semantics.judgement import Judgement, judge
 from firable.semantics.player import Player
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(dense_nets(signals=True), st.booleans(), st.booleans())
 def test_a_net_waits_iff_another_valuation_would_let_it_run(net: Net, r: bool, s: bool) -> None:
     player, marking = Player(net), net.initial_marking

@@ -6,10 +6,11 @@ import random
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.cell_nets import cell_nets
 from support.dense_nets import dense_nets
+from support.examples import examples, seeds
 from support.lively_nets import lively_net, lively_nets, part_of
 from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
@@ -66,9 +67,10 @@ def check(net: Net, goal: Formula) -> Reduced:
     return reduced
 
 
+@pytest.mark.seeds
 @pytest.mark.parametrize("chunk", range(4))
 def test_goals_of_nets_whose_transitions_compete_are_kept(chunk: int) -> None:
-    for seed in range(60 * chunk, 60 * (chunk + 1)):
+    for seed in seeds(60, chunk):
         draw = random.Random(seed)
         net = lively_net(draw, 10)
         check(net, Deadlock())
@@ -76,20 +78,20 @@ def test_goals_of_nets_whose_transitions_compete_are_kept(chunk: int) -> None:
         check(net, part_of(draw, net, draw.getrandbits(len(net.places)), 4))
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(st.data())
 def test_a_goal_is_reachable_in_the_reduced_net_exactly_if_it_is_in_the_original(data: st.DataObject) -> None:
     net = data.draw(NETS)
     check(net, data.draw(goals(net)))
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(NETS)
 def test_there_is_a_deadlock_in_the_reduced_net_exactly_if_there_is_one_in_the_original(net: Net) -> None:
     check(net, Deadlock())
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(NETS)
 def test_a_transition_is_live_or_dead_exactly_if_its_image_is(net: Net) -> None:
     original, reduced = NaiveSpace(net), reduce_for_liveness(net)
@@ -103,7 +105,7 @@ def test_a_transition_is_live_or_dead_exactly_if_its_image_is(net: Net) -> None:
     assert (original.count(original.deadlocks) > 0) == (space.count(space.deadlocks) > 0)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(NETS)
 def test_literals_that_are_true_together_somewhere_are_not_said_to_exclude_each_other(net: Net) -> None:
     facts = pairs(Draft(net, None), None, NEVER)
@@ -164,7 +166,7 @@ def test_where_the_deadline_is_over_nothing_but_what_cannot_fire_is_gone() -> No
     assert len(reduced.net.places) == 2
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(cell_nets(), st.integers(1, 12))
 def test_whatever_the_deadline_interrupts_the_result_is_sound(net: Net, polls: int) -> None:
     class Clock(Deadline):

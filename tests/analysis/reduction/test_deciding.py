@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.cell_nets import cell_nets
+from support.examples import examples
 from support.naive_space import NaiveSpace
 from support.small_text import net_of
 
@@ -116,7 +117,7 @@ def test_a_transition_without_places_keeps_a_net_together() -> None:
     assert len(parts(loose, Deadlock())) == 1
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(cell_nets(), cell_nets(), st.booleans())
 def test_parts_reach_their_goals_exactly_if_the_whole_does(first: Net, second: Net, deadlock: bool) -> None:
     goals = [Holds(f"{net.places[-1].name}{i}") for i, net in enumerate((first, second))]
@@ -151,7 +152,7 @@ def test_one_part_that_does_not_reach_its_goal_decides_and_one_that_is_undecided
         assert decide_reduced(beside(late, late), Deadlock(), Limits(), next_of).reachable is expected
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(cell_nets())
 def test_stubborn_sets_on_the_reduced_net_find_a_deadlock_exactly_if_there_is_one(net: Net) -> None:
     found = decide_by_reduction(net, Deadlock(), Limits())

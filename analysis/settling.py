@@ -1,0 +1,163 @@
+"""Settling verdicts one by one: what `check` does where no technique holds all markings, or while some still try.
+
+A verdict is settled in one of three ways, whichever is first:
+
+- a technique *knows* it at once, from the structure of the net or a few walks (`KNOWERS` of the table of methods);
+- it comes down to *goals*, and techniques race each other for each of these (`GOALS`);
+- it *follows* from verdicts that are settled (`firable.analysis.verdicts.consequences`).
+
+Nothing is settled twice, and what is settled is kept from one stage to the next, so it can be begun beside the search
+for all markings. What is told of it goes into the course of the report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from threading import Event
+from time import perf_counter
+from typing import Final
+
+from firable.analysis._engine import IncompleteGraph
+from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.methods import GOALS, KNOWERS, Method
+from firable.analysis.question import Answer, Question, no, yes
+from firable.analysis.race import SLICES_SECONDS, Contestant, Outcome, T, race
+from firable.analysis.spaces.space import WitnessError
+from firable.analysis.verdicts.behaviour import QUESTIONS
+from firable.analysis.verdicts.consequences import consequences
+from firable.analysis.verdicts.goals import Goal, goals_of, query_goals
+from firable.analysis.verdicts.starvation import STARVATION
+from firable.nets.formula import Formula
+from firable.nets.net import Net
+from firable.nets.queries import Query
+from firable.nets.verdict import Cost, Status, Verdict
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import holds_in
+from firable.semantics.trace import Discipline
+
+Lanes = Sequence[Sequence[Method]]
+
+_GOALS_MAX: Final = 64  # a verdict of more goals than this takes longer than anybody waits
+_QUESTIONS: Final = {question.name: question for question in (*QUESTIONS, STARVATION)}
+
+
+@dataclass
+class Settling:
+    """The verdicts on one net that were `found` without all markings, and the `course` of finding them.
+
+    Ctrl-C sets `interrupted`, after which nothing is begun.
+    """
+
+    net: Net
+    queries: tuple[Query, ...]
+    memory_bytes: int
+    interrupted: Event
+    found: dict[str, Verdict] = field(default_factory=dict)
+    course: list[str] = field(default_factory=list)
+
+    def learn(self, of: Method, among: Collection[str], deadline: Deadline) -> None:
+        """Take from a technique what it knows at once of these verdicts, by name."""
+        missing = {name for name in among if name not in self.found}
+        if not missing or deadline.over:
+            return
+        began = perf_counter()
+        try:
+            known = KNOWERS[of].load()(self.net, Limits(deadline, self.memory_bytes))
+        except KeyboardInterrupt:
+            self.interrupted.set()
+            return
+        cost = Cost(seconds=perf_counter() - began)
+        if said := sorted(missing & known.keys()):
+            self.course.append(f"{KNOWERS[of].words}: {', '.join(said)}")
+        for name in said:
+            self._settle(_QUESTIONS[name], known[name].answer, known[name].method, cost)
+
+    def conclude(self, verdicts: Iterable[Verdict]) -> None:
+        """Add what follows from these verdicts and those that were found."""
+        decided = {verdict.name: verdict for verdict in verdicts if verdict.status is not Status.UNKNOWN}
+        following = consequences(self.net, decided | self.found)
+        for name, known in following.items():
+            self._settle(_QUESTIONS[name], known.answer, known.method, Cost(seconds=0.0))
+
+    def ask(
+        self,
+        verdict: Verdict,
+        fired: Collection[str],
+        lanes: Lanes,
+        deadline: Deadline,
+        slices_seconds: Sequence[float] = SLICES_SECONDS,
+    ) -> None:
+        """Settle a verdict by a race for each of its goals; not where one stays undecided or there are too many.
+
+        `fired` names transitions that are known to fire.
+        """
+        asked = goals_of(self.net, verdict.name, fired) or query_goals(self.queries, verdict)
+        if verdict.name in self.found or asked is None or not lanes or len(asked[1]) > _GOALS_MAX:
+            return
+        question, goals = asked
+        finding = None
+        for goal in goals:
+            if (finding := self._race(verdict.name, goal, lanes, deadline, slices_seconds)) is None:
+                return
+            if finding.reachable is not goal.wanted:
+                self._settle(question, self._failed(goal, finding), finding.method, finding.cost)
+                return
+        if finding is not None:
+            self._settle(question, yes(finding.witness), finding.method, finding.cost)
+
+    def _settle(self, question: Question, answer: Answer, method: str, cost: Cost) -> None:
+        self.found[question.name] = question.settle(answer, method, Discipline.INTERLEAVING, cost)
+
+    def _race(
+        self, name: str, goal: Goal, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float]
+    ) -> Finding | None:
+        """What the first technique finds that decides a goal; None where none does in time."""
+        if deadline.over:
+            return None
+        contestants = [
+            [Contestant(GOALS[of].words, partial(_decided, of, self.net, goal.formula)) for of in lane]
+            for lane in lanes
+        ]
+        outcome = self.noted(race(contestants, Limits(deadline, self.memory_bytes), slices_seconds))
+        if outcome.answer is None:
+            self.course.append(f"{name}: {'; '.join(outcome.told)}")
+        else:
+            self.course.append(f"{name}: {outcome.winner} was first")
+        return outcome.answer
+
+    def noted(self, outcome: Outcome[T]) -> Outcome[T]:
+        """The outcome; where Ctrl-C ended the race nothing else is begun, and what is known is reported."""
+        if outcome.interrupted:
+            self.interrupted.set()
+            self.course.append("interrupted")
+        return outcome
+
+    def _failed(self, goal: Goal, finding: Finding) -> Answer:
+        if finding.witness is None:
+            return no(goal.subjects)
+        subjects, note = goal.told(_marking_of(self.net, goal.formula, finding))
+        return no(subjects, replace(finding.witness, note=note))
+
+
+def _marking_of(net: Net, formula: Formula, found: Finding) -> int:
+    """The marking that a witness ends in, which must satisfy the goal."""
+    if found.witness is None:
+        raise WitnessError(f"{found.method} says that a goal is reachable and does not show how")
+    marking = net.marking(found.witness.marking)
+    if not evaluate(BOOL, net, formula, holds_in(marking)):
+        raise WitnessError(f"{found.method} shows a marking that does not satisfy the goal")
+    return marking
+
+
+def _decided(of: Method, net: Net, formula: Formula, limits: Limits) -> Finding | None:
+    """What a technique found, or None where it did not decide."""
+    found = GOALS[of].load()(net, formula, limits)
+    if found.reachable is None:
+        raise IncompleteGraph(found.bound or "not decided")
+    if found.reachable:
+        _marking_of(net, formula, found)
+    return found
