@@ -399,6 +399,22 @@ class Stubborn:
         marking within `max_steps` firings or the time, which says nothing about the net. The same seed gives the same
         walk.
         """
+    def cover(
+        self,
+        transitions: list[int],
+        *,
+        seed: int,
+        max_steps: int,
+        max_seconds: float | None,
+        cancelled: Callable[[], bool] | None = None,
+    ) -> tuple[list[tuple[tuple[int, int] | None, list[int], list[tuple[int, int]]]], list[int] | None, int]:
+        """Walk at random until each of some transitions was firable, for `max_steps` firings or the time at most.
+
+        The ways to them: each goes on from an earlier one, after so many of its firings (None: from M0), and tells what
+        it fires, and which of the transitions are firable after how many of these firings. Also a firing sequence from
+        M0 to a deadlock, if one was met; and how many firings were made. What was not met may fire all the same.
+        `IndexError` for a transition that does not exist.
+        """
 
 @final
 class Search:

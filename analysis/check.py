@@ -27,7 +27,7 @@ from typing import Any, Final
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Limits
-from firable.analysis.methods import GOAL_LANES, GOALS, KNOWERS, SPACES, Method, Technique
+from firable.analysis.methods import FIRST_KNOWERS, GOAL_LANES, GOALS, KNOWERS, SPACES, Method, Technique
 from firable.analysis.question import Question, unknown
 from firable.analysis.race import Contestant, race
 from firable.analysis.report import CheckReport, report_on
@@ -111,11 +111,11 @@ class _Check:
         course = [f"the first {first.n_markings:,} markings are not all"]
         settling = self._settling()
         space = self._whole(settling, course)
-        return self._settled(self._report(space or first), settling, KNOWERS, GOAL_LANES, course)
+        return self._settled(self._report(space or first), settling, FIRST_KNOWERS, GOAL_LANES, course)
 
     def _begin(self, settling: Settling, deadline: Deadline) -> None:
         """Settle, beside the search for all markings, what others follow from, by quick techniques."""
-        for of in KNOWERS:
+        for of in FIRST_KNOWERS:
             settling.learn(of, _LEARNT_FIRST, self._moment(deadline))
         settling.ask(_asked_of(DEADLOCK_FREE), (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
 

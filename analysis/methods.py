@@ -64,8 +64,14 @@ SPACES: Final[dict[Method, Technique[SpaceMaker]]] = {
 
 KNOWERS: Final[dict[Method, Technique[Knower]]] = {
     Method.STRUCTURE: Technique("theorems on net classes", "firable.analysis.structure.theorems:decide_by_class"),
+    Method.REDUCTION: Technique(
+        "walks on the reduced net, at large", "firable.analysis.reduction.deciding:known_by_reduction"
+    ),
     Method.STUBBORN_SETS: Technique("stubborn sets, at large", "firable.analysis.stubborn:known_firings"),
 }
+
+FIRST_KNOWERS: Final = (Method.STRUCTURE, Method.REDUCTION)
+"""Whom `auto` asks, in this order; stubborn sets know what those on the reduced net know, and later."""
 
 GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
     Method.REDUCTION: Technique(

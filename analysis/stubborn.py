@@ -11,8 +11,9 @@ quick one and leaves a fortieth of the markings on one net, and more of them on 
 with budgets of markings that grow; the last word has the quick one. All of this is counted in markings, not seconds,
 so the same net gives the same answer.
 
-A firing is asked for each transition (`find_firings`): all that are open are asked for together, which is one search
-where most of them fire, and then one by one, which is next to nothing where they are dead for a reason nearby.
+A firing is asked for each transition (`find_firings`), in rounds that grow: random walks make most of them fire
+(`analysis/engine/src/stubborn/cover.rs`); then those that are open are asked for together, which is one search where
+most of them fire, and then one by one, which is next to nothing where they are dead for a reason nearby.
 
 The rejected alternative, stubborn sets that keep liveness or temporal properties, needs provisos on cycles and leaves
 little to save; those questions are asked of the whole state space.
@@ -20,7 +21,7 @@ little to save; those questions are asked of the whole state space.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any, Final
@@ -30,13 +31,15 @@ from firable.analysis.compiled import engine_limits, nodes_of, rows
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.question import Known, no, yes
 from firable.analysis.spaces.reachability import REASONS
-from firable.analysis.spaces.space import Witnesses
+from firable.analysis.spaces.space import WitnessError, Witnesses
+from firable.analysis.walk import SEED
 from firable.nets.formula import Deadlock, Formula
-from firable.nets.net import Net
+from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
 from firable.semantics.trace import Discipline
 
 METHOD: Final = "stubborn sets"
+WALKS: Final = "random walks"
 _MARKINGS_MAX: Final = 2**32 - 2
 _BUDGETS: Final = ((2**15, 2**13), (2**18, 2**16), (2**21, 2**19))
 """Markings of a quick and of a thorough search, in turn; then a quick one without a bound."""
@@ -98,40 +101,97 @@ def find_deadlocks(net: Net, limits: Limits) -> Deadlocks:
     return Deadlocks(len(all_found), last.complete, witness, _bound(last), runs.cost)
 
 
+Moment = tuple[int, int]
+"""So many firings of a way, by number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A firing sequence from a moment of an earlier way, or from M0."""
+
+    after: Moment | None
+    firings: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class Firings:
-    """Which transitions can fire: those that do in one of the `runs`, the dead ones, and those left undecided.
+    """Which transitions can fire: those that do on one of the `ways`, the dead ones, and those left undecided.
 
-    `fires` gives for each transition that fires a run and the number of firings up to and with its own.
+    `fires` gives the moment at which a transition is firable. `deadlock` is a firing sequence to a deadlock, where one
+    was met. All of it was replayed, in the `original` net.
     """
 
     net: Net
-    runs: tuple[tuple[int, ...], ...]
-    fires: Mapping[int, tuple[int, int]]
+    original: Net
+    ways: tuple[Way, ...]
+    fires: Mapping[int, Moment]
     dead: tuple[str, ...]
     undecided: tuple[str, ...]
+    deadlock: tuple[int, ...] | None = None
     bound: str = ""
     cost: Cost = field(default_factory=Cost)
 
+    def known(self) -> dict[str, Known]:
+        """The verdicts `quasi-live` and `deadlock-free`, by name, where they are decided."""
+        found = {}
+        if (witness := self.way_to_deadlock("a marking of the net is a deadlock")) is not None:
+            found["deadlock-free"] = Known(no((), witness), WALKS)
+        if self.dead:
+            found["quasi-live"] = Known(no(self.dead), METHOD)
+        elif not self.undecided:
+            found["quasi-live"] = Known(yes(), METHOD if self.cost.markings else WALKS)
+        return found
+
     def witness(self, name: str) -> Witness | None:
         """A firing sequence that ends with the firing of a transition, replayed; None where none was found."""
-        if (at := self.fires.get(self.net.transition_index[name])) is None:
+        last = self.net.transition_index[name]
+        moment: Moment | None = self.fires.get(last)
+        if moment is None:
             return None
-        run, end = at
-        witnesses = Witnesses(self.net, Discipline.INTERLEAVING)
-        firings = [(t,) for t in self.runs[run][:end]]
-        return witnesses.named(firings, witnesses.play(self.net.initial_marking, firings))
+        fired = [last]
+        while moment is not None:
+            way = self.ways[moment[0]]
+            fired += reversed(way.firings[: moment[1]])
+            moment = way.after
+        return self._shown(reversed(fired))
+
+    def way_to_deadlock(self, note: str) -> Witness | None:
+        """The firing sequence to the deadlock that was met, replayed; None where none was."""
+        return None if self.deadlock is None else self._shown(self.deadlock, note)
+
+    def _shown(self, fired: Iterable[int], note: str = "") -> Witness:
+        replay = _Replay(self.net, self.original)
+        firings = [(replay.number[t],) for t in fired]
+        reached = replay.witnesses.play(self.original.initial_marking, firings)
+        return replay.witnesses.named(firings, reached, note=note)
 
 
+class _Replay:
+    """Plays what fires in a net in the original one, whose transitions it calls by the same names."""
+
+    def __init__(self, net: Net, original: Net) -> None:
+        self.start = original.initial_marking
+        self.witnesses = Witnesses(original, Discipline.INTERLEAVING)
+        self.number = [original.transition_index[transition.name] for transition in net.transitions]
+
+    def play(self, marking: Marking, firings: Iterable[int]) -> Marking:
+        """The marking of the original net after a firing sequence; raises `WitnessError` where it is none."""
+        return self.witnesses.play(marking, ((self.number[t],) for t in firings))
+
+
+_WALKED: Final = (2**14, 2**20)
 _TOGETHER_FIRST: Final = 2**12
 _ALONE_LEAST: Final = 2**8
 
 
-def find_firings(net: Net, limits: Limits) -> Firings:
+def find_firings(net: Net, limits: Limits, original: Net | None = None) -> Firings:
     """Find for each transition whether it can ever fire (quasi-liveness); each run was replayed.
 
-    Cost: in each round as many markings for all open transitions together as for all of them one by one, four times as
-    many in the next.
+    Where the net is a reduction of an `original` one whose transitions fire in it by the same names, it is replayed
+    there.
+
+    Cost: in each round some firings at random, and as many markings for all open transitions together as for all of
+    them one by one; four times as many in the next.
 
     >>> from firable.nets.net import Place, Transition
     >>> places = (Place("p", marked=True), Place("q"), Place("r"))
@@ -140,49 +200,104 @@ def find_firings(net: Net, limits: Limits) -> Firings:
     >>> found.dead, found.undecided, found.witness("t").firings
     (('u',), (), (('t',),))
     """
-    return _Firings(_Runs(net, limits)).found()
+    return _Firings(_Runs(net, limits), net if original is None else original).found()
 
 
 def known_firings(net: Net, limits: Limits) -> Mapping[str, Known]:
-    """The verdict `quasi-live`, by name, where it is decided: some transition is dead, or each was found firing."""
-    found = find_firings(net, limits)
-    if found.dead:
-        return {"quasi-live": Known(no(found.dead), METHOD)}
-    return {} if found.undecided else {"quasi-live": Known(yes(), METHOD)}
+    """The verdicts `quasi-live` and `deadlock-free`, by name, where they are decided.
+
+    Some transition is dead, or each was found firing; a deadlock was met on the way.
+    """
+    return find_firings(net, limits).known()
 
 
 class _Firings:
     """The search for firings: what is open, and what is known."""
 
-    def __init__(self, runs: _Runs) -> None:
-        self.runs = runs
+    def __init__(self, runs: _Runs, original: Net) -> None:
+        self.runs, self.original = runs, original
+        self.replay = _Replay(runs.net, original)
         self.open = set(range(len(runs.net.transitions)))
-        self.sequences: list[tuple[int, ...]] = []
-        self.fires: dict[int, tuple[int, int]] = {}
+        self.ways: list[Way] = []
+        self.fires: dict[int, Moment] = {}
         self.dead: set[int] = set()
+        self.deadlock: tuple[int, ...] | None = None
 
     def found(self) -> Firings:
-        budget, bound = _TOGETHER_FIRST, ""
+        budget, bound, turn = _TOGETHER_FIRST, "", 0
         while self.open and not bound:
-            bound = self._round(budget)
-            budget = min(4 * budget, _MARKINGS_MAX)
+            self._walk(turn)
+            bound = self._round(budget, one_by_one=turn > 0) if self.open else ""
+            budget, turn = min(4 * budget, _MARKINGS_MAX), turn + 1
         names = self.runs.net.transitions
         dead, undecided = (tuple(names[t].name for t in sorted(of)) for of in (self.dead, self.open))
         return Firings(
             self.runs.net,
-            tuple(self.sequences),
+            self.original,
+            tuple(self.ways),
             self.fires,
             dead,
             undecided,
+            self.deadlock,
             bound if undecided else "",
             self.runs.cost,
         )
 
-    def _round(self, budget: int) -> str:
-        """All together, then one by one; why it must be the last, or nothing."""
+    def _walk(self, turn: int) -> None:
+        """Make open transitions fire by random walks.
+
+        Each turn walks anew, and towards all transitions, because those that are easily met lead to the others.
+        """
+        everything, firings = range(len(self.runs.net.transitions)), _WALKED[min(turn, 1)] * 4 ** max(0, turn - 1)
+        limits = engine_limits(self.runs.limits.deadline)
+        found, deadlock, steps = self.runs.engine.cover(list(everything), seed=SEED + turn, max_steps=firings, **limits)
+        self.runs.edges += steps
+        needed = set[int]()
+        for way, (after, _, firable) in reversed(list(enumerate(found))):
+            if way in needed or any(t in self.open for t, _ in firable):
+                needed.add(way)
+                needed.update(() if after is None else after[:1])
+        ends: dict[int, tuple[int, dict[int, Marking]]] = {}  # of a way its number here, and markings to go on from
+        for way in sorted(needed):
+            after, fired, firable = found[way]
+            if after is None:
+                moment, marking = None, self.replay.start
+            else:
+                number, reached = ends[after[0]]
+                moment, marking = (number, after[1]), reached[after[1]]
+            ends[way] = len(self.ways), self._play(Way(moment, tuple(fired)), marking, firable)
+        if deadlock is not None and self.deadlock is None:
+            if not self.replay.witnesses.player.deadlocked(self.replay.play(self.replay.start, deadlock)):
+                raise WitnessError("a walk to a deadlock ends in a marking that is none")
+            self.deadlock = tuple(deadlock)
+
+    def _play(self, way: Way, marking: Marking, firable: Sequence[tuple[int, int]]) -> dict[int, Marking]:
+        """Replay a way, and each transition that is said to be firable after some of its firings; the markings there.
+
+        They, and all that fire on the way, are no longer open.
+        """
+        number, played = len(self.ways), 0
+        reached: dict[int, Marking] = {}
+        for t, end in firable:
+            marking = self.replay.play(marking, way.firings[played:end])
+            self.replay.play(marking, (t,))
+            self._close(t, (number, end))
+            reached[end], played = marking, end
+        for end, t in enumerate(way.firings[:played]):
+            self._close(t, (number, end))
+        self.ways.append(way)
+        return reached
+
+    def _close(self, t: int, moment: Moment) -> None:
+        if t in self.open:
+            self.open.remove(t)
+            self.fires[t] = moment
+
+    def _round(self, budget: int, *, one_by_one: bool) -> str:
+        """All together, then one by one, which is left to later rounds; why it must be the last, or nothing."""
         bound = self._ask(sorted(self.open), budget, thorough=False)
         alone = max(_ALONE_LEAST, budget // max(1, len(self.open)))
-        for t in sorted(self.open):
+        for t in sorted(self.open) if one_by_one else ():
             if bound:
                 break
             if t in self.open:
@@ -208,15 +323,9 @@ class _Firings:
         firable = search.firable()
         deepest = sorted(((index, t) for t in self.open if (index := firable[t]) is not None), reverse=True)
         for index, last in deepest:
-            if last not in self.open:
-                continue
-            run = (*search.path_to(index), last)
-            self.runs.witnesses.play(self.runs.net.initial_marking, ((t,) for t in run))
-            for end, t in enumerate(run, start=1):
-                if t in self.open:
-                    self.open.remove(t)
-                    self.fires[t] = (len(self.sequences), end)
-            self.sequences.append(run)
+            if last in self.open:
+                path = tuple(search.path_to(index))
+                self._play(Way(None, path), self.replay.start, [(last, len(path))])
 
 
 _Ask = Callable[[Stubborn, dict[str, Any]], Search]

@@ -55,10 +55,7 @@ class Reduced:
     @property
     def summary(self) -> str:
         """What was reduced to what, by which rules: for the method of a verdict."""
-        before = f"{len(self.original.places)}/{len(self.original.transitions)}"
-        after = f"{len(self.net.places)}/{len(self.net.transitions)}"
-        rules = ", ".join(f"{rule} {times}" for rule, times in sorted(self.applied.items()))
-        return f"reduction from {before} to {after} places/transitions by {rules or 'no rule'}"
+        return _summary(self.original, self.net, self.applied)
 
     def lift(self, firings: Iterable[str], note: str = "") -> Witness:
         """The firing sequence of the original net that a sequence of the reduced one into its goal stands for.
@@ -102,6 +99,18 @@ class ReducedTransitions:
     net: Net
     applied: Mapping[str, int]
     transitions: Mapping[str, str | None]
+
+    @property
+    def summary(self) -> str:
+        """What was reduced to what, by which rules: for the method of a verdict."""
+        return _summary(self.original, self.net, self.applied)
+
+
+def _summary(original: Net, small: Net, applied: Mapping[str, int]) -> str:
+    before = f"{len(original.places)}/{len(original.transitions)}"
+    after = f"{len(small.places)}/{len(small.transitions)}"
+    rules = ", ".join(f"{rule} {times}" for rule, times in sorted(applied.items()))
+    return f"reduction from {before} to {after} places/transitions by {rules or 'no rule'}"
 
 
 def reduce_for_goal(net: Net, goal: Formula, limits: Limits | None = None) -> Reduced:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
 
 import pytest
@@ -9,19 +10,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.cell_nets import cell_nets
 from support.examples import examples
+from support.lively_nets import lively_net
 from support.naive_space import NaiveSpace
 from support.small_text import net_of
 
+from firable.analysis.check import check
 from firable.analysis.evidence.certificate import InductiveInvariant
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.reduction.components import parts
-from firable.analysis.reduction.deciding import decide_by_reduction, decide_reduced
-from firable.analysis.spaces.space import WitnessError
+from firable.analysis.reduction.deciding import decide_by_reduction, decide_reduced, known_by_reduction
+from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.nets.catalogue import catalogue_net
 from firable.nets.formula import And, Deadlock, Formula, Holds, Not, parse_formula
 from firable.nets.net import Net, Place, Transition
-from firable.nets.verdict import Cost, Witness
+from firable.nets.verdict import Cost, Status, Witness
 from firable.semantics.player import Player
+from firable.semantics.trace import Discipline
 
 
 def by_playing(net: Net, goal: Formula, limits: Limits) -> Finding:
@@ -173,3 +177,23 @@ def test_a_wrong_witness_is_refused() -> None:
 
     with pytest.raises(WitnessError):
         decide_reduced(catalogue_net("one_robot_mc_late"), Deadlock(), Limits(), wrong)
+
+
+@pytest.mark.parametrize("chunk", range(4))
+def test_what_is_known_on_the_reduced_net_holds_of_the_original(chunk: int) -> None:
+    known = 0
+    for seed in range(40 * chunk, 40 * (chunk + 1)):
+        net = lively_net(random.Random(seed), 9)
+        report = check(net, method="explicit")
+        for name, of in known_by_reduction(net, Limits()).items():
+            verdict = report.verdict(name)
+            assert of.answer.holds is (verdict.status is Status.PROVED)
+            assert set(of.answer.subjects) <= set(verdict.subjects)
+            if of.answer.witness is not None:
+                marking = Witnesses(net, Discipline.INTERLEAVING).play(
+                    net.initial_marking,
+                    [(net.transition_index[t],) for (t,) in of.answer.witness.firings],
+                )
+                assert Player(net).deadlocked(marking)
+            known += 1
+    assert known >= 40

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 
 use super::{BudgetExceeded, Patience, Row, but_ctrl_c, detached, mask, net};
 use crate::budget::{Stop, Watch};
+use crate::stubborn::cover;
 use crate::stubborn::dependencies::literal;
 use crate::stubborn::formula::{Formula, Node};
 use crate::stubborn::search::{self, Goal, Limits, Prepared};
@@ -16,6 +17,9 @@ use crate::table::NONE;
 
 /// A formula from Python: (operator, operands), 0 empty, 1 full, 2 all, 3 any.
 type Nodes = Vec<(u8, Vec<u32>)>;
+
+/// Where each way goes on from, what it fires, and which transitions are firable after how many of its firings.
+type Ways = Vec<(Option<(u32, u32)>, Vec<u32>, Vec<(u32, u32)>)>;
 
 /// A net that is ready for searches; see the stub `_engine.pyi`.
 #[pyclass(frozen, module = "firable.analysis._engine")]
@@ -42,6 +46,15 @@ pub(crate) fn formula(nodes: Nodes, places: usize) -> PyResult<Formula> {
 }
 
 impl Stubborn {
+    /// Refuses transitions that do not exist.
+    fn existing(&self, transitions: &[u32]) -> PyResult<()> {
+        let count = self.prepared.net.transitions.len();
+        match transitions.iter().find(|&&t| t as usize >= count) {
+            Some(t) => Err(PyIndexError::new_err(format!("there is no transition {t} of {count}"))),
+            None => Ok(()),
+        }
+    }
+
     fn search(
         &self,
         py: Python<'_>,
@@ -116,10 +129,7 @@ impl Stubborn {
         max_seconds: Option<f64>,
         cancelled: Option<Py<PyAny>>,
     ) -> PyResult<Search> {
-        let count = self.prepared.net.transitions.len();
-        if let Some(t) = transitions.iter().find(|&&t| t as usize >= count) {
-            return Err(PyIndexError::new_err(format!("there is no transition {t} of {count}")));
-        }
+        self.existing(&transitions)?;
         let patience = Patience::new(max_seconds, cancelled)?;
         self.search(py, Goal::Firing(transitions), (thorough, max_markings, max_memory_bytes), &patience)
     }
@@ -147,6 +157,29 @@ impl Stubborn {
         });
         but_ctrl_c(py, raised)?;
         Ok((found.unwrap_or(None), steps))
+    }
+
+    #[pyo3(signature = (transitions, *, seed, max_steps, max_seconds, cancelled=None))]
+    fn cover(
+        &self,
+        py: Python<'_>,
+        transitions: Vec<u32>,
+        seed: u64,
+        max_steps: u64,
+        max_seconds: Option<f64>,
+        cancelled: Option<Py<PyAny>>,
+    ) -> PyResult<(Ways, Option<Vec<u32>>, u64)> {
+        self.existing(&transitions)?;
+        let patience = Patience::new(max_seconds, cancelled)?;
+        let deadline = patience.time.and_then(|time| Instant::now().checked_add(time));
+        let mut raised = None;
+        let Prepared { net, dependencies } = &*self.prepared;
+        let (found, _) = detached(py, &patience, &mut raised, |poll| {
+            cover::cover(net, dependencies, &transitions, seed, max_steps, &mut Watch::new(deadline, poll))
+        });
+        but_ctrl_c(py, raised)?;
+        let ways = found.ways.into_iter().map(|way| (way.from, way.firings, way.firable)).collect();
+        Ok((ways, found.deadlock, found.steps))
     }
 }
 

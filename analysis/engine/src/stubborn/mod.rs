@@ -48,10 +48,12 @@
 //! place that many share; literals as nodes between them keep the closure linear in the net.
 
 pub mod closure;
+pub mod cover;
 pub mod deletion;
 pub mod dependencies;
 pub mod effort;
 pub mod formula;
 pub mod marks;
+pub mod relaxed;
 pub mod search;
 pub mod walk;

@@ -24,13 +24,13 @@ use crate::marking::mix;
 use crate::net::Net;
 
 /// Firings in the shortest walks; longer for nets with more transitions.
-const UNIT: usize = 1 << 10;
+pub(super) const UNIT: usize = 1 << 10;
 /// Firings in the longest walk.
-const LENGTH_MAX: usize = 1 << 20;
+pub(super) const LENGTH_MAX: usize = 1 << 20;
 /// Words of markings that are remembered to find loops.
 const REMEMBERED_MAX: usize = 1 << 24;
 /// How many transitions a guided walk draws to choose from.
-const DRAWS: usize = 4;
+pub(super) const DRAWS: usize = 4;
 
 /// What a walk looks for.
 #[derive(Clone, Debug)]
@@ -50,23 +50,26 @@ enum Guide {
 }
 
 /// A place in the net that walks on.
-struct Walker<'a> {
+pub(super) struct Walker<'a> {
     net: &'a Dependencies,
-    marking: Vec<u64>,
+    pub(super) marking: Vec<u64>,
     /// For each transition how many of its conditions are false; those that never fire are not counted down.
     unmet: Vec<u32>,
-    firable: Vec<u32>,
+    pub(super) firable: Vec<u32>,
     position: Vec<u32>,
+    /// The transitions that the last firing made firable, and some that it made so for a moment.
+    pub(super) fresh: Vec<u32>,
 }
 
 impl<'a> Walker<'a> {
-    fn new(net: &'a Dependencies, initial: &[u64], transitions: usize) -> Self {
+    pub(super) fn new(net: &'a Dependencies, initial: &[u64], transitions: usize) -> Self {
         let mut walker = Walker {
             net,
             marking: initial.to_vec(),
             unmet: vec![u32::MAX; transitions],
             firable: Vec::new(),
             position: vec![0; transitions],
+            fresh: Vec::new(),
         };
         for t in (0..transitions as u32).filter(|&t| net.able(t)) {
             let unmet = net.conditions(t).iter().filter(|&&l| !is_true(l, initial)).count() as u32;
@@ -81,6 +84,12 @@ impl<'a> Walker<'a> {
     fn add(&mut self, t: u32) {
         self.position[t as usize] = self.firable.len() as u32;
         self.firable.push(t);
+        self.fresh.push(t);
+    }
+
+    /// Whether a transition is firable.
+    pub(super) fn may_fire(&self, t: u32) -> bool {
+        self.unmet[t as usize] == 0
     }
 
     fn remove(&mut self, t: u32) {
@@ -92,9 +101,10 @@ impl<'a> Walker<'a> {
     }
 
     /// Flips the places of a transition: fires it, or takes the firing back. Returns the work done.
-    fn flip(&mut self, t: u32) -> usize {
+    pub(super) fn flip(&mut self, t: u32) -> usize {
         let net = self.net;
         let mut work = 1;
+        self.fresh.clear();
         for &condition in net.flipped(t) {
             let place = condition >> 1;
             let now_false = if is_true(condition, &self.marking) { condition } else { negation(condition) };
@@ -141,7 +151,7 @@ impl Target {
 }
 
 /// The i-th number, from 1, of 1, 1, 2, 1, 1, 2, 4, 1, 1, 2, ...
-fn luby(i: u64) -> u64 {
+pub(super) fn luby(i: u64) -> u64 {
     let bits = 64 - i.leading_zeros();
     if i + 1 == 1 << bits { 1 << (bits - 1) } else { luby(i + 1 - (1 << (bits - 1))) }
 }
@@ -171,7 +181,7 @@ fn find(
     watch: &mut Watch<'_>,
 ) -> Result<Option<Vec<u32>>, Stop> {
     let count = net.transitions.len();
-    let mut random = Random(mix(seed));
+    let mut random = Random::new(seed);
     let mut fired = vec![0u32; count];
     let mut path = Vec::new();
     let unit = UNIT.max(count.min(LENGTH_MAX / 64));
@@ -236,7 +246,7 @@ fn choose(
 }
 
 /// The firings of a path that the target needs, in their order.
-fn cut_down(
+pub(super) fn cut_down(
     net: &Dependencies,
     target: &mut Target,
     reached: &[u64],
@@ -244,17 +254,18 @@ fn cut_down(
     transitions: usize,
     places: usize,
 ) -> Vec<u32> {
-    let mut needed = Marks::new(2 * places);
     match target {
         Target::Formula(formula) => {
             let mut literals: Vec<Literal> = Vec::new();
             formula.support(reached, &mut literals);
-            literals.iter().for_each(|&l| _ = needed.insert(l));
+            needed_for(net, &literals, path, places)
         }
         Target::Deadlock => {
             let flips =
                 path.iter().enumerate().flat_map(|(at, &t)| net.flipped(t).iter().map(move |&l| (negation(l), at)));
             let made: HashMap<Literal, usize> = flips.collect();
+            let mut needed = Marks::new(2 * places);
+            let mut literals: Vec<Literal> = Vec::new();
             for t in (0..transitions as u32).filter(|&t| net.able(t)) {
                 let mut unmet = net.conditions(t).iter().copied().filter(|&l| !is_true(l, reached)).map(negation);
                 // What was never made costs no firing; of the rest, the last firings are needed most likely anyway.
@@ -262,10 +273,18 @@ fn cut_down(
                     unmet.clone().min_by_key(|l| made.get(l).map_or((false, Reverse(0)), |&at| (true, Reverse(at))));
                 if !unmet.any(|l| needed.has(l)) {
                     cheapest.iter().for_each(|&l| _ = needed.insert(l));
+                    literals.extend(cheapest);
                 }
             }
+            needed_for(net, &literals, path, places)
         }
     }
+}
+
+/// The firings of a path that some literals need, which are true at its end, in their order.
+fn needed_for(net: &Dependencies, literals: &[Literal], path: &[u32], places: usize) -> Vec<u32> {
+    let mut needed = Marks::new(2 * places);
+    literals.iter().for_each(|&l| _ = needed.insert(l));
     let mut kept = Vec::new();
     for &t in path.iter().rev() {
         if net.flipped(t).iter().any(|&l| needed.has(negation(l))) {
@@ -279,7 +298,7 @@ fn cut_down(
 }
 
 /// The path without the parts that lead back to a marking; unchanged where its markings are too many to remember.
-fn without_loops(net: &Net, path: &[u32]) -> Vec<u32> {
+pub(super) fn without_loops(net: &Net, path: &[u32]) -> Vec<u32> {
     if path.len().saturating_mul(net.words) > REMEMBERED_MAX {
         return path.to_vec();
     }
@@ -302,10 +321,14 @@ fn without_loops(net: &Net, path: &[u32]) -> Vec<u32> {
 }
 
 /// Numbers from a seed (splitmix64).
-struct Random(u64);
+pub(super) struct Random(u64);
 
 impl Random {
-    fn below(&mut self, bound: usize) -> usize {
+    pub(super) fn new(seed: u64) -> Self {
+        Random(mix(seed))
+    }
+
+    pub(super) fn below(&mut self, bound: usize) -> usize {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         ((u128::from(mix(self.0)) * bound as u128) >> 64) as usize
     }

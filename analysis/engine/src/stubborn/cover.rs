@@ -1,0 +1,318 @@
+//! Cover: walks that make as many transitions fire as they can, for quasi-liveness.
+//!
+//! A walk that has made an open transition firable has come to a part of the net where others wait; so the way there is
+//! kept, cut down to the firings that it needs, and later walks start from there as often as from M0 (the archive of
+//! Ecoffet and others, "First return, then explore", 2021). A third of the walks are drawn towards one open transition
+//! by relaxed plans; a third fire what was fired least; a third are blind. A deadlock that is met on the way is kept too.
+//!
+//! What comes out is a tree of firing sequences, each of which goes on from a moment of another: what a walk has met is
+//! shown by one sequence, cut down to what all of it needs, so that all together are replayed in the time that their
+//! firings take. What was not met may fire all the same.
+
+use super::dependencies::{Dependencies, Literal, negation};
+use super::marks::Marks;
+use super::relaxed::Relaxed;
+use super::walk::{DRAWS, LENGTH_MAX, Random, Target, UNIT, Walker, cut_down, luby, without_loops};
+use crate::budget::{Stop, Watch};
+use crate::net::Net;
+
+/// Firings along one relaxed plan before the next is made.
+const PLAN_STEPS: usize = 64;
+
+/// A moment: so many firings of a way.
+type Moment = (u32, u32);
+
+/// A firing sequence, from M0 or a moment of an earlier one.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Way {
+    /// Where it goes on from; none is M0.
+    pub from: Option<Moment>,
+    /// What is fired.
+    pub firings: Vec<u32>,
+    /// Transitions, open until then, and after how many of these firings each is firable; ascending.
+    pub firable: Vec<(u32, u32)>,
+}
+
+/// What the walks have met.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Cover {
+    /// Ways to the transitions that were met.
+    pub ways: Vec<Way>,
+    /// A firing sequence from M0 to a deadlock.
+    pub deadlock: Option<Vec<u32>>,
+    /// Firings made.
+    pub steps: u64,
+}
+
+/// Where walks start: M0, or a moment of a way.
+struct Start {
+    marking: Vec<u64>,
+    at: Option<Moment>,
+    visits: u32,
+}
+
+/// Walks from M0 until each of the `open` transitions was firable, or for `max_steps` firings.
+pub fn cover(
+    net: &Net,
+    dependencies: &Dependencies,
+    open: &[u32],
+    seed: u64,
+    max_steps: u64,
+    watch: &mut Watch<'_>,
+) -> (Cover, Result<(), Stop>) {
+    let mut search = Search::new(net, dependencies, open, seed);
+    let end = search.run(max_steps, watch);
+    (search.found, end)
+}
+
+struct Search<'a> {
+    net: &'a Net,
+    dependencies: &'a Dependencies,
+    /// The open transitions, and for each transition its position among them.
+    open: Vec<u32>,
+    position: Vec<u32>,
+    fired: Vec<u32>,
+    archive: Vec<Start>,
+    relaxed: Relaxed<'a>,
+    random: Random,
+    found: Cover,
+}
+
+const CLOSED: u32 = u32::MAX;
+
+impl<'a> Search<'a> {
+    fn new(net: &'a Net, dependencies: &'a Dependencies, open: &[u32], seed: u64) -> Self {
+        let count = net.transitions.len();
+        let mut search = Search {
+            net,
+            dependencies,
+            open: Vec::new(),
+            position: vec![CLOSED; count],
+            fired: vec![0; count],
+            archive: vec![Start { marking: net.initial.clone(), at: None, visits: 0 }],
+            relaxed: Relaxed::new(dependencies, net.places, count),
+            random: Random::new(seed),
+            found: Cover::default(),
+        };
+        for &t in open.iter().filter(|&&t| dependencies.able(t)) {
+            if search.position[t as usize] == CLOSED {
+                search.position[t as usize] = search.open.len() as u32;
+                search.open.push(t);
+            }
+        }
+        search
+    }
+
+    fn close(&mut self, t: u32) {
+        let at = std::mem::replace(&mut self.position[t as usize], CLOSED);
+        self.open.swap_remove(at as usize);
+        if let Some(&moved) = self.open.get(at as usize) {
+            self.position[moved as usize] = at;
+        }
+    }
+
+    fn run(&mut self, max_steps: u64, watch: &mut Watch<'_>) -> Result<(), Stop> {
+        let unit = UNIT.max(self.net.transitions.len().min(LENGTH_MAX / 64));
+        for round in 1_u64.. {
+            let nowhere_to_go = self.found.deadlock.as_ref().is_some_and(Vec::is_empty);
+            if self.open.is_empty() || nowhere_to_go || self.found.steps >= max_steps {
+                break;
+            }
+            let from = self.start(round);
+            self.archive[from].visits += 1;
+            let length = LENGTH_MAX.min(unit.saturating_mul(luby(round.div_ceil(6)) as usize));
+            let left = usize::try_from(max_steps - self.found.steps).unwrap_or(usize::MAX);
+            self.walk(from, round % 3, length.min(left), watch)?;
+        }
+        Ok(())
+    }
+
+    /// M0 for every other walk; else, of two starts that are drawn, the one that fewer walks have left from.
+    fn start(&mut self, round: u64) -> usize {
+        if round % 2 == 1 {
+            return 0;
+        }
+        let (one, other) = (self.random.below(self.archive.len()), self.random.below(self.archive.len()));
+        if self.archive[one].visits <= self.archive[other].visits { one } else { other }
+    }
+
+    /// One walk.
+    fn walk(&mut self, from: usize, kind: u64, length: usize, watch: &mut Watch<'_>) -> Result<(), Stop> {
+        let count = self.net.transitions.len();
+        let mut walker = Walker::new(self.dependencies, &self.archive[from].marking, count);
+        watch.tick(count)?;
+        let (mut path, mut met) = (Vec::new(), Vec::new());
+        self.meet(&walker, &walker.firable, 0, &mut met);
+        let mut plan: Vec<u32> = Vec::new();
+        let mut planned = 0;
+        while path.len() < length && !self.open.is_empty() {
+            if walker.firable.is_empty() {
+                if self.found.deadlock.is_none() {
+                    let whole = self.whole_path(self.archive[from].at, &path);
+                    let (deadlock, places) = (&mut Target::Deadlock, self.net.places);
+                    let needed = cut_down(self.dependencies, deadlock, &walker.marking, &whole, count, places);
+                    self.found.deadlock = Some(without_loops(self.net, &needed));
+                }
+                break;
+            }
+            let mut work = 0;
+            let t = match kind {
+                0 => self.least_fired(&walker),
+                1 => {
+                    if planned == 0 || plan.is_empty() {
+                        let target = self.open[self.random.below(self.open.len())];
+                        let goal: &[Literal] = self.dependencies.conditions(target);
+                        if !self.relaxed.plan(&walker.marking, goal, &mut self.random, &mut plan) {
+                            break;
+                        }
+                        work = self.relaxed.size();
+                        planned = PLAN_STEPS;
+                    }
+                    planned -= 1;
+                    self.along(&walker, &mut plan)
+                }
+                _ => walker.firable[self.random.below(walker.firable.len())],
+            };
+            work += walker.flip(t);
+            path.push(t);
+            self.fired[t as usize] = self.fired[t as usize].saturating_add(1);
+            self.found.steps += 1;
+            self.meet(&walker, &walker.fresh, path.len(), &mut met);
+            if let Err(stop) = watch.tick(work) {
+                self.keep(from, &path, &met);
+                return Err(stop);
+            }
+        }
+        self.keep(from, &path, &met);
+        Ok(())
+    }
+
+    fn least_fired(&mut self, walker: &Walker<'_>) -> u32 {
+        let among = &walker.firable;
+        let mut best = among[self.random.below(among.len())];
+        for _ in 1..DRAWS {
+            let t = among[self.random.below(among.len())];
+            if self.fired[t as usize] < self.fired[best as usize] {
+                best = t;
+            }
+        }
+        best
+    }
+
+    /// A transition of the plan that is firable, which is taken out of it; now and then, and where there is none, any.
+    fn along(&mut self, walker: &Walker<'_>, plan: &mut Vec<u32>) -> u32 {
+        if self.random.below(16) > 0 {
+            let begin = self.random.below(plan.len());
+            for k in 0..plan.len() {
+                let at = (begin + k) % plan.len();
+                if walker.may_fire(plan[at]) {
+                    return plan.swap_remove(at);
+                }
+            }
+        }
+        walker.firable[self.random.below(walker.firable.len())]
+    }
+
+    /// Notes those of some transitions that are open and firable, after so many firings of a walk.
+    fn meet(&mut self, walker: &Walker<'_>, among: &[u32], after: usize, met: &mut Vec<(u32, usize)>) {
+        for &t in among {
+            if self.position[t as usize] != CLOSED && walker.may_fire(t) {
+                self.close(t);
+                met.push((t, after));
+            }
+        }
+    }
+
+    /// Keeps the way to what was met on a walk, cut down to what it needs, and starts from there later.
+    fn keep(&mut self, from: usize, path: &[u32], met: &[(u32, usize)]) {
+        if met.is_empty() {
+            return;
+        }
+        let (firings, firable) = self.needed(path, met);
+        let mut marking = self.archive[from].marking.clone();
+        let number = self.found.ways.len() as u32;
+        let (mut fired, mut last) = (0, 0);
+        for &(_, after) in &firable {
+            for &u in &firings[fired..after as usize] {
+                let flip = self.net.flip(u as usize, self.net.words);
+                marking.iter_mut().zip(flip).for_each(|(word, flip)| *word ^= flip);
+            }
+            fired = after as usize;
+            if after > last {
+                self.archive.push(Start { marking: marking.clone(), at: Some((number, after)), visits: 0 });
+                last = after;
+            }
+        }
+        self.found.ways.push(Way { from: self.archive[from].at, firings, firable });
+    }
+
+    /// The firings of a path that the transitions met on it need, and after how many of them each is firable.
+    fn needed(&self, path: &[u32], met: &[(u32, usize)]) -> (Vec<u32>, Vec<(u32, u32)>) {
+        let net = self.dependencies;
+        let mut needed = Marks::new(2 * self.net.places);
+        let (mut kept, mut firable) = (Vec::new(), Vec::new());
+        let mut met = met.iter().rev().peekable();
+        for after in (0..=path.len()).rev() {
+            while let Some(&(t, _)) = met.next_if(|&&(_, at)| at == after) {
+                net.conditions(t).iter().for_each(|&l| _ = needed.insert(l));
+                firable.push((t, kept.len() as u32));
+            }
+            let Some(&t) = after.checked_sub(1).map(|at| &path[at]) else { break };
+            if net.flipped(t).iter().any(|&l| needed.has(negation(l))) {
+                net.flipped(t).iter().for_each(|&l| needed.remove(negation(l)));
+                net.conditions(t).iter().for_each(|&l| _ = needed.insert(l));
+                kept.push(t);
+            }
+        }
+        kept.reverse();
+        firable.reverse();
+        // They were counted from the end.
+        firable.iter_mut().for_each(|(_, after)| *after = kept.len() as u32 - *after);
+        (kept, firable)
+    }
+
+    /// A path from a moment, as a path from M0.
+    fn whole_path(&self, at: Option<Moment>, path: &[u32]) -> Vec<u32> {
+        let moments = std::iter::successors(at, |&(way, _)| self.found.ways[way as usize].from);
+        let mut parts: Vec<&[u32]> =
+            moments.map(|(way, fired)| &self.found.ways[way as usize].firings[..fired as usize]).collect();
+        parts.reverse();
+        parts.push(path);
+        parts.concat()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+    use crate::net::Transition;
+
+    #[test]
+    fn each_transition_of_a_chain_is_met_and_the_one_that_is_dead_is_not() {
+        let arc = |from, to| Transition::new(&[from], &[to], &[], &[], &[]);
+        let mut transitions: Vec<Transition> = (0..200).map(|p| arc(p, p + 1)).collect();
+        transitions.push(arc(201, 0));
+        let net = Net::new(202, transitions, &[0]).expect("well formed");
+        let dependencies = Dependencies::new(&net);
+        let all: Vec<u32> = (0..201).collect();
+        let mut poll = unwatched;
+        let (found, end) = cover(&net, &dependencies, &all, 1, 100_000, &mut Watch::new(None, &mut poll));
+        let met: Vec<u32> = found.ways.iter().flat_map(|way| way.firable.iter().map(|&(t, _)| t)).collect();
+        assert_eq!((end, met.len()), (Ok(()), 200));
+        for Way { from, firings, firable } in &found.ways {
+            let begin = from.map_or(0, |(way, fired)| {
+                found.ways[way as usize]
+                    .firable
+                    .iter()
+                    .find(|&&(_, after)| after == fired)
+                    .expect("an archived moment")
+                    .0
+            });
+            for &(t, after) in firable {
+                assert_eq!(firings[..after as usize], (begin..t).collect::<Vec<u32>>());
+            }
+        }
+        assert_eq!(found.deadlock.map(|path| path.len()), Some(200));
+    }
+}
