@@ -292,6 +292,13 @@ class Diagram:
         """The markings that can be reached from a set."""
     def endless(self, within: MarkingSet) -> MarkingSet:
         """The markings from which a run can go on for ever inside a set (EG over infinite runs)."""
+    def nodes(self, sets: list[MarkingSet], most: int) -> tuple[list[tuple[int, int, int]], list[int]] | None:
+        """The nodes of some sets as rows (level, without, with), and the number of each set; None for more than `most`.
+
+        Levels count from 1, the place of level k being `order[k - 1]`. Rows have numbers from 2, and the parts of a row
+        stand before it: the markings in which its place is empty, and those in which it holds a token, that token left
+        out; 0 holds no marking, 1 the empty one. A level that is passed over is empty.
+        """
     def path_to(self, targets: MarkingSet) -> tuple[list[int], list[int], bool] | None:
         """A firing sequence from M0 into a set, the places marked in its end, and whether it is known to be shortest.
 

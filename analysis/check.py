@@ -215,7 +215,7 @@ class _Check:
             settling.found.get(verdict.name, verdict) if verdict.status is Status.UNKNOWN else verdict
             for verdict in report.verdicts
         )
-        return _told(replace(report, verdicts=verdicts), [*course, *settling.course])
+        return _told(replace(report, verdicts=verdicts, findings=settling.findings), [*course, *settling.course])
 
     def _moment(self, deadline: Deadline) -> Deadline:
         """When a technique that knows things at once must have said them."""

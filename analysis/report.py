@@ -10,11 +10,12 @@ here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
+from firable.analysis.goal import Finding
 from firable.analysis.question import Answer, Question
 from firable.analysis.spaces.reachability import BudgetExceeded, IncompleteGraph, ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
@@ -31,6 +32,7 @@ from firable.analysis.verdicts.commands import (
 from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pairs, Steps
 from firable.analysis.verdicts.properties import decide_properties
 from firable.analysis.verdicts.starvation import starvation_free
+from firable.nets.formula import Formula
 from firable.nets.net import Net
 from firable.nets.queries import Query
 from firable.nets.verdict import Status, Verdict, Weight, overall
@@ -72,7 +74,7 @@ class Figures:
     def to_json(self) -> dict[str, Any]:
         """The figures as JSON data; unknown ones are null."""
         data: dict[str, Any] = {}
-        for name in (field.name for field in fields(self)):
+        for name in (one.name for one in fields(self)):
             value = getattr(self, name)
             if isinstance(value, Pairs):
                 value = {
@@ -91,7 +93,8 @@ class Figures:
 class CheckReport:
     """What `check` found of a net under one discipline; `space` is there for further questions.
 
-    `course` tells, in words, which techniques were tried and why the verdicts name the ones they name.
+    `course` tells, in words, which techniques were tried and why the verdicts name the ones they name. `findings` are,
+    for the verdicts that came down to goals, these goals with what was found of them: what evidence is made from.
     """
 
     net: Net
@@ -100,6 +103,7 @@ class CheckReport:
     verdicts: tuple[Verdict, ...]
     space: StateSpace[Any]
     course: tuple[str, ...] = ()
+    findings: Mapping[str, Sequence[tuple[Formula, Finding]]] = field(default_factory=dict)
 
     @property
     def status(self) -> Status:

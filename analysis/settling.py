@@ -49,7 +49,8 @@ _QUESTIONS: Final = {question.name: question for question in (*QUESTIONS, STARVA
 class Settling:
     """The verdicts on one net that were `found` without all markings, and the `course` of finding them.
 
-    Ctrl-C sets `interrupted`, after which nothing is begun.
+    `findings` keeps, by verdict, its goals with what was found of them: what evidence is made from. Ctrl-C sets
+    `interrupted`, after which nothing is begun.
     """
 
     net: Net
@@ -58,6 +59,7 @@ class Settling:
     interrupted: Event
     found: dict[str, Verdict] = field(default_factory=dict)
     course: list[str] = field(default_factory=list)
+    findings: dict[str, list[tuple[Formula, Finding]]] = field(default_factory=dict)
 
     def learn(self, of: Method, among: Collection[str], deadline: Deadline) -> None:
         """Take from a technique what it knows at once of these verdicts, by name."""
@@ -103,6 +105,7 @@ class Settling:
         for goal in goals:
             if (finding := self._race(verdict.name, goal, lanes, deadline, slices_seconds)) is None:
                 return
+            self.findings.setdefault(verdict.name, []).append((goal.formula, finding))
             if finding.reachable is not goal.wanted:
                 self._settle(question, self._failed(goal, finding), finding.method, finding.cost)
                 return

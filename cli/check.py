@@ -16,6 +16,7 @@ from firable.cli.report import Report
 from firable.cli.structure import structure_json, structure_lines
 
 if TYPE_CHECKING:
+    from firable.analysis.report import CheckReport
     from firable.analysis.spaces.reachability import Budget
     from firable.cli.cache import Kept
     from firable.nets.loading import Loaded
@@ -53,6 +54,7 @@ class _Asked:
 
 
 _EVIDENCE = ".evidence.json"
+_NAME_MAX = 100  # of a net, in the name of a file
 
 
 @click.command(short_help="Check nets: deadlock, contact, liveness, conflicts, their own properties.")
@@ -77,7 +79,7 @@ _EVIDENCE = ".evidence.json"
     "--evidence",
     "evidence_dir",
     metavar="DIR",
-    help="Write evidence of what was decided, for `firable verify`; looked for in --max-seconds more, or 30.",
+    help="Write evidence of what is decided, for `firable verify`; takes at most --max-seconds more, or 30.",
 )
 @click.option(
     "--structure", is_flag=True, help="Also net class, invariants, siphons, traps; in --max-seconds more, or 30."
@@ -130,11 +132,15 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: boo
     queries = _queries(loaded, asked)
     cache = opened_cache() if asked.cached else None
     key = key_of(net, asked.of_the_net(queries)) if cache is not None else ""
-    kept = cache.read(key) if cache is not None else None
+    # Evidence comes from the run that decides, which a cache does not keep.
+    kept = cache.read(key) if cache is not None and evidence_dir is None else None
     again = kept is not None
+    documents: dict[str, bytes] = {}
     if kept is None:
         with loaded.placing():
-            kept = _found(net, asked, queries)
+            found, kept = _found(net, asked, queries)
+            if evidence_dir is not None:
+                documents = _evidence(found, queries, asked)
         if cache is not None:
             cache.write(key, kept)
     files: tuple[str, ...] = ()
@@ -142,7 +148,7 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: boo
         folder = _folder(asked.trace_dir, argument, many=many)
         files = write_folder(folder, _traces(net, kept.verdicts, asked.discipline))
     if evidence_dir is not None:
-        files += write_folder(_folder(evidence_dir, argument, many=many), _evidence(net, kept.verdicts, asked))
+        files += write_folder(_folder(evidence_dir, argument, many=many), documents)
     return Report(
         "check",
         argument,
@@ -179,8 +185,8 @@ def _queries(loaded: Loaded, asked: _Asked) -> tuple[Query, ...]:
     return found + single
 
 
-def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> Kept:
-    """What the techniques find of a net."""
+def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> tuple[CheckReport, Kept]:
+    """What the techniques find of a net, and what is kept of it."""
     from firable.analysis.check import check as check_net
     from firable.cli.cache import Kept
     from firable.cli.progress import progress_line
@@ -195,7 +201,7 @@ def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> Kept:
         figures["structure"] = structure_json(
             net, contact_free=contact_free, seconds=asked.budget.seconds, discipline=asked.discipline
         )
-    return Kept(found.verdicts, figures, found.course)
+    return found, Kept(found.verdicts, figures, found.course)
 
 
 def _traces(net: Net, verdicts: Iterable[Verdict], discipline: str) -> dict[str, str]:
@@ -214,24 +220,18 @@ def _traces(net: Net, verdicts: Iterable[Verdict], discipline: str) -> dict[str,
     return traces
 
 
-def _evidence(net: Net, verdicts: Iterable[Verdict], asked: _Asked) -> dict[str, str]:
-    """The documents of evidence that can be had of the verdicts, by the names of their files."""
-    from dataclasses import replace
-
+def _evidence(found: CheckReport, queries: Sequence[Query], asked: _Asked) -> dict[str, bytes]:
+    """The document of evidence on all that was decided, by the name of its file."""
     from firable.analysis.deadline import Deadline
-    from firable.analysis.evidence.producing import MARKINGS_MAX, evidence_of_verdict
+    from firable.analysis.evidence.producing import evidence_of_report
     from firable.analysis.goal import Limits
-    from firable.analysis.spaces.reachability import explore
     from firable.nets.bundle import file_stem
 
     seconds = 30.0 if asked.budget.seconds is None else asked.budget.seconds
-    limits = Limits(Deadline.after(seconds))
-    graph = explore(net, asked.discipline, replace(asked.budget, markings=MARKINGS_MAX, seconds=seconds))
-    return {
-        f"{file_stem(name)}{_EVIDENCE}": evidence.to_text()
-        for verdict in verdicts
-        for name, evidence in evidence_of_verdict(net, verdict, graph, limits).items()
-    }
+    document = evidence_of_report(found, queries, Limits(Deadline.after(seconds), asked.budget.memory_bytes))
+    data = document.to_bytes()
+    name = file_stem(found.net.name[:_NAME_MAX] or "net") + _EVIDENCE
+    return {name if data.startswith(b"{") else f"{name}.gz": data}
 
 
 def _show(report: Report, *, verbose: bool) -> None:
@@ -252,12 +252,9 @@ def _show(report: Report, *, verbose: bool) -> None:
         for line in structure_lines(figures["structure"]):
             click.echo(f"  {line}")
     text.show_summary(report)
-    documents = [file for file in report.files if file.endswith(_EVIDENCE)]
+    documents = [file for file in report.files if file.endswith((_EVIDENCE, f"{_EVIDENCE}.gz"))]
     for file in report.files:
         if file not in documents:
             click.echo(f"  replay it: firable replay {file} --net {report.input}")
-    if documents:
-        from pathlib import Path
-
-        folder = Path(documents[0]).parent
-        click.echo(f"  {text.counted(len(documents), 'document')} of evidence: firable verify {folder}/*{_EVIDENCE}")
+    for file in documents:
+        click.echo(f"  evidence: firable verify {file}")

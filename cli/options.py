@@ -116,14 +116,14 @@ def write_text(path: str, text: str) -> None:
         write_whole(path, text)
 
 
-def write_folder(folder: str, files: Mapping[str, str]) -> tuple[str, ...]:
+def write_folder(folder: str, files: Mapping[str, str | bytes]) -> tuple[str, ...]:
     """Write files into a folder, made if it is missing; returns their paths. Raises `InputError` F1017."""
     from firable.nets.writing import make_folder, write_whole
 
     make_folder(folder)
-    paths = {str(Path(folder) / name): text for name, text in files.items()}
-    for path, text in paths.items():
-        write_whole(path, text)
+    paths = {str(Path(folder) / name): data for name, data in files.items()}
+    for path, data in paths.items():
+        write_whole(path, data)
     return tuple(paths)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,8 +14,13 @@ from firable.cli.options import answer_all, format_option, load_net, write_folde
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
-    from firable.analysis.evidence.document import Evidence
+    from firable.analysis.evidence.checker import CheckedRecord
+    from firable.analysis.evidence.document import Document
     from firable.nets.net import Net
+    from firable.nets.verdict import Verdict
+
+_CLAIMS_MAX = 3  # told of one verdict
+_CLAIM_MAX = 100  # characters told of one claim
 
 
 @click.command(short_help="Check evidence anew, without the technique that made it.")
@@ -33,9 +39,13 @@ if TYPE_CHECKING:
 def verify(evidence: tuple[str, ...], of: str | None, smt_dir: str | None, timeout: float, format_: str) -> int:
     """Check documents of EVIDENCE, written by `firable check --evidence DIR`.
 
-    A firing sequence is played, a set of markings is fired through, and the obligations of an inductive invariant are
-    derived anew from the net and decided by z3. Evidence that was damaged or edited, or that does not show what it
-    claims, is refused as an input error.
+    Each verdict of a document is shown again, from the firing rule alone: firing sequences are played, listed markings
+    fired through, decision diagrams found closed, the obligations of invariants derived anew from the net and decided
+    by z3. Of each it is told how. "proved" means here that the evidence shows it, whether it says that something holds
+    or that it is violated; a verdict that nothing shows is unknown, and told why: it is only claimed.
+
+    Exit codes: 0 all verdicts of the documents are shown, 3 some are only claimed, or the time was over, 2 evidence was
+    damaged or edited, is about another net, or does not show what it claims.
     """
     milliseconds = max(1, round(timeout * 1000))
     net = None if of is None else load_net(of).net
@@ -45,53 +55,73 @@ def verify(evidence: tuple[str, ...], of: str | None, smt_dir: str | None, timeo
 
 
 def _report(file: str, of: Net | None, smt_dir: str | None, timeout_ms: int, *, many: bool) -> Report:
-    from firable.analysis.evidence.checker import check_evidence
-    from firable.analysis.evidence.document import read_evidence
+    from firable.analysis.evidence.checker import check_document
+    from firable.analysis.evidence.document import read_document
     from firable.nets.bundle import file_stem
-    from firable.nets.verdict import Status, Verdict
 
-    evidence = read_evidence(file)
+    document = read_document(file)
     if of is not None:
-        _refuse_another_net(file, evidence, of)
-    checked = check_evidence(evidence, timeout_ms=timeout_ms)
+        _refuse_another_net(file, document, of)
+    checked = list(check_document(document, timeout_ms=timeout_ms))
+    verdicts = [_verdict(document, one) for one in checked]
     files: tuple[str, ...] = ()
     if smt_dir is not None:
         folder = str(Path(smt_dir) / file_stem(Path(file).stem)) if many else smt_dir
-        files = write_folder(folder, _obligations(evidence))
-    verdict = Verdict(
-        "evidence",
+        files = write_folder(folder, dict(_obligations(document)))
+    discipline = document.discipline.value
+    return Report("verify", file, document.net, tuple(verdicts), discipline=discipline, files=files)
+
+
+def _verdict(document: Document, checked: CheckedRecord) -> Verdict:
+    from firable.nets.verdict import Status, Verdict
+
+    record = checked.record
+    claims = [_shortened(str(claim)) for claim, _ in record.shown]
+    more = f", and {len(claims) - _CLAIMS_MAX} more claims" if len(claims) > _CLAIMS_MAX else ""
+    words = f" ({record.query})" if record.query else ""
+    said = f"it {'holds' if record.proved else 'is violated'}{words}: " if record.name else ""
+    late = checked.only_claimed and not checked.only_claimed.startswith("only claimed")
+    return Verdict(
+        record.name or "evidence",
         Status.PROVED if checked.shown else Status.UNKNOWN,
-        str(evidence.claim),
-        checked.method,
-        bound=checked.bound,
-        hint="" if checked.shown else "allow more time",
-        evidence=tuple(Path(path).name for path in files),
-        discipline=evidence.discipline.value,
+        f"{said}{'; '.join(claims[:_CLAIMS_MAX])}{more}".removesuffix(": "),
+        "; ".join(checked.methods) or "nothing",
+        bound=checked.only_claimed,
+        hint="allow more time" if late else "",
+        discipline=document.discipline.value,
     )
-    return Report("verify", file, evidence.net, (verdict,), discipline=evidence.discipline.value, files=files)
 
 
-def _refuse_another_net(file: str, evidence: Evidence, of: Net) -> None:
+def _shortened(text: str) -> str:
+    return text if len(text) <= _CLAIM_MAX else f"{text[: _CLAIM_MAX - 1]}…"
+
+
+def _refuse_another_net(file: str, document: Document, of: Net) -> None:
     from firable.nets.diagnostics import Diagnostic, InputError, Span
     from firable.nets.interchange import net_digest
     from firable.nets.source import printable
 
-    if net_digest(evidence.net) != net_digest(of):
+    if net_digest(document.net) != net_digest(of):
         message = (
-            f"the evidence does not show what it claims of this net: it is about another one, '{evidence.net.name}'"
+            f"the evidence does not show what it claims of this net: it is about another one, '{document.net.name}'"
         )
         hint = "a change of a place, an arc or a gate makes another net; check it anew"
         raise InputError([Diagnostic("F6002", message, hint, span=Span(printable(file), 1, 1))])
 
 
-def _obligations(evidence: Evidence) -> dict[str, str]:
-    """The SMT-LIB 2 text of each obligation, by the name of its file."""
-    from firable.analysis.evidence.obligations import obligations, sums_text
+def _obligations(document: Document) -> Iterator[tuple[str, str]]:
+    """The SMT-LIB 2 text of each obligation, by the name of its file: verdict, number of the claim, obligation."""
+    from firable.analysis.evidence.obligations import Evidence, obligations, sums_text
+    from firable.nets.bundle import file_stem
 
-    files = {f"{obligation.name}.smt2": obligation.text(evidence) for obligation in obligations(evidence)}
-    if (sums := sums_text(evidence)) is not None:
-        files["sums.smt2"] = sums
-    return files
+    for record in document.records:
+        for number, (claim, certificate) in enumerate(record.shown, start=1):
+            evidence = Evidence(document.net, document.discipline, claim, certificate)
+            name = file_stem(record.name or "evidence") + (f".{number}" if len(record.shown) > 1 else "")
+            for obligation in obligations(evidence):
+                yield f"{name}.{obligation.name}.smt2", obligation.text(evidence)
+            if (sums := sums_text(evidence)) is not None:
+                yield f"{name}.sums.smt2", sums
 
 
 def _show(report: Report) -> None:
@@ -99,5 +129,15 @@ def _show(report: Report) -> None:
     words = {"interleaving": "interleaving", "step": "synchronous steps"}[report.discipline]
     click.echo(f"  {words}, external gates free")
     text.show_verdicts(report.net, report.verdicts, verbose=True)
+    _summary(report)
     if report.files:
         click.echo(f"\n  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
+
+
+def _summary(report: Report) -> None:
+    counts: Mapping[str, int] = {
+        word: sum(verdict.status.value == status for verdict in report.verdicts)
+        for word, status in (("shown", "proved"), ("not shown", "unknown"))
+    }
+    told = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
+    click.echo(f"\n{told or 'the document claims nothing'}")

@@ -1,17 +1,22 @@
-"""Certificates: what shows that a claim about the reachable markings holds, apart from how it was found.
+"""Certificates: what shows that a claim about the runs of a net holds, apart from how it was found.
 
 Each is data over the names of the net, small or large, that somebody who knows the firing rule, and nothing of the
 technique that found it, can check:
 
-- a *firing sequence* leads from M0 to a marking where the goal holds;
+- a *firing sequence* leads from M0 to a marking where the goal holds; with a cycle it is a run that goes on for ever;
 - an *inductive invariant* is true of M0, kept by every firing, and excludes the goal. It is a conjunction of equations
   (weighted sums of tokens that no firing changes: P-invariants), of inequalities (such sums that no firing lowers, as
   the state equation gives them), and of clauses (some of these places holds a token, or some of those holds none). A
   trap that is marked in M0 is such a clause, so the argument of siphons and traps is an
   inductive invariant too, whose premises need no trust: the checker fires the transitions as they are;
-- a *closed marking set* is that, with the invariant as a list: M0 is in it and every firing stays in it. With a
-  distance for each marking it shows more: where each marking has a successor that is nearer to the goal, the goal can
-  be reached from everywhere, which is what liveness and reversibility say.
+- a *labelling* is that, with the invariant as a set of markings, listed or as a decision diagram: M0 is in it and every
+  firing stays in it. With labels it shows any formula of CTL: each subformula "until" comes with a rank for each
+  marking, which falls along some firing (or along every one), and each "always" with a set that is not left;
+- a *continuation* is a firing sequence and a certificate for the net that starts where it ends: from there the goal is
+  never reached again;
+- *progress* shows a response under fairness: ranks that no firing without the answer raises, and for each rank a
+  transition that must fire at last, and lowers it;
+- a *theorem* names a class of nets, and what of its premises cannot be read off the arcs.
 
 Where the invariant does not exclude the goal by itself, the absence of the goal may still be d-inductive within it: the
 goal is not among the first d markings of any run, and after d markings without it comes another one (Sheeran, Singh
@@ -22,6 +27,7 @@ and Stålmarck 2000, "Checking safety properties using induction and a SAT-solve
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 from firable.nets.net import Marking
 
@@ -52,9 +58,10 @@ class Clause:
 
 @dataclass(frozen=True, slots=True)
 class FiringSequence:
-    """From M0 these transitions fire, one set of them after the other, and then the goal holds."""
+    """From M0 these transitions fire, one set of them after the other; then, if it is not empty, the cycle for ever."""
 
     firings: tuple[tuple[str, ...], ...]
+    cycle: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,15 +79,123 @@ class InductiveInvariant:
 
 
 @dataclass(frozen=True, slots=True)
-class MarkingSet:
-    """M0 is among these markings, no firing leads out of them, and the goal holds in none.
-
-    With `distances`, one for each marking, another claim: the goal holds where the distance is 0, and elsewhere some
-    firing leads to a marking whose distance is smaller by one; so it can be reached from every marking.
-    """
+class Markings:
+    """A set of markings, one by one."""
 
     markings: tuple[Marking, ...]
-    distances: tuple[int, ...] = ()
 
 
-Certificate = FiringSequence | InductiveInvariant | MarkingSet
+@dataclass(frozen=True, slots=True)
+class Diagram:
+    """Sets of markings as a zero-suppressed decision diagram; the first of the `roots` is the set that is closed.
+
+    `order` names the places, level 1 first. A row is a level and two numbers of rows before it: the markings in which
+    the place of the level is empty, and those in which it holds a token, that token left out. The first row has number
+    2; 0 is the empty set, 1 the empty marking alone; a level that is passed over is empty.
+    """
+
+    order: tuple[str, ...]
+    rows: tuple[tuple[int, int, int], ...]
+    roots: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Ranks:
+    """Of listed markings: the rank of each in a subformula, -1 for none.
+
+    Of an "until" the rank falls on the way to its end, where it is 0; of an "always" it is 0 where that holds.
+    """
+
+    ranks: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Back:
+    """Of a diagram: an "until" of some run is found by going back from its end, by each of these in turn."""
+
+    transitions: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Rounds:
+    """Of a diagram: an "until" of every run is found by going back so many times by one firing, from its end."""
+
+    rounds: int
+
+
+@dataclass(frozen=True, slots=True)
+class Root:
+    """Of a diagram: an "always" holds in the set of this root."""
+
+    root: int
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """An "always" holds in all of the set."""
+
+
+Label = Ranks | Back | Rounds | Root | Whole
+
+
+@dataclass(frozen=True, slots=True)
+class Labelling:
+    """M0 is in the set, no firing leads out of it, and the claim holds of it.
+
+    The labels are those of the fixpoints of the claim in negation normal form, inner ones first
+    (`firable.analysis.evidence.labelling`).
+    """
+
+    space: Markings | Diagram
+    labels: tuple[Label, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Continuation:
+    """After these firings the goal is never reached: the certificate shows it of the net in the marking after them."""
+
+    firings: tuple[tuple[str, ...], ...]
+    then: InductiveInvariant | Labelling
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """A response: `ranks` gives each of the listed markings its place on the way to the answer, none where none is due.
+
+    A place on the way is a sequence of numbers, compared from the left; `helpful` names, for a beginning of such a
+    sequence, the transition that fairness makes fire at last (`firable.analysis.evidence.progress`).
+    """
+
+    space: Markings
+    ranks: tuple[tuple[int, ...], ...]
+    helpful: tuple[tuple[tuple[int, ...], str], ...] = ()
+
+
+class TheoremName(StrEnum):
+    """The theorems that are taken from books; the premises are checked, the theorem is not."""
+
+    MARKED_GRAPH = "marked-graph"
+    FREE_CHOICE = "free-choice"
+    ASYMMETRIC_CHOICE = "asymmetric-choice"
+
+
+@dataclass(frozen=True, slots=True)
+class Theorem:
+    """A theorem on a class of contact-free nets; `contact` shows that the net is one.
+
+    Where the premise is that every siphon contains a marked trap, one of the `traps` is in each.
+    """
+
+    name: TheoremName
+    contact: InductiveInvariant | Labelling
+    traps: tuple[tuple[str, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Unfolded:
+    """A formula of LTL is decided anew, on the markings of this closed set, by a tableau that the checker makes."""
+
+    space: Markings
+
+
+Certificate = FiringSequence | InductiveInvariant | Labelling | Continuation | Progress | Theorem | Unfolded

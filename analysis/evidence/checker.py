@@ -2,38 +2,79 @@
 
 It imports nothing that finds anything: no engine, no exploration, no proof method, no theory of structure. What it
 needs is the firing rule, and z3 for the obligations, whose SMT-LIB text goes to any other solver as well. A firing
-sequence is played by the reference player, token by token; a set of markings is fired through, marking by marking.
+sequence is played by the reference player, token by token; listed markings are fired through, one by one, and labels,
+ranks and tableaux looked through there; a decision diagram is found closed under each transition by a few operations
+of its own.
 
-There are three answers. It shows the claim; the solver ran out of time, and nothing is known; or it does not show it,
-and then the evidence is refused as an input that says something wrong. That says nothing on whether the claim is true.
+There are three answers. It shows the claim; the time was over, and nothing is known; or it does not show it, and then
+the evidence is refused as an input that says something wrong. That says nothing on whether the claim is true.
+
+A verdict is shown where the claims that are shown suffice for it (`firable.analysis.evidence.meaning`); one that no
+claim shows is only claimed, and told so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Final, NoReturn
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
 
-from firable.analysis.evidence.certificate import FiringSequence, InductiveInvariant, MarkingSet
-from firable.analysis.evidence.document import ClaimKind, Evidence
-from firable.analysis.evidence.obligations import obligations, wrong_sums
-from firable.analysis.induction.smt import Answer, decide
-from firable.nets.diagnostics import Diagnostic, InputError
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import (
+    Certificate,
+    Continuation,
+    Diagram,
+    FiringSequence,
+    InductiveInvariant,
+    Label,
+    Labelling,
+    Markings,
+    Progress,
+    Theorem,
+    Unfolded,
+)
+from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
+from firable.analysis.evidence.diagrams import Diagrams
+from firable.analysis.evidence.document import Document, Record
+from firable.analysis.evidence.labelling import LabelledSpace, labelled
+from firable.analysis.evidence.listed import Listed
+from firable.analysis.evidence.meaning import suffices
+from firable.analysis.evidence.obligations import (
+    Evidence,
+    Obligation,
+    contact_free,
+    continued,
+    diagram_term,
+    obligations,
+    played,
+    wrong_sums,
+)
+from firable.analysis.evidence.progress import check_progress
+from firable.analysis.evidence.refusal import TimeIsOverError, refuse
+from firable.analysis.evidence.runs import check_refuting_run, check_unanswered_run, holds
+from firable.analysis.evidence.theorems import check_premises
+from firable.analysis.evidence.unfolding import Unfolding
+from firable.analysis.induction.smt import Answer, Terms, decide
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import format_formula
-from firable.nets.net import Marking
-from firable.semantics.algebra import BOOL, Bitwise
-from firable.semantics.firing import firable
+from firable.nets.net import Net
+from firable.nets.queries import parse_query
+from firable.nets.temporal import format_temporal
 from firable.semantics.formulas import evaluate
-from firable.semantics.player import NotFirableError, Player, holds_in
-from firable.semantics.trace import Discipline
 
 TIMEOUT_MS: Final = 60_000
 
 _SHOWS: Final = {
-    FiringSequence: {ClaimKind.REACHABLE},
+    FiringSequence: {ClaimKind.REACHABLE, ClaimKind.FIRES, ClaimKind.NOT_LTL, ClaimKind.NOT_LEADS_TO},
     InductiveInvariant: {ClaimKind.NEVER},
-    MarkingSet: {ClaimKind.NEVER, ClaimKind.ALWAYS_POSSIBLE},
+    Labelling: {ClaimKind.NEVER, ClaimKind.REACHABLE, ClaimKind.ALWAYS_POSSIBLE, ClaimKind.LOST, ClaimKind.CTL},
+    Continuation: {ClaimKind.LOST},
+    Progress: {ClaimKind.LEADS_TO},
+    Theorem: {ClaimKind.LIVE, ClaimKind.HOME, ClaimKind.ALWAYS_POSSIBLE},
+    Unfolded: {ClaimKind.LTL},
 }
+
+_BY_DEFINITION: Final = {"starvation": "the arbitrated run played"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,127 +86,214 @@ class Checked:
     bound: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class CheckedRecord:
+    """A verdict of a document: whether it is shown, by what, and what of it is only claimed."""
+
+    record: Record
+    shown: bool
+    methods: tuple[str, ...]
+    only_claimed: str = ""
+
+
 def check_evidence(evidence: Evidence, *, timeout_ms: int = TIMEOUT_MS) -> Checked:
     """Check that the evidence shows what it claims; `timeout_ms` is for each obligation.
 
     Raises `InputError` F6002 where it does not.
 
-    >>> from firable.analysis.evidence.document import Claim
     >>> from firable.nets.catalogue.families import family_net
     >>> from firable.nets.formula import Deadlock
+    >>> from firable.semantics.trace import Discipline
     >>> net, claim = family_net("philosophers-2"), Claim(ClaimKind.REACHABLE, Deadlock())
     >>> sequence = FiringSequence((("p1_takes_left",), ("p2_takes_left",)))
     >>> check_evidence(Evidence(net, Discipline.INTERLEAVING, claim, sequence)).shown
     True
     """
-    certificate = evidence.certificate
-    if evidence.claim.kind not in _SHOWS[type(certificate)]:
-        _refuse(f"evidence of this kind cannot show '{evidence.claim}'")
-    match certificate:
-        case FiringSequence(firings):
-            return _played(evidence, firings)
-        case MarkingSet():
-            return _fired_through(evidence, certificate)
-        case InductiveInvariant():
-            return _discharged(evidence, timeout_ms)
+    return _Checker(timeout_ms).check(evidence)
 
 
-def _refuse(reason: str) -> NoReturn:
-    message = f"the evidence does not show what it claims: {reason}"
-    hint = "it was edited, or the technique that made it is wrong; whether the claim is true is not known from it"
-    raise InputError([Diagnostic("F6002", message, hint)])
+def check_document(document: Document, *, timeout_ms: int = TIMEOUT_MS) -> Iterator[CheckedRecord]:
+    """Check a document, verdict by verdict.
 
-
-def _played(evidence: Evidence, firings: tuple[tuple[str, ...], ...]) -> Checked:
-    net, player = evidence.net, Player(evidence.net)
-    marking = net.initial_marking
-    for number, names in enumerate(firings, start=1):
-        fired = tuple(net.transition_index[name] for name in names)
-        single = evidence.discipline is Discipline.INTERLEAVING
-        allowed = len(fired) == 1 and net.transitions[fired[0]].openable if single else player.is_step(marking, fired)
-        if not allowed or len(set(fired)) != len(fired):
-            _refuse(f"firing {number}, {' + '.join(names) or 'of nothing'}, is none of this discipline")
+    Raises `InputError` F6002 at the first verdict with a certificate that does not show its claim.
+    """
+    checker = _Checker(timeout_ms)
+    for record in document.records:
         try:
-            marking = player.fire(marking, fired)
-        except NotFirableError as error:
-            _refuse(f"firing {number}: {error}")
-    if not evaluate(BOOL, net, evidence.claim.goal, holds_in(marking)):
-        _refuse(f"after the firings ({format_formula(evidence.claim.goal)}) does not hold")
-    return Checked(shown=True, method=f"{len(firings):,} firings played by the reference player")
+            yield _checked(checker, document, record)
+        except InputError as error:
+            named = [replace(one, message=f"{record.name}: {one.message}") for one in error.diagnostics]
+            raise InputError(named if record.name else error.diagnostics) from None
 
 
-def _discharged(evidence: Evidence, timeout_ms: int) -> Checked:
-    for wrong in wrong_sums(evidence.net, evidence.certificate):
-        _refuse(str(wrong))
-    todo = obligations(evidence)
-    method = f"{len(todo)} obligations discharged by z3, and the sums multiplied out"
-    for obligation in todo:
-        decision = decide(obligation.asserted, timeout_ms=timeout_ms)
-        if decision.answer is Answer.UNKNOWN:
-            return Checked(None, method, f"z3 gave up on '{obligation.name}': {decision.reason}")
-        if decision.answer is Answer.SAT:
-            full = [place.name for place in evidence.net.places if _true(decision.assignment, place.name)]
-            _refuse(f"'{obligation.statement}' is refuted where hold a token: {', '.join(full) or 'none'}")
-    return Checked(shown=True, method=method)
+def _checked(checker: _Checker, document: Document, record: Record) -> CheckedRecord:
+    net, discipline = document.net, document.discipline
+    checked = [checker.check(Evidence(net, discipline, claim, of)) for claim, of in record.shown]
+    methods = tuple(dict.fromkeys(one.method for one in checked))
+    if late := [one.bound for one in checked if one.shown is None]:
+        return CheckedRecord(record, shown=False, methods=methods, only_claimed=late[0])
+    if not record.name:
+        return CheckedRecord(record, shown=bool(checked), methods=methods)
+    claims = [claim for claim, _ in record.shown]
+    query = parse_query(record.query, record.name.partition(".")[2]) if record.query else None
+    if suffices(net, discipline, record.name, record.proved, claims, query):
+        return CheckedRecord(
+            record, shown=True, methods=methods or (_BY_DEFINITION.get(record.name, "read off the net"),)
+        )
+    reason = record.lacking or "what is shown does not say so"
+    return CheckedRecord(record, shown=False, methods=methods, only_claimed=f"only claimed: {reason}")
+
+
+@dataclass
+class _Checker:
+    """What is found of a set once serves all claims that rest on it."""
+
+    timeout_ms: int
+    _spaces: list[tuple[Net, Markings | Diagram, Listed | Diagrams]] = field(default_factory=list)
+
+    def check(self, evidence: Evidence) -> Checked:
+        """Check one claim."""
+        claim, certificate = evidence.claim, evidence.certificate
+        if claim.kind not in _SHOWS[type(certificate)]:
+            refuse(f"evidence of this kind cannot show '{claim}'")
+        try:
+            return self._check(evidence, certificate)
+        except TimeIsOverError:
+            return Checked(None, "not all was gone through", "the time was over")
+
+    def _check(self, evidence: Evidence, certificate: Certificate) -> Checked:
+        net, discipline, claim = evidence.net, evidence.discipline, evidence.claim
+        match certificate:
+            case FiringSequence():
+                return _run(evidence, certificate)
+            case InductiveInvariant():
+                return self._discharged(evidence)
+            case Labelling(space, labels):
+                return self._labelled(evidence, space, labels)
+            case Continuation(firings):
+                rest = self.check(continued(evidence))
+                return replace(rest, method=f"{len(firings):,} firings played, and from there: {rest.method}")
+            case Progress(space):
+                listed = self._listed(evidence, space)
+                check_progress(listed, claim, certificate)
+                return Checked(shown=True, method=f"{listed.method}, and their ranks looked through")
+            case Theorem(name, _, traps):
+                check_premises(net, discipline, claim, certificate)
+                premise = self.check(contact_free(evidence))
+                siphons = [one for one in obligations(evidence) if one.name == "siphons"] if traps else []
+                if traps == () and name.value != "marked-graph":
+                    refuse("the theorem wants a marked trap in every siphon")
+                late = self._unsolved(evidence, siphons)
+                words = f"premises of the theorem on nets of the class '{name}' checked; {premise.method}"
+                if premise.shown is None or late:
+                    return Checked(None, words, premise.bound or late)
+                return Checked(shown=True, method=words)
+            case Unfolded(space):
+                listed = self._listed(evidence, space)
+                unfolding = Unfolding(listed, claim.goal, self._deadline)
+                unfolding.check()
+                return Checked(shown=True, method=f"{listed.method}, {unfolding.nodes:,} nodes of a tableau on them")
+
+    @property
+    def _deadline(self) -> Deadline:
+        return Deadline.after(self.timeout_ms / 1000)
+
+    def _space(self, evidence: Evidence, of: Markings | Diagram) -> Listed | Diagrams:
+        for net, known, space in self._spaces:
+            if net is evidence.net and known is of:
+                return space
+        if isinstance(of, Diagram):
+            if evidence.discipline.value != "interleaving":
+                refuse("a decision diagram is checked under interleaving only")
+            made: Listed | Diagrams = Diagrams(evidence.net, of, self._deadline)
+        else:
+            made = Listed(evidence.net, evidence.discipline, of.markings, self._deadline)
+        self._spaces.append((evidence.net, of, made))
+        return made
+
+    def _listed(self, evidence: Evidence, of: Markings) -> Listed:
+        space = self._space(evidence, of)
+        if not isinstance(space, Listed):
+            raise TypeError("listed markings make no diagram")
+        return space
+
+    def _labelled(self, evidence: Evidence, of: Markings | Diagram, labels: tuple[Label, ...]) -> Checked:
+        space, claim = self._space(evidence, of), evidence.claim
+        if isinstance(space, Diagrams):
+            space.deadline = self._deadline
+        if claim.kind is ClaimKind.NEVER and not labels:
+            if isinstance(space, Diagrams) and isinstance(of, Diagram):
+                return self._excluded(evidence, of, space)
+            if isinstance(space, Listed) and any(space.where(claim.state_goal)):
+                refuse(f"the goal ({format_formula(claim.state_goal)}) holds in a marking of the set")
+            return Checked(shown=True, method=space.method)
+        _require_initially(space, claim, labels)
+        return Checked(shown=True, method=f"{space.method}{', and the labels looked through' if labels else ''}")
+
+    def _excluded(self, evidence: Evidence, of: Diagram, space: Diagrams) -> Checked:
+        """That the goal holds in no marking of a diagram is a question to the solver, as of an invariant."""
+        terms, net = Terms(), evidence.net
+        holds_at = [terms.variable(place.name) for place in net.places]
+        among = diagram_term(terms, net, of, holds_at.__getitem__)
+        goal = evaluate(terms, net, evidence.claim.state_goal, holds_at.__getitem__)
+        todo = Obligation("goal", "the goal holds in no marking of the set", (among, goal))
+        late = self._unsolved(evidence, [todo])
+        return Checked(None if late else True, f"{space.method}, the goal excluded by z3", late)
+
+    def _discharged(self, evidence: Evidence) -> Checked:
+        for wrong in wrong_sums(evidence.net, evidence.certificate):
+            refuse(str(wrong))
+        todo = obligations(evidence)
+        late = self._unsolved(evidence, todo)
+        method = f"{len(todo)} obligations discharged by z3, and the sums multiplied out"
+        return Checked(None if late else True, method, late)
+
+    def _unsolved(self, evidence: Evidence, todo: tuple[Obligation, ...] | list[Obligation]) -> str:
+        """Why an obligation is open; refused where one does not hold."""
+        for obligation in todo:
+            decision = decide(obligation.asserted, timeout_ms=self.timeout_ms)
+            if decision.answer is Answer.UNKNOWN:
+                return f"z3 gave up on '{obligation.name}': {decision.reason}"
+            if decision.answer is Answer.SAT:
+                full = [place.name for place in evidence.net.places if _true(decision.assignment, place.name)]
+                refuse(f"'{obligation.statement}' is refuted where hold a token: {', '.join(full) or 'none'}")
+        return ""
+
+
+def _require_initially(space: Listed | Diagrams, claim: Claim, labels: tuple[Label, ...]) -> None:
+    """Refuse labels that do not show the claim of M0."""
+    formula = as_ctl(claim)
+    if formula is None:
+        raise TypeError(f"'{claim}' is no formula of CTL")
+    of: LabelledSpace[Any] = space
+    if not of.holds_initially(labelled(of, formula, labels)):
+        refuse(f"the labels do not say that ({format_temporal(formula)}) holds in the initial marking")
 
 
 def _true(assignment: object, name: str) -> bool:
     return isinstance(assignment, dict) and bool(assignment.get(name, assignment.get(f"{name}@0")))
 
 
-def _fired_through(evidence: Evidence, found: MarkingSet) -> Checked:
-    net, player = evidence.net, Player(evidence.net)
-    places = {marking: i for i, marking in enumerate(found.markings)}
-    if net.initial_marking not in places:
-        _refuse("the initial marking is not in the set")
-    ranked = evidence.claim.kind is ClaimKind.ALWAYS_POSSIBLE
-    if ranked != bool(found.distances):
-        _refuse(f"'{evidence.claim}' wants {'a distance for each marking' if ranked else 'no distances'}")
-    goal = _where(evidence, found.markings)
-    enabled = _firable(evidence, found.markings) if evidence.discipline is Discipline.INTERLEAVING else None
-    edges = 0
-    for i, marking in enumerate(found.markings):
-        if enabled is None:
-            successors: Iterable[Marking] = (after for _, after in player.successors(marking, step=True))
-        else:
-            successors = (player.fire(marking, (t,)) for t, where in enabled if where >> i & 1)
-        nearer = False
-        for after in successors:
-            edges += 1
-            if after not in places:
-                _refuse(f"a firing leads out of the set, to {_shown(evidence, after)}")
-            nearer |= ranked and found.distances[places[after]] < found.distances[i]
-        holds = bool(goal >> i & 1)
-        if not ranked and holds:
-            _refuse(f"the goal holds in {_shown(evidence, marking)}")
-        if ranked and not (holds if not found.distances[i] else nearer):
-            _refuse(f"nothing leads nearer to the goal from {_shown(evidence, marking)}")
-    method = f"{len(found.markings):,} markings and {edges:,} firings gone through by the reference player"
+def _run(evidence: Evidence, of: FiringSequence) -> Checked:
+    net, discipline, claim = evidence.net, evidence.discipline, evidence.claim
+    method = f"{len(of.firings) + len(of.cycle):,} firings played by the reference player"
+    match claim.kind:
+        case ClaimKind.NOT_LTL:
+            check_refuting_run(net, discipline, claim, of)
+            return Checked(shown=True, method=f"{method}, and the formula evaluated along them")
+        case ClaimKind.NOT_LEADS_TO:
+            check_unanswered_run(net, discipline, claim, of)
+            return Checked(shown=True, method=f"{method}, a run that is fair and has no answer")
+    if of.cycle:
+        refuse("a run into a marking has no cycle")
+    markings = played(net, discipline, of.firings)
+    if claim.kind is ClaimKind.REACHABLE:
+        if not holds(net, claim.state_goal, markings[-1]):
+            refuse(f"after the firings ({format_formula(claim.state_goal)}) does not hold")
+        return Checked(shown=True, method=method)
+    begin = next((i for i, marking in enumerate(markings) if holds(net, claim.state_goal, marking)), None)
+    if begin is None:
+        refuse(f"({format_formula(claim.state_goal)}) holds nowhere on the run")
+    if left := set(claim.fires) - {name for fired in of.firings[begin:] for name in fired}:
+        refuse(f"the run does not fire {min(left)}")
     return Checked(shown=True, method=method)
-
-
-def _columns(evidence: Evidence, markings: tuple[Marking, ...]) -> tuple[Bitwise[int], list[int]]:
-    """For each place the markings of the list in which it holds a token, as one number, and the algebra of these."""
-    columns = [0] * len(evidence.net.places)
-    for p in range(len(columns)):
-        digits = "".join("1" if marking >> p & 1 else "0" for marking in reversed(markings))
-        columns[p] = int(digits or "0", 2)
-    return Bitwise(true=(1 << len(markings)) - 1, false=0), columns
-
-
-def _where(evidence: Evidence, markings: tuple[Marking, ...]) -> int:
-    algebra, columns = _columns(evidence, markings)
-    return evaluate(algebra, evidence.net, evidence.claim.goal, columns.__getitem__)
-
-
-def _firable(evidence: Evidence, markings: tuple[Marking, ...]) -> list[tuple[int, int]]:
-    """Each transition that may fire in some of the markings, and in which."""
-    algebra, columns = _columns(evidence, markings)
-    net = evidence.net
-    openable = (t for t, transition in enumerate(net.transitions) if transition.openable)
-    found = [(t, firable(algebra, net, t, columns.__getitem__)) for t in openable]
-    return [(t, where) for t, where in found if where]
-
-
-def _shown(evidence: Evidence, marking: Marking) -> str:
-    return "{" + ", ".join(evidence.net.names(marking)) + "}"

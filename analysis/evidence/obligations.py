@@ -10,36 +10,59 @@ transition relation of the discipline:
               only the last is in the goal
     base-j    M0, j firings, and the goal, for each j below the depth
 
-A set of markings is an invariant too, "it is one of these", and has the same obligations where it is small enough to be
-written as a formula. Nothing here is taken from the technique that found the certificate; the relation is an evaluation
+A set of markings is an invariant too, "it is one of these" or "the diagram leads to its end", and has the same
+obligations where it is small enough to be written as a formula; a diagram's is linear in its nodes. Of a continuation
+they are those of the net that starts where its firings end. That every siphon contains one of some traps is one
+question:
+
+    siphons   a set of places that is not empty, a siphon, and lacks a place of each trap
+
+Nothing here is taken from the technique that found the certificate; the relation is an evaluation
 of the firing rule. An obligation is SMT-LIB 2 text for any solver, so that nobody needs to trust ours. The sums are
 integers and only multiplied out: their file is in linear arithmetic without a variable.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Final
 
 from firable.analysis.evidence.certificate import (
     Certificate,
     Clause,
+    Continuation,
+    Diagram,
     Equation,
     InductiveInvariant,
     Inequality,
-    MarkingSet,
+    Labelling,
+    Markings,
+    Theorem,
 )
-from firable.analysis.evidence.document import ClaimKind, Evidence
+from firable.analysis.evidence.claims import Claim, ClaimKind, without_start
+from firable.analysis.evidence.meaning import contact
+from firable.analysis.evidence.refusal import refuse
 from firable.analysis.induction.encoding import Relation, interleaving_relation, step_relation
 from firable.analysis.induction.smt import Operator, Term, Terms, smtlib, subterms
-from firable.nets.net import Net
+from firable.nets.net import Marking, Net
 from firable.semantics.counting import at_most
 from firable.semantics.firing import Valuation
 from firable.semantics.formulas import evaluate
+from firable.semantics.player import NotFirableError, Player
 from firable.semantics.trace import Discipline
 
 LITERALS_MAX: Final = 20_000  # of a set of markings that is written as a formula
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """A claim about a net under a discipline, with what shows it."""
+
+    net: Net
+    discipline: Discipline
+    claim: Claim
+    certificate: Certificate
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +87,60 @@ def _comments(evidence: Evidence, statement: str) -> list[str]:
 
 
 def obligations(evidence: Evidence) -> tuple[Obligation, ...]:
-    """All obligations in propositional logic; none for a firing sequence, which is played, and for a large set."""
+    """All obligations in propositional logic; none for what is played, and for a large set."""
     match evidence.certificate:
         case InductiveInvariant() as invariant:
             return tuple(_of_invariant(evidence, invariant))
-        case MarkingSet(markings, _) as found if len(markings) * len(evidence.net.places) <= LITERALS_MAX:
-            return tuple(_of_markings(evidence, found))
+        case Labelling(space) if _size(evidence.net, space) <= LITERALS_MAX:
+            return tuple(_of_set(evidence, space))
+        case Continuation():
+            return obligations(continued(evidence))
+        case Theorem(_, _, traps):
+            siphons = (_of_siphons(evidence.net, traps),) if traps else ()
+            return (*obligations(contact_free(evidence)), *siphons)
         case _:
             return ()
+
+
+def continued(evidence: Evidence) -> Evidence:
+    """What a continuation shows of the net that starts where its firings end; refused where they cannot be fired."""
+    certificate, net = evidence.certificate, evidence.net
+    if not isinstance(certificate, Continuation):
+        raise TypeError("the evidence is no continuation")
+    marking = played(net, evidence.discipline, certificate.firings)[-1]
+    places = tuple(replace(place, marked=bool(marking >> p & 1)) for p, place in enumerate(net.places))
+    claim = Claim(ClaimKind.NEVER, without_start(net, evidence.claim.state_goal))
+    return Evidence(replace(net, places=places, properties=()), evidence.discipline, claim, certificate.then)
+
+
+def played(net: Net, discipline: Discipline, firings: Iterable[Iterable[str]]) -> list[Marking]:
+    """The markings of a firing sequence, M0 first; refused where the reference player cannot fire it."""
+    player, markings = Player(net), [net.initial_marking]
+    for number, names in enumerate(firings, start=1):
+        fired = tuple(net.transition_index[name] for name in names)
+        if discipline is Discipline.INTERLEAVING:
+            allowed = len(fired) == 1 and net.transitions[fired[0]].openable
+        else:
+            allowed = player.is_step(markings[-1], fired)
+        if not allowed or len(set(fired)) != len(fired):
+            refuse(f"firing {number}, {' + '.join(names) or 'of nothing'}, is none of this discipline")
+        try:
+            markings.append(player.fire(markings[-1], fired))
+        except NotFirableError as error:
+            refuse(f"firing {number}: {error}")
+    return markings
+
+
+def contact_free(evidence: Evidence) -> Evidence:
+    """The premise of a theorem, that the net is contact-free."""
+    if not isinstance(evidence.certificate, Theorem):
+        raise TypeError("the evidence is no theorem")
+    claim = Claim(ClaimKind.NEVER, contact(evidence.net))
+    return Evidence(evidence.net, Discipline.INTERLEAVING, claim, evidence.certificate.contact)
+
+
+def _size(net: Net, space: Markings | Diagram) -> int:
+    return len(space.markings) * len(net.places) if isinstance(space, Markings) else 3 * len(space.rows)
 
 
 def _relation(evidence: Evidence) -> Relation:
@@ -100,28 +169,64 @@ def _of_invariant(evidence: Evidence, invariant: InductiveInvariant) -> Iterator
     runs = _Runs(relation)
     run: list[Term] = []
     for k in range(invariant.depth):
-        goal = runs.at(k, evaluate(terms, net, evidence.claim.goal, before))
+        goal = runs.at(k, evaluate(terms, net, evidence.claim.state_goal, before))
         base = (runs.at(0, relation.initial()), *(runs.step(j) for j in range(k)), goal)
         yield Obligation(f"base-{k}", f"the goal is not reached by {k} firings", base)
         run += [terms.negation(goal), runs.step(k), *(runs.at(k, term) for term in known(before))]
     last = [
-        runs.at(invariant.depth, term) for term in (*known(before), evaluate(terms, net, evidence.claim.goal, before))
+        runs.at(invariant.depth, term)
+        for term in (*known(before), evaluate(terms, net, evidence.claim.state_goal, before))
     ]
     after_so_many = f" and {invariant.depth} markings without the goal before it" if invariant.depth else ""
     yield Obligation("goal", f"the invariant{after_so_many} excludes the goal", (*run, *last))
 
 
-def _of_markings(evidence: Evidence, found: MarkingSet) -> Iterator[Obligation]:
+def _of_set(evidence: Evidence, space: Markings | Diagram) -> Iterator[Obligation]:
     net, relation = evidence.net, _relation(evidence)
     terms = relation.terms
-    among = terms.disjunction(relation.is_marking(marking) for marking in found.markings)
-    outside = terms.negation(terms.disjunction(relation.is_marking(m, after=True) for m in found.markings))
+    if isinstance(space, Diagram):
+        among = diagram_term(terms, net, space, relation.before.__getitem__)
+        outside = terms.negation(diagram_term(terms, net, space, relation.after.__getitem__))
+    else:
+        among = terms.disjunction(relation.is_marking(marking) for marking in space.markings)
+        outside = terms.negation(terms.disjunction(relation.is_marking(m, after=True) for m in space.markings))
     initial = (relation.initial(), terms.negation(among))
     yield Obligation("initial", "the initial marking is in the set", initial)
     yield Obligation("step", "no firing leads out of the set", (among, relation.term, outside))
     if evidence.claim.kind is ClaimKind.NEVER:
-        goal = evaluate(terms, net, evidence.claim.goal, relation.before.__getitem__)
+        goal = evaluate(terms, net, evidence.claim.state_goal, relation.before.__getitem__)
         yield Obligation("goal", "the goal holds in no marking of the set", (among, goal))
+
+
+def diagram_term(terms: Terms, net: Net, of: Diagram, holds: Valuation[Term]) -> Term:
+    """The marking is in the first set of a diagram; linear in its rows, and in the levels that they pass over."""
+    places = [net.place_index[name] for name in of.order]
+    values, levels = [terms.false, terms.true], [0, 0]
+
+    def below(row: int, level: int) -> Term:
+        """The row, as it is seen from a level: what is passed over is empty."""
+        passed = (terms.negation(holds(places[k - 1])) for k in range(levels[row] + 1, level))
+        return terms.conjunction([values[row], *passed])
+
+    for level, lo, hi in of.rows:
+        full = holds(places[level - 1])
+        without = terms.conjunction([terms.negation(full), below(lo, level)])
+        values.append(terms.disjunction([without, terms.conjunction([full, below(hi, level)])]))
+        levels.append(level)
+    return below(of.roots[0], len(places) + 1)
+
+
+def _of_siphons(net: Net, traps: Iterable[Iterable[str]]) -> Obligation:
+    """That there is no siphon without one of the traps; a place of the net stands for "it is in the siphon"."""
+    terms = Terms()
+    joined = dict.fromkeys(name for t in net.transitions for name in (*t.inputs, *t.outputs, *t.permissive))
+    asserted = [terms.disjunction(map(terms.variable, joined))]
+    for t in net.transitions:
+        taken = terms.disjunction(terms.variable(name) for name in dict.fromkeys((*t.inputs, *t.permissive)))
+        put = (terms.variable(name) for name in dict.fromkeys((*t.outputs, *t.permissive)))
+        asserted += [terms.implies(place, taken) for place in put]
+    asserted += [terms.disjunction(terms.negation(terms.variable(name)) for name in trap) for trap in traps]
+    return Obligation("siphons", "every siphon contains one of the marked traps", tuple(asserted))
 
 
 def _clause(terms: Terms, net: Net, clause: Clause, holds: Valuation[Term]) -> Term:

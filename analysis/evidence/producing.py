@@ -1,158 +1,350 @@
-"""Evidence from what a technique found: the finding with its claim, or the markings of a small net.
+"""Evidence for what `check` decided: each verdict brought down to claims, and each claim to a certificate.
 
-Nothing here needs to be right for a check to be sound: what is wrong is refused by the checker.
+Which claims a verdict comes down to is the matter of `firable.analysis.evidence.meaning`, which also judges them; here
+stands which of several ways is tried, and in which order. What cannot be had is said in the document, with the reason.
+The run that decided hands over what it held: its state space, and the findings of techniques that leave a certificate.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Final
 
-from firable.analysis.evidence.certificate import Certificate, FiringSequence, MarkingSet
-from firable.analysis.evidence.document import Claim, ClaimKind, Evidence
+from firable.analysis.evidence.certificate import Certificate, FiringSequence
+from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking
+from firable.analysis.evidence.document import Document, Record
+from firable.analysis.evidence.meaning import (
+    commands_clash,
+    competing,
+    completions_clash,
+    contact,
+    eager_cycle,
+    property_claim,
+    read_off,
+    senders,
+    some_firable,
+    suffices,
+    temporal_claim,
+    tidy,
+    tokens_at_least,
+)
+from firable.analysis.evidence.producing_claims import Certifier, LackingError
 from firable.analysis.goal import Finding, Limits
-from firable.analysis.induction.k_induction import decide_by_k_induction
-from firable.analysis.induction.pdr import decide_by_pdr
-from firable.analysis.spaces.reachability import ReachabilityGraph
-from firable.analysis.structure.contact import decide_contact_by_invariants
-from firable.analysis.structure.state_equation import decide_by_state_equation
-from firable.analysis.verdicts.behaviour import CONTACT_FREE, LIVE, REVERSIBLE
-from firable.analysis.verdicts.goals import goals_of
-from firable.nets.formula import Firable, Formula, Start
-from firable.nets.net import Net, Property, PropertyKind
-from firable.nets.verdict import Status, Verdict
+from firable.analysis.report import CheckReport
+from firable.nets.formula import Constant, Deadlock, Firable, Formula, Holds, Not, Start
+from firable.nets.net import Marking, Net, Property, TemporalProperty
+from firable.nets.queries import Query, QueryKind, format_query
+from firable.nets.verdict import Status, Verdict, Witness
 from firable.semantics.trace import Discipline
 
-MARKINGS_MAX: Final = 20_000
-_SECONDS: Final = 10.0  # for k-induction, where nobody sets a limit
+Shown = list[tuple[Claim, Certificate]]
+_FALSE: Final = Constant(value=False)
+STABLE_PLACES_MAX: Final = 500
 
 
-def evidence_of_finding(
-    net: Net, goal: Formula, finding: Finding, discipline: Discipline = Discipline.INTERLEAVING
-) -> Evidence | None:
-    """The evidence that a finding comes with: its witness, or its certificate; None where it has neither.
+def evidence_of_report(report: CheckReport, queries: Sequence[Query] = (), limits: Limits | None = None) -> Document:
+    """The document on all that a report decides.
 
-    >>> from firable.nets.catalogue.families import family_net
-    >>> from firable.nets.formula import Deadlock
-    >>> net = family_net("token_ring-5")
-    >>> found = evidence_of_finding(net, Deadlock(), decide_by_k_induction(net, Deadlock(), Limits()))
-    >>> str(found.claim) if found else None
-    'never (deadlock)'
+    >>> from firable.analysis.check import check
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> document = evidence_of_report(check(catalogue_net("conceptual_one_robot")))
+    >>> [record.lacking for record in document.records if record.lacking]
+    []
     """
-    if finding.reachable and finding.witness is not None:
-        kind, certificate = ClaimKind.REACHABLE, FiringSequence(finding.witness.firings)
-        return Evidence(net, discipline, Claim(kind, goal), certificate)
-    if finding.reachable is False and finding.certificate is not None:
-        return Evidence(net, discipline, Claim(ClaimKind.NEVER, goal), finding.certificate)
-    return None
+    findings = [finding for of in report.findings.values() for finding in of]
+    space = report.space if report.space.complete else None
+    certifier = Certifier(report.net, report.discipline, limits or Limits(), space, findings)
+    one = _Verdicts(certifier, {query.name: query for query in queries}, report.findings)
+    decided = [verdict for verdict in report.verdicts if verdict.status is not Status.UNKNOWN]
+    return Document(report.net, report.discipline, tuple(map(one.record, decided)))
 
 
-def evidence_of_graph(graph: ReachabilityGraph, claim: Claim) -> Evidence | None:
-    """The markings of a complete and small graph as evidence of a claim; None where it is larger, or none of it.
-
-    Of `always_possible` with the least number of firings that lead from each marking to the goal. Whether the claim
-    holds is not asked, but for a goal that is out of reach, of which there is no distance.
-    """
-    if not graph.complete or graph.n_markings > MARKINGS_MAX or claim.kind is ClaimKind.REACHABLE:
+def evidence_of_claim(
+    net: Net, claim: Claim, discipline: Discipline = Discipline.INTERLEAVING, limits: Limits | None = None
+) -> Certificate | None:
+    """A certificate for one claim, looked for within the limits; None where none is found."""
+    try:
+        return Certifier(net, discipline, limits or Limits()).certify(claim)
+    except LackingError:
         return None
-    markings = tuple(graph.marking(i) for i in range(graph.n_markings))
-    certificate: Certificate = MarkingSet(markings)
-    if claim.kind is ClaimKind.ALWAYS_POSSIBLE:
-        distances = _distances(graph, claim.goal)
-        if None in distances:
-            return None
-        certificate = MarkingSet(markings, tuple(d for d in distances if d is not None))
-    return Evidence(graph.net, graph.discipline, claim, certificate)
 
 
-def _distances(graph: ReachabilityGraph, goal: Formula) -> list[int | None]:
-    before: list[list[int]] = [[] for _ in range(graph.n_markings)]
-    for i in range(graph.n_markings):
-        for _, after in graph.successors(i):
-            before[after].append(i)
-    distances: list[int | None] = [None] * graph.n_markings
-    todo = deque(i for i, holds in enumerate(graph.satisfying(goal)) if holds)
-    for i in todo:
-        distances[i] = 0
-    while todo:
-        target = todo.popleft()
-        for i in before[target]:
-            if distances[i] is None:
-                distances[i] = (distances[target] or 0) + 1
-                todo.append(i)
-    return distances
+class _Verdicts:
+    """The records of the verdicts of one report."""
 
+    def __init__(
+        self,
+        certifier: Certifier,
+        queries: Mapping[str, Query],
+        findings: Mapping[str, Sequence[tuple[Formula, Finding]]],
+    ) -> None:
+        self.certifier, self.queries, self.findings = certifier, queries, findings
+        self.net = certifier.net
+        self._live: dict[tuple[str, ...], Shown | str] = {}
 
-def evidence_of_verdict(net: Net, verdict: Verdict, graph: ReachabilityGraph, limits: Limits) -> dict[str, Evidence]:
-    """Evidence of each claim that a decided verdict comes down to, by name; what cannot be had is left out.
+    def record(self, verdict: Verdict) -> Record:
+        """What shows a decided verdict, or why nothing does."""
+        net, discipline = self.net, self.certifier.discipline
+        query = self.queries.get(verdict.name.removeprefix("query.")) if verdict.name.startswith("query.") else None
+        proved, lacking, shown = verdict.status is Status.PROVED, "", Shown()
+        if read_off(net, discipline, verdict.name) is None:
+            try:
+                shown = list(self._shown(verdict, query, proved))
+            except LackingError as error:
+                lacking = str(error)
+        claims = [claim for claim, _ in shown]
+        if not lacking and not suffices(net, discipline, verdict.name, proved, claims, query):
+            lacking = "no certificate is known for this verdict"
+        return Record(verdict.name, proved, tuple(shown), lacking, "" if query is None else format_query(query))
 
-    The firing sequence of the verdict itself, the markings where `graph` holds all of them and they are few, or else an
-    inductive invariant, looked for anew within the limits.
-    """
-    wanted = dict(_claims(net, verdict))
-    found = {}
-    for name, claim in wanted.items():
-        evidence = _evidence(net, verdict, claim, graph, limits, single=len(wanted) == 1)
-        if evidence is not None:
-            found[name] = evidence
-    return found
+    def _one(self, claim: Claim, witness: Witness | None = None) -> Iterator[tuple[Claim, Certificate]]:
+        yield claim, self.certifier.certify(claim, witness)
 
+    def _never(self, bad: Formula, verdict: Verdict) -> Iterator[tuple[Claim, Certificate]]:
+        """That something is never so, for a verdict that says this, or that it is."""
+        if verdict.status is Status.PROVED:
+            return iter(()) if bad == _FALSE else self._one(Claim(ClaimKind.NEVER, bad))
+        return self._one(Claim(ClaimKind.REACHABLE, bad), verdict.witness)
 
-def _claims(net: Net, verdict: Verdict) -> Iterator[tuple[str, Claim]]:
-    """What a decided verdict claims of the reachable markings, each with a name."""
-    proved, name = verdict.status is Status.PROVED, verdict.name
-    property_ = next((of for of in net.properties if f"property.{of.name}" == name), None)
-    if verdict.status is Status.UNKNOWN:
-        return
-    if (asked := goals_of(net, name)) is not None:
-        _, goals = asked
-        for goal in goals:
-            # Of several goals a verdict that is not proved says which failed by its subjects.
-            if proved or len(goals) == 1 or (goal.wanted and set(goal.subjects) & set(verdict.subjects)):
-                kind = ClaimKind.REACHABLE if goal.wanted is proved else ClaimKind.NEVER
-                yield ".".join((name, *goal.subjects)), Claim(kind, goal.formula)
-    elif proved and name == LIVE.name:
-        for transition in net.transitions:
-            yield f"{name}.{transition.name}", Claim(ClaimKind.ALWAYS_POSSIBLE, Firable(transition.name))
-    elif proved and name == REVERSIBLE.name:
-        yield name, Claim(ClaimKind.ALWAYS_POSSIBLE, Start())
-    elif proved and isinstance(property_, Property) and property_.kind is PropertyKind.ALWAYS_POSSIBLE:
-        yield name, Claim(ClaimKind.ALWAYS_POSSIBLE, property_.formula)
+    def _shown(self, verdict: Verdict, query: Query | None, proved: bool) -> Iterable[tuple[Claim, Certificate]]:
+        net = self.net
+        if proved:
+            if verdict.name in _ALL_LIVE or (query is not None and query.kind is QueryKind.LIVE):
+                return self._all_live()
+            if verdict.name == "quasi-live" or (query is not None and query.kind is QueryKind.QUASI_LIVE):
+                return self._quasi_live(verdict)
+        elif (query is not None and query.kind in _DEAD) or verdict.name in {"live", "quasi-live"}:
+            dead = verdict.name == "quasi-live" or (query is not None and query.kind is QueryKind.QUASI_LIVE)
+            return self._not_live(verdict, dead=dead)
+        match verdict.name:
+            case "contact-free":
+                return self._never(contact(net), verdict)
+            case "deadlock-free":
+                return self._never(Deadlock(), verdict)
+            case "doomed-markings":
+                return self._no_doom(verdict)
+            case "reversible":
+                kind = ClaimKind.ALWAYS_POSSIBLE if proved else ClaimKind.LOST
+                return self._or_theorem(Claim(kind, Start()), verdict.witness)
+            case "home-markings":
+                return self._home() if proved else self._homeless()
+            case "conflicting-commands":
+                return self._never(commands_clash(net), verdict)
+            case "shared-completions":
+                return self._never(completions_clash(net), verdict)
+            case "effective-conflicts":
+                pairs = competing(net)
+                return () if pairs is None else self._never(pairs, verdict)
+            case "machine-never-stopped":
+                return self._stopped() if proved else self._never_stopped()
+            case "starvation":
+                return self._served(proved)
+        if (of := next((of for of in net.properties if verdict.name == f"property.{of.name}"), None)) is not None:
+            return self._property(of, verdict, proved)
+        return () if query is None else self._query(query, verdict, proved)
 
+    def _no_doom(self, verdict: Verdict) -> Iterable[tuple[Claim, Certificate]]:
+        """A deadlock is doomed, and every doomed marking leads to one."""
+        if verdict.status is Status.PROVED:
+            return self._one(Claim(ClaimKind.NEVER, Deadlock()))
+        return self._one(Claim(ClaimKind.REACHABLE, Deadlock()))
 
-def _evidence(
-    net: Net, verdict: Verdict, claim: Claim, graph: ReachabilityGraph, limits: Limits, *, single: bool
-) -> Evidence | None:
-    discipline = graph.discipline
-    if claim.kind is ClaimKind.REACHABLE:
-        witness = verdict.witness if single else None
-        if witness is None:
-            witness = graph.witness(graph.satisfying(claim.goal))
-        return None if witness is None else Evidence(net, discipline, claim, FiringSequence(witness.firings))
-    if (found := evidence_of_graph(graph, claim)) is not None:
+    def _home_claim(self, home: Marking) -> Claim:
+        return Claim(ClaimKind.ALWAYS_POSSIBLE, tidy(is_marking(self.net, home)))
+
+    def _home(self) -> Iterator[tuple[Claim, Certificate]]:
+        home = self.certifier.homes()
+        if home is not None:
+            return self._one(self._home_claim(home))
+        return iter([(Claim(ClaimKind.HOME), self.certifier.theorem())])
+
+    def _or_theorem(self, claim: Claim, witness: Witness | None) -> Iterator[tuple[Claim, Certificate]]:
+        try:
+            yield claim, self.certifier.certify(claim, witness)
+        except LackingError as error:
+            if claim.kind is not ClaimKind.ALWAYS_POSSIBLE:
+                raise
+            try:
+                yield claim, self.certifier.theorem()
+            except LackingError:
+                raise error from None
+
+    def _all_live(self) -> Shown:
+        return self._lively(tuple(t.name for t in self.net.transitions))
+
+    def _lively(self, names: tuple[str, ...]) -> Shown:
+        """That transitions are live: by a home marking, or by a theorem, or each for itself."""
+        if names not in self._live:
+            ways: list[Callable[[], Shown]] = [partial(self._by_home, names), self._by_theorem]
+            ways.append(lambda: [pair for name in names for pair in self._one(_possible(name))])
+            said = ""
+            for way in ways:
+                try:
+                    self._live[names] = way()
+                    break
+                except LackingError as error:
+                    said = said or str(error)
+            else:
+                self._live[names] = said
+        found = self._live[names]
+        if isinstance(found, str):
+            raise LackingError(found)
         return found
-    if claim.kind is ClaimKind.NEVER:
-        finding = _contact_excluded(net, verdict, limits) or _proof(net, claim.goal, limits, discipline)
-        return evidence_of_finding(net, claim.goal, finding, discipline)
-    return None
 
+    def _by_theorem(self) -> Shown:
+        return [(Claim(ClaimKind.LIVE), self.certifier.theorem())]
 
-def _contact_excluded(net: Net, verdict: Verdict, limits: Limits) -> Finding | None:
-    """The invariants that exclude contact, of a net of any size; None where they do not, or another thing is asked."""
-    if verdict.name != CONTACT_FREE.name:
+    def _by_home(self, names: tuple[str, ...]) -> Shown:
+        home = self.certifier.homes()
+        if home is None:
+            raise LackingError("no home marking is known")
+        claim = self._home_claim(home)
+        shown: Shown = [(claim, self.certifier.certify(claim))]
+        return shown + _fired(claim.state_goal, self.certifier.runs_firing(names, home))
+
+    def _quasi_live(self, verdict: Verdict) -> Shown:
+        names = [t.name for t in self.net.transitions]
+        shown: Shown = []
+        for goal, found in self.findings.get(verdict.name, ()):
+            if isinstance(goal, Firable) and found.witness is not None:
+                run = FiringSequence(found.witness.firings)
+                shown.append((Claim(ClaimKind.REACHABLE, goal), run))
+        known = {claim.state_goal.transition for claim, _ in shown if isinstance(claim.state_goal, Firable)}
+        left = [name for name in names if name not in known]
+        return shown + (_fired(Constant(value=True), self.certifier.runs_firing(left)) if left else [])
+
+    def _not_live(self, verdict: Verdict, *, dead: bool) -> Iterator[tuple[Claim, Certificate]]:
+        """Of the transitions that a verdict says to be dead, or not live, the first of which it can be shown."""
+        reason = "the verdict names no transition"
+        for name in verdict.subjects:
+            claim = Claim(ClaimKind.NEVER if dead else ClaimKind.LOST, Firable(name))
+            try:
+                yield claim, self.certifier.certify(claim, verdict.witness)
+            except LackingError as error:
+                reason = str(error)
+                continue
+            return
+        raise LackingError(reason)
+
+    def _homeless(self) -> Iterator[tuple[Claim, Certificate]]:
+        formula = self.certifier.parted()
+        if formula is None:
+            raise LackingError("no formula was found that parts two ends of the net")
+        for goal in (formula, Not(formula)):
+            yield from self._one(Claim(ClaimKind.LOST, goal))
+
+    def _stopped(self) -> Iterator[tuple[Claim, Certificate]]:
+        """Each command is never sent, or sent in a run that sends another one to the same machine."""
+        dead = set()
+        for names in senders(self.net).values():
+            for name, sending in names.items():
+                others = [t for other, of in names.items() if other != name for t in of]
+                found = self._pair(sending, others)
+                if found is not None:
+                    yield found
+                elif sending not in dead:
+                    dead.add(sending)
+                    yield from self._never_sent(sending)
+
+    def _never_sent(self, sending: tuple[str, ...]) -> Iterator[tuple[Claim, Certificate]]:
+        goal = some_firable(sending)
+        return iter(()) if goal == _FALSE else self._one(Claim(ClaimKind.NEVER, goal))
+
+    def _pair(self, one: Sequence[str], others: Sequence[str]) -> tuple[Claim, Certificate] | None:
+        """A run that fires one of these and one of those."""
+        for first in one:
+            for second in others:
+                try:
+                    runs = self.certifier.runs_firing((first, second))
+                except LackingError:
+                    continue
+                for run in runs:
+                    fired = {name for names in run.firings for name in names}
+                    if {first, second} <= fired:
+                        return Claim(ClaimKind.FIRES, Constant(value=True), fires=(first, second)), run
         return None
-    found = decide_contact_by_invariants(net, limits)
-    return found if found.certificate is not None else None
+
+    def _never_stopped(self) -> Iterator[tuple[Claim, Certificate]]:
+        alone = [next(iter(names.values())) for names in senders(self.net).values() if len(names) == 1]
+        for sending in alone:
+            for name in sending:
+                try:
+                    yield from _fired(Constant(value=True), self.certifier.runs_firing((name,)))
+                except LackingError:
+                    continue
+                return
+        raise LackingError("that no other command follows in any run is not certified")
+
+    def _served(self, proved: bool) -> Iterator[tuple[Claim, Certificate]]:
+        again = eager_cycle(self.net)
+        waiting = [t.name for t in self.net.transitions if again is not None and t.name not in again]
+        if not proved:
+            for name in waiting:
+                try:
+                    yield from self._lively((name,))
+                except LackingError:
+                    continue
+                return
+            raise LackingError("that a waiting transition is live was not certified")
+        for name in waiting:
+            yield from self._one(Claim(ClaimKind.LOST, Firable(name)))
+
+    def _property(
+        self, of: Property | TemporalProperty, verdict: Verdict, proved: bool
+    ) -> Iterator[tuple[Claim, Certificate]]:
+        if isinstance(of, TemporalProperty):
+            return self._one(temporal_claim(of.logic, of.formula, proved=proved), verdict.witness)
+        return self._one(property_claim(of, proved=proved), verdict.witness)
+
+    def _query(self, query: Query, verdict: Verdict, proved: bool) -> Iterator[tuple[Claim, Certificate]]:
+        match query.kind:
+            case QueryKind.CTL | QueryKind.LTL if query.formula is not None:
+                return self._one(temporal_claim(query.kind, query.formula, proved=proved), verdict.witness)
+            case QueryKind.STABLE_MARKING:
+                return self._stable(proved)
+            case QueryKind.ONE_SAFE:
+                return self._never(contact(self.net, openable=True), verdict)
+            case QueryKind.BOUND:
+                return self._bound(query.places, verdict)
+        return iter(())
+
+    def _stable(self, proved: bool) -> Iterator[tuple[Claim, Certificate]]:
+        if len(self.net.places) > STABLE_PLACES_MAX:
+            raise LackingError(f"a firing sequence for each of more than {STABLE_PLACES_MAX} places is not written")
+        for place in self.net.places:
+            both: tuple[Formula, ...] = (Holds(place.name), Not(Holds(place.name)))
+            if not proved:
+                yield from (pair for one in both for pair in self._one(Claim(ClaimKind.REACHABLE, one)))
+                continue
+            for one in both:
+                try:
+                    yield from self._one(Claim(ClaimKind.NEVER, one))
+                except LackingError:
+                    continue
+                return
+
+    def _bound(self, places: tuple[str, ...], verdict: Verdict) -> Iterator[tuple[Claim, Certificate]]:
+        if verdict.witness is None:
+            raise LackingError("no marking with so many tokens was found")
+        held = set(verdict.witness.marking)
+        bound = sum(place in held for place in places)
+        if bound:
+            yield from self._one(Claim(ClaimKind.REACHABLE, tokens_at_least(places, bound)), verdict.witness)
+        if bound < len(places):
+            yield from self._one(Claim(ClaimKind.NEVER, tokens_at_least(places, bound + 1)))
 
 
-def _proof(net: Net, goal: Formula, limits: Limits, discipline: Discipline) -> Finding:
-    """An inductive invariant against a goal, by the methods that give one, from the quick to the thorough."""
-    if discipline is Discipline.STEP:
-        return decide_by_k_induction(net, goal, limits, discipline=discipline)
-    found = decide_by_state_equation(net, goal, limits)
-    if found.reachable is None:
-        left = limits.deadline.left_seconds
-        third = limits.deadline.within(_SECONDS if left is None else left / 3)
-        found = decide_by_k_induction(net, goal, Limits(third, limits.memory_bytes))
-    return decide_by_pdr(net, goal, limits) if found.reachable is None else found
+_ALL_LIVE: Final = frozenset({"live"})
+_DEAD: Final = frozenset({QueryKind.LIVE, QueryKind.QUASI_LIVE})
+
+
+def _possible(name: str) -> Claim:
+    return Claim(ClaimKind.ALWAYS_POSSIBLE, Firable(name))
+
+
+def _fired(goal: Formula, runs: Iterable[FiringSequence]) -> Shown:
+    return [
+        (Claim(ClaimKind.FIRES, goal, fires=tuple(dict.fromkeys(name for fired in run.firings for name in fired))), run)
+        for run in runs
+    ]

@@ -11,8 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import PLACES, dense_nets
+from support.evidence import certified, document, evidence_of_finding
 from support.examples import examples
 from support.second_solver import by_cvc5
+from support.true_claims import true
 from support.whole_nets import formulas
 
 from firable.analysis.deadline import Deadline
@@ -22,62 +24,63 @@ from firable.analysis.evidence.certificate import (
     FiringSequence,
     InductiveInvariant,
     Inequality,
-    MarkingSet,
+    Labelling,
+    Markings,
+    Ranks,
+    Whole,
 )
-from firable.analysis.evidence.checker import check_evidence
-from firable.analysis.evidence.document import Claim, ClaimKind, Evidence, evidence_from_text, seal
-from firable.analysis.evidence.obligations import obligations, sums_text
-from firable.analysis.evidence.producing import evidence_of_finding, evidence_of_graph, evidence_of_verdict
+from firable.analysis.evidence.checker import check_document, check_evidence
+from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.document import document_from_text, seal
+from firable.analysis.evidence.meaning import contact
+from firable.analysis.evidence.obligations import Evidence, obligations, sums_text
+from firable.analysis.evidence.producing_claims import Certifier
+from firable.analysis.evidence.producing_labels import listed
 from firable.analysis.goal import Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
-from firable.analysis.spaces.reachability import Budget, explore
+from firable.analysis.spaces.reachability import explore
 from firable.analysis.spaces.symbolic import explore_symbolically
-from firable.analysis.verdicts.behaviour import Behaviour, contact_free
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Start, parse_formula
 from firable.nets.interchange import net_digest, net_from_json
 from firable.nets.net import Net, Place, Transition
-from firable.semantics.algebra import BOOL
-from firable.semantics.formulas import evaluate
-from firable.semantics.player import Player, holds_in
 from firable.semantics.trace import Discipline
 
+KINDS = [ClaimKind.NEVER, ClaimKind.REACHABLE, ClaimKind.ALWAYS_POSSIBLE, ClaimKind.LOST]
 DISCIPLINES = [Discipline.INTERLEAVING, Discipline.STEP]
 BOTH_EAT = And((Holds("p1.eating"), Holds("p2.eating")))
 
 
 def induced(net: Net, goal: Formula, discipline: Discipline = Discipline.INTERLEAVING) -> Evidence | None:
     limits = Limits(Deadline.after(20))
-    return evidence_of_finding(
-        net, goal, decide_by_k_induction(net, goal, limits, discipline=discipline, depth_max=3), discipline
-    )
+    found = decide_by_k_induction(net, goal, limits, discipline=discipline, depth_max=3)
+    return evidence_of_finding(net, goal, found, discipline)
+
+
+def text_of(evidence: Evidence) -> str:
+    return document(evidence).to_text()
+
+
+def read_back(text: str) -> Evidence:
+    """The evidence of a document of one claim."""
+    found = document_from_text(text)
+    ((claim, certificate),) = found.records[0].shown
+    return Evidence(found.net, found.discipline, claim, certificate)
 
 
 def refuses(evidence: Evidence | str) -> bool:
     try:
-        checked = check_evidence(evidence_from_text(evidence) if isinstance(evidence, str) else evidence)
+        if isinstance(evidence, str):
+            (checked,) = check_document(document_from_text(evidence))
+            return not checked.shown
+        found = check_evidence(evidence)
     except InputError as error:
         return {found.code for found in error.diagnostics} <= {"F6001", "F6002"}
-    if checked.shown is None:
-        raise AssertionError(checked.bound)
+    if found.shown is None:
+        raise AssertionError(found.bound)
     return False
-
-
-def true(evidence: Evidence) -> bool:
-    """Whether the claim holds, by playing everything."""
-    net, step = evidence.net, evidence.discipline is Discipline.STEP
-    graph = Player(net).reachable(step=step)
-    goal = {m for m in graph if evaluate(BOOL, net, evidence.claim.goal, holds_in(m))}
-    match evidence.claim.kind:
-        case ClaimKind.NEVER:
-            return not goal
-        case ClaimKind.REACHABLE:
-            return bool(goal)
-    while more := {m for m, edges in graph.items() if m not in goal and any(after in goal for _, after in edges)}:
-        goal |= more
-    return goal == set(graph)
 
 
 @st.composite
@@ -95,7 +98,7 @@ def test_all_that_induction_finds_is_shown_to_two_solvers(
     found = induced(*question, discipline)
     if found is None:
         return
-    assert evidence_from_text(found.to_text()) == found
+    assert read_back(text_of(found)) == found
     assert check_evidence(found).shown is True
     texts = [obligation.text(found) for obligation in obligations(found)]
     assert {by_cvc5(text) for text in [*texts, *filter(None, [sums_text(found)])]} <= {"unsat"}
@@ -108,13 +111,14 @@ def test_the_markings_of_a_net_show_a_claim_iff_it_is_true(
     discipline: Discipline, question: tuple[Net, Formula], kind: ClaimKind
 ) -> None:
     net, goal = question
-    found = evidence_of_graph(explore(net, discipline), Claim(kind, goal))
-    if found is None:
-        assert kind is ClaimKind.ALWAYS_POSSIBLE
-        return
-    assert evidence_from_text(found.to_text()) == found
-    assert refuses(found) is not true(found)
-    if true(found):
+    claim = Claim(kind, goal)
+    whole = Evidence(net, discipline, claim, Labelling(listed(explore(net, discipline))))
+    found = certified(net, claim, discipline)
+    assert (found is not None) is true(whole)
+    assert refuses(whole) or (true(whole) and kind is ClaimKind.NEVER)
+    if found is not None:
+        assert read_back(text_of(found)) == found
+        assert not refuses(found)
         assert {by_cvc5(obligation.text(found)) for obligation in obligations(found)} <= {"unsat"}
 
 
@@ -133,12 +137,14 @@ def test_no_certificate_shows_a_claim_that_is_false(
         st.integers(0, 2),
         st.lists(st.builds(Inequality, weights, st.integers(-3, 2)), max_size=1).map(tuple),
     )
-    sets = st.builds(MarkingSet, st.lists(st.integers(0, 31), unique=True, max_size=32).map(tuple))
+    markings = st.lists(st.integers(0, 31), unique=True, max_size=32).map(lambda found: Markings(tuple(found)))
+    labels = st.one_of(st.lists(st.integers(-1, 3), max_size=32).map(lambda r: Ranks(tuple(r))), st.builds(Whole))
+    sets = st.builds(Labelling, markings, st.lists(labels, max_size=2).map(tuple))
     sequences = st.lists(st.sampled_from(["t0", "t1"]).map(lambda t: (t,)), max_size=3).map(
         lambda firings: FiringSequence(tuple(f for f in firings if f[0] in net.transition_index))
     )
     certificate = data.draw(st.one_of(invariants, sets, sequences))
-    kind = data.draw(st.sampled_from(ClaimKind))
+    kind = data.draw(st.sampled_from(KINDS))
     evidence = Evidence(net, discipline, Claim(kind, goal), certificate)
     assert refuses(evidence) or true(evidence)
 
@@ -156,12 +162,8 @@ TRAPPED = Net(  # no sum of tokens stays the same, and yet somewhere there is al
 EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
     "invariant": lambda: induced(family_net("philosophers-3"), BOTH_EAT),
     "traps": lambda: induced(TRAPPED, parse_formula("not a and not b and not c")),
-    "markings": lambda: evidence_of_graph(
-        explore(catalogue_net("conceptual_one_robot")), Claim(ClaimKind.NEVER, Deadlock())
-    ),
-    "distances": lambda: evidence_of_graph(
-        explore(catalogue_net("conceptual_one_robot")), Claim(ClaimKind.ALWAYS_POSSIBLE, Start())
-    ),
+    "markings": lambda: certified(catalogue_net("conceptual_one_robot"), Claim(ClaimKind.NEVER, Deadlock())),
+    "distances": lambda: certified(catalogue_net("conceptual_one_robot"), Claim(ClaimKind.ALWAYS_POSSIBLE, Start())),
     "sequence": lambda: induced(family_net("philosophers-3"), Deadlock()),
 }
 
@@ -170,12 +172,12 @@ EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
 def example(request: pytest.FixtureRequest) -> Evidence:
     found = EXAMPLES[request.param]()
     assert found is not None
-    assert not refuses(found.to_text())
+    assert not refuses(text_of(found))
     return found
 
 
 def test_every_damaged_byte_is_seen(example: Evidence) -> None:
-    text = example.to_text()
+    text = text_of(example)
     chance = random.Random(0)
     for at in chance.sample(range(len(text)), 150):
         if not text[at].isspace():
@@ -191,7 +193,7 @@ def _harmless(text: str, damaged: str) -> bool:
 
 
 def test_a_text_that_ends_early_is_refused(example: Evidence) -> None:
-    text = example.to_text().rstrip()
+    text = text_of(example).rstrip()
     assert all(refuses(text[:at]) for at in range(0, len(text), 211))
     assert not refuses(" \n" + text + "\n\n")
 
@@ -215,22 +217,27 @@ def _edits(value: Any) -> Iterator[Any]:
 
 
 def test_an_edited_certificate_that_is_sealed_anew_is_refused_or_a_proof_all_the_same(example: Evidence) -> None:
-    data = json.loads(example.to_text())
-    edits = list(_edits(data["certificate"]))
+    data = json.loads(text_of(example))
+    shown = data["verdicts"][0]["shown"][0]
+    edits = [(shown, "certificate", edited) for edited in _edits(shown["certificate"])]
+    edits += [(data, "sets", edited) for edited in _edits(data["sets"])]
     assert edits
     refused = 0
-    for edited in random.Random(0).sample(edits, min(40, len(edits))):
-        refused += refuses(sealed(data | {"certificate": edited}))  # where not, the claim is true: it has not changed
+    for inside, key, edited in random.Random(0).sample(edits, min(40, len(edits))):
+        kept, inside[key] = inside[key], edited
+        refused += refuses(sealed(data))  # where not, the claim is true: it has not changed
+        inside[key] = kept
     assert refused
 
 
 def test_the_markings_need_each_of_them() -> None:
     found = EXAMPLES["markings"]()
     assert found is not None
-    assert isinstance(found.certificate, MarkingSet)
-    markings = found.certificate.markings
+    assert isinstance(found.certificate, Labelling)
+    assert isinstance(found.certificate.space, Markings)
+    markings = found.certificate.space.markings
     for i in range(len(markings)):
-        assert refuses(replace(found, certificate=MarkingSet(markings[:i] + markings[i + 1 :])))
+        assert refuses(replace(found, certificate=Labelling(Markings(markings[:i] + markings[i + 1 :]))))
 
 
 def test_an_invariant_without_its_trap_is_refused() -> None:
@@ -246,14 +253,14 @@ def test_an_invariant_without_its_trap_is_refused() -> None:
 
 def test_another_goal_sealed_anew_is_proved_for_itself_or_refused(example: Evidence) -> None:
     for goal in ("true", "start", "deadlock", "not start", "false"):
-        data = json.loads(example.to_text())
-        data["claim"]["goal"] = goal
+        data = json.loads(text_of(example))
+        data["verdicts"][0]["shown"][0]["claim"]["goal"] = goal
         if not refuses(sealed(data)):
             assert true(replace(example, claim=Claim(example.claim.kind, parse_formula(goal))))
 
 
 def test_another_net_is_refused_or_the_claim_is_true_of_it(example: Evidence) -> None:
-    data = json.loads(example.to_text())
+    data = json.loads(text_of(example))
     edits = [("marked", i) for i in range(len(data["net"]["places"]))]
     edits += [(side, i) for side in ("inputs", "outputs") for i in range(len(data["net"]["transitions"]))]
     for key, i in edits:
@@ -285,7 +292,7 @@ def test_evidence_of_interleaving_shows_nothing_of_steps() -> None:
     both = And((Not(Holds("a")), Not(Holds("b"))))
     gated = (Transition("t", ("a",), permissive=("b",)), Transition("u", ("b",), permissive=("a",)))
     net = Net("racing", (Place("a", marked=True), Place("b", marked=True)), gated)
-    found = evidence_of_graph(explore(net), Claim(ClaimKind.NEVER, both))
+    found = certified(net, Claim(ClaimKind.NEVER, both))
     assert found is not None
     assert not refuses(found)
     assert refuses(replace(found, discipline=Discipline.STEP))
@@ -318,14 +325,13 @@ def test_without_time_evidence_is_neither_shown_nor_refused() -> None:
 )
 def test_what_is_no_evidence_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="F6001"):
-        evidence_from_text(text)
+        document_from_text(text)
 
 
-def test_liveness_of_each_transition_is_shown_by_distances() -> None:
+def test_liveness_of_each_transition_is_shown_by_ranks() -> None:
     net = catalogue_net("conceptual_one_robot")
-    graph = explore(net)
     for transition in net.transitions:
-        found = evidence_of_graph(graph, Claim(ClaimKind.ALWAYS_POSSIBLE, Firable(transition.name)))
+        found = certified(net, Claim(ClaimKind.ALWAYS_POSSIBLE, Firable(transition.name)))
         assert found is not None
         assert not refuses(found)
 
@@ -356,11 +362,9 @@ def test_a_sum_that_a_firing_changes_is_refused() -> None:
 
 def test_contact_of_a_net_too_large_to_list_is_excluded_by_sums_of_tokens() -> None:
     net = family_net("philosophers_either-40")
-    verdict = contact_free(Behaviour(explore_symbolically(net)))
-    graph = explore(net, budget=Budget(markings=1))
-    assert not graph.complete
-    evidence = evidence_of_verdict(net, verdict, graph, Limits())["contact-free"]
-    assert isinstance(evidence.certificate, InductiveInvariant)
+    claim = Claim(ClaimKind.NEVER, contact(net))
+    certificate = Certifier(net, Discipline.INTERLEAVING, Limits(), explore_symbolically(net)).certify(claim)
+    assert isinstance(certificate, InductiveInvariant)
     # One for each philosopher, who is in one place or none but has one token, and one for each fork.
-    assert len(evidence.certificate.equations) == 80
-    assert check_evidence(evidence).shown
+    assert len(certificate.equations) == 80
+    assert check_evidence(Evidence(net, Discipline.INTERLEAVING, claim, certificate)).shown

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from support.dense_nets import PLACES, dense_nets
+from support.evidence import evidence_of_finding
 from support.examples import examples
 from support.second_solver import by_cvc5
 from support.whole_nets import formulas
@@ -16,7 +17,6 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Clause, InductiveInvariant
 from firable.analysis.evidence.checker import check_evidence
 from firable.analysis.evidence.obligations import obligations
-from firable.analysis.evidence.producing import evidence_of_finding
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.bounded import decide_by_bounded_search, shortened
 from firable.analysis.induction.encoding import parallel_relation

@@ -1,16 +1,21 @@
 """`firable verify`: what it prints of evidence that shows its claim, and how it refuses what does not."""
 
+import gzip
 import json
 from importlib.resources import files
 from pathlib import Path
 
 import jsonschema
 import pytest
+from support.evidence import document
 from support.pigeons import pigeon_evidence
 from support.second_solver import by_cvc5
 
-from firable.analysis.evidence.document import Claim, ClaimKind
-from firable.analysis.evidence.producing import evidence_of_finding, evidence_of_graph
+from firable.analysis.evidence.certificate import Labelling
+from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.document import Document, Record, seal
+from firable.analysis.evidence.obligations import Evidence
+from firable.analysis.evidence.producing_labels import listed
 from firable.analysis.goal import Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.spaces.reachability import explore
@@ -18,29 +23,33 @@ from firable.cli.main import main
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
 from firable.nets.formula import Deadlock
+from firable.semantics.trace import Discipline
 
 
 @pytest.fixture
 def invariant(tmp_path: Path) -> Path:
     """Evidence that a ring has no deadlock."""
     net, path = family_net("token_ring-5"), tmp_path / "deadlock-free.evidence.json"
-    found = evidence_of_finding(net, Deadlock(), decide_by_k_induction(net, Deadlock(), Limits()))
-    assert found is not None
-    path.write_text(found.to_text())
+    found = decide_by_k_induction(net, Deadlock(), Limits())
+    assert found.certificate is not None
+    claim = Claim(ClaimKind.NEVER, Deadlock())
+    path.write_text(
+        document(Evidence(net, Discipline.INTERLEAVING, claim, found.certificate), name="deadlock-free").to_text()
+    )
     return path
 
 
 def test_evidence_that_shows_its_claim_is_told_so(invariant: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", str(invariant)]) == 0
     told = capsys.readouterr().out
-    assert "✓ proved    evidence  never (deadlock)" in told
+    assert "✓ proved    deadlock-free  it holds: never (deadlock)" in told
     assert "discharged by z3" in told
 
 
 def test_the_obligations_go_to_another_solver(invariant: Path, tmp_path: Path) -> None:
     assert main(["verify", str(invariant), "--smt-dir", str(tmp_path / "smt")]) == 0
     texts = sorted((tmp_path / "smt").iterdir())
-    assert {"goal.smt2", "sums.smt2"} <= {file.name for file in texts}
+    assert {"deadlock-free.goal.smt2", "deadlock-free.sums.smt2"} <= {file.name for file in texts}
     assert {by_cvc5(file.read_text()) for file in texts} == {"unsat"}
 
 
@@ -61,11 +70,12 @@ def test_damaged_evidence_is_refused(invariant: Path, capsys: pytest.CaptureFixt
 
 def test_evidence_of_a_false_claim_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     graph, path = explore(catalogue_net("one_robot_mc_late")), tmp_path / "false.evidence.json"
-    found = evidence_of_graph(graph, Claim(ClaimKind.NEVER, Deadlock()))
-    assert found is not None
-    path.write_text(found.to_text())
+    claim = Claim(ClaimKind.NEVER, Deadlock())
+    found = Evidence(graph.net, Discipline.INTERLEAVING, claim, Labelling(listed(graph)))
+    path.write_text(document(found, name="deadlock-free").to_text())
     assert main(["verify", str(path)]) == 2
-    assert "error[F6002]" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "error[F6002]: deadlock-free: the evidence does not show what it claims" in told
 
 
 def test_evidence_on_another_net_is_refused(invariant: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -76,7 +86,7 @@ def test_evidence_on_another_net_is_refused(invariant: Path, capsys: pytest.Capt
 
 def test_evidence_that_takes_too_long_is_unknown(tmp_path: Path) -> None:
     path = tmp_path / "pigeons.evidence.json"
-    path.write_text(pigeon_evidence().to_text())
+    path.write_text(document(pigeon_evidence()).to_text())
     assert main(["verify", str(path), "--timeout", "0.001"]) == 3
 
 
@@ -88,27 +98,61 @@ def test_the_worst_of_several_documents_decides(invariant: Path, tmp_path: Path)
 
 
 @pytest.mark.parametrize("discipline", ["interleaving", "step"])
-def test_all_that_check_decides_of_the_cell_is_verified(
-    discipline: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("cell", ["one_robot", "one_robot_mc_late"])
+def test_all_that_check_decides_of_a_cell_is_verified(
+    cell: str, discipline: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    main(["check", "catalogue:one_robot", "--discipline", discipline, "--evidence", str(tmp_path), "--no-cache"])
-    assert "documents of evidence: firable verify" in capsys.readouterr().out
-    documents = sorted(tmp_path.glob("*.evidence.json"))
-    names = {document.name.removesuffix(".evidence.json").partition(".")[0] for document in documents}
-    assert {"contact-free", "deadlock-free", "quasi-live", "live", "reversible"} <= names
-    assert main(["verify", *map(str, documents)]) == 0
+    net = f"catalogue:{cell}"
+    main(["check", net, "--discipline", discipline, "--evidence", str(tmp_path), "--no-cache", "--format", "json"])
+    (report,) = json.loads(capsys.readouterr().out)["reports"]
+    (path,) = report["files"]
+    assert main(["verify", path, "--net", net, "--format", "json"]) == 0
+    (verified,) = json.loads(capsys.readouterr().out)["reports"]
+    assert [v["name"] for v in verified["verdicts"]] == [v["name"] for v in report["verdicts"]]
+    assert {v["status"] for v in verified["verdicts"]} == {"proved"}
 
 
 def test_the_evidence_of_a_deadlock_is_the_way_into_it(tmp_path: Path) -> None:
     assert main(["check", "catalogue:one_robot_mc_late", "--evidence", str(tmp_path), "--no-cache"]) == 1
-    document = json.loads((tmp_path / "deadlock-free.evidence.json").read_text())
-    assert (document["claim"]["kind"], document["certificate"]["kind"]) == ("reachable", "firing-sequence")
-    assert main(["verify", str(tmp_path / "deadlock-free.evidence.json")]) == 0
+    (path,) = tmp_path.iterdir()
+    record = next(v for v in json.loads(path.read_text())["verdicts"] if v["name"] == "deadlock-free")
+    (shown,) = record["shown"]
+    assert (shown["claim"]["kind"], shown["certificate"]["kind"]) == ("reachable", "firing-sequence")
 
 
 def test_a_net_too_large_to_list_has_an_invariant_as_evidence(tmp_path: Path) -> None:
     arguments = ["catalogue:token_ring-40", "--max-seconds", "5", "--evidence", str(tmp_path), "--no-cache"]
     main(["check", *arguments, "--method", "k-induction"])
-    document = json.loads((tmp_path / "deadlock-free.evidence.json").read_text())
-    assert document["certificate"]["kind"] == "inductive-invariant"
-    assert main(["verify", str(tmp_path / "deadlock-free.evidence.json")]) == 0
+    (path,) = tmp_path.iterdir()
+    record = next(v for v in json.loads(path.read_text())["verdicts"] if v["name"] == "deadlock-free")
+    assert record["shown"][0]["certificate"]["kind"] == "inductive-invariant"
+    assert main(["verify", str(path)]) in {0, 3}
+
+
+def test_a_verdict_that_nothing_shows_is_only_claimed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    net, path = family_net("token_ring-5"), tmp_path / "claimed.evidence.json"
+    records = (Record("live", True, (), "nobody has looked"), Record("self-loops", True, ()))
+    path.write_text(Document(net, Discipline.INTERLEAVING, records).to_text())
+    assert main(["verify", str(path)]) == 3
+    told = capsys.readouterr().out
+    assert "only claimed: nobody has looked" in told
+    assert "1 shown, 1 not shown" in told
+
+
+def test_a_claim_that_says_less_than_the_verdict_shows_nothing_of_it(tmp_path: Path, invariant: Path) -> None:
+    data = json.loads(invariant.read_text())
+    data["verdicts"][0]["name"] = "live"
+    path = tmp_path / "renamed.evidence.json"
+    path.write_text(json.dumps(data | {"seal": seal(data)}))
+    assert main(["verify", str(path)]) == 3
+
+
+def test_a_large_document_is_compressed_and_read_like_any_other(
+    tmp_path: Path, invariant: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    packed = tmp_path / "packed.evidence.json.gz"
+    packed.write_bytes(gzip.compress(invariant.read_bytes()))
+    assert main(["verify", str(packed)]) == 0
+    packed.write_bytes(gzip.compress(invariant.read_bytes())[:-9])
+    assert main(["verify", str(packed)]) == 2
+    assert "error[F6001]" in capsys.readouterr().err

@@ -20,6 +20,7 @@ use crate::net::Transition;
 use crate::symbolic::algebra::Binary;
 use crate::symbolic::cache::ANY;
 use crate::symbolic::count::Natural;
+use crate::symbolic::listing::Line;
 use crate::symbolic::space::{Events, Symbolic};
 use crate::symbolic::zdd::{EMPTY, Node};
 
@@ -289,6 +290,16 @@ impl Diagram {
     fn endless(&self, py: Python<'_>, within: &MarkingSet) -> PyResult<MarkingSet> {
         let set = self.mine(within)?;
         self.shared.set(py, |space, roots, watch| space.endless(roots, set, watch))
+    }
+
+    fn nodes(
+        &self,
+        py: Python<'_>,
+        sets: Vec<PyRef<'_, MarkingSet>>,
+        most: usize,
+    ) -> PyResult<Option<(Vec<Line>, Vec<u32>)>> {
+        let sets = sets.iter().map(|set| self.mine(set)).collect::<PyResult<Vec<Node>>>()?;
+        self.shared.work(py, |space, _, watch| space.listed(&sets, most, watch))
     }
 
     fn path_to(&self, py: Python<'_>, targets: &MarkingSet) -> PyResult<Option<Path>> {

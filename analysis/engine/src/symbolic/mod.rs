@@ -4,8 +4,8 @@
 //! is the method for such nets: zero-suppressed decision diagrams (`zdd`, `algebra`, `cache`), one place a level in an
 //! order that keeps neighbours together (`order`, `race`), transitions as lists of literals (`events`), reachability by
 //! saturation (`saturation`, `firing`), which takes several places at once (`blocks`, `values`, `parts`), one step of all
-//! transitions (`image`), exact numbers (`count`), firing sequences (`walk`), and what is found of a net as one value
-//! (`space`, `ordered`).
+//! transitions (`image`), exact numbers (`count`), firing sequences (`walk`), sets as rows for others to read (`listing`),
+//! and what is found of a net as one value (`space`, `ordered`).
 //!
 //! Everything is written with stacks of its own, because nets have half a million levels, and everything that grows
 //! claims its bytes, so that running out of either is a return value. Nodes with several places each, in a store of their
@@ -19,6 +19,7 @@ pub mod events;
 mod firing;
 mod hubs;
 pub mod image;
+pub mod listing;
 pub mod order;
 mod ordered;
 mod parts;

@@ -1,0 +1,132 @@
+"""A closed set of listed markings: each is fired through by the reference player, and labels are ranks.
+
+Columns of Booleans, one for each marking of the list, are its subsets. Everything is one look at each marking and its
+successors, so a check costs about what it costs to read the list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+
+from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.evidence.certificate import Label, Ranks, Whole
+from firable.analysis.evidence.refusal import TimeIsOverError, refuse, shown
+from firable.nets.formula import Formula
+from firable.nets.net import Marking, Net
+from firable.semantics.algebra import Bitwise
+from firable.semantics.firing import firable
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import FiringSet, Player
+from firable.semantics.trace import Discipline
+
+Column = list[bool]
+_CLOCK_EVERY = 256
+
+
+class Listed:
+    """A set of markings that is closed under firing, and holds M0; refused where it is not."""
+
+    def __init__(
+        self, net: Net, discipline: Discipline, markings: Sequence[Marking], deadline: Deadline = NEVER
+    ) -> None:
+        self.net, self.discipline, self.markings = net, discipline, markings
+        self.player = Player(net)
+        places = {marking: i for i, marking in enumerate(markings)}
+        if net.initial_marking not in places:
+            refuse("the initial marking is not in the set")
+        self.start = places[net.initial_marking]
+        self.edges: list[list[tuple[FiringSet, int]]] = []
+        for i, marking in enumerate(markings):
+            if i % _CLOCK_EVERY == 0 and deadline.over:
+                raise TimeIsOverError
+            row = []
+            for fired, after in self._successors(i, marking):
+                if after not in places:
+                    refuse(f"a firing leads out of the set, to {shown(net, after)}")
+                row.append((fired, places[after]))
+            self.edges.append(row)
+
+    @property
+    def method(self) -> str:
+        """What was gone through, in words."""
+        n_edges = sum(map(len, self.edges))
+        return f"{len(self.markings):,} markings and {n_edges:,} firings gone through by the reference player"
+
+    def _successors(self, i: int, marking: Marking) -> Iterable[tuple[FiringSet, Marking]]:
+        if self.discipline is Discipline.STEP:
+            return self.player.successors(marking, step=True)
+        fires = (t for t, where in self._firable if where[i])
+        return (((t,), self.player.fire(marking, (t,))) for t in fires)
+
+    @cached_property
+    def _columns(self) -> tuple[Bitwise[int], list[int]]:
+        """For each place the markings in which it holds a token, as one number, and the algebra of these."""
+        columns = []
+        for p in range(len(self.net.places)):
+            digits = "".join("1" if marking >> p & 1 else "0" for marking in reversed(self.markings))
+            columns.append(int(digits or "0", 2))
+        return Bitwise(true=(1 << len(self.markings)) - 1, false=0), columns
+
+    @cached_property
+    def _firable(self) -> list[tuple[int, Column]]:
+        """Each transition that may fire in some of the markings, and in which."""
+        algebra, columns = self._columns
+        openable = (t for t, transition in enumerate(self.net.transitions) if transition.openable)
+        found = ((t, firable(algebra, self.net, t, columns.__getitem__)) for t in openable)
+        return [(t, self._column(where)) for t, where in found if where]
+
+    def _column(self, number: int) -> Column:
+        size = len(self.markings)
+        return [digit == "1" for digit in reversed(f"{number:0{size}b}")] if size else []
+
+    def holds_initially(self, column: Column) -> bool:
+        """Whether M0 is in a subset."""
+        return column[self.start]
+
+    def where(self, formula: Formula) -> Column:
+        """The markings in which a state formula holds."""
+        algebra, columns = self._columns
+        return self._column(evaluate(algebra, self.net, formula, columns.__getitem__))
+
+    def all_of(self, sets: Iterable[Column]) -> Column:
+        """The markings in all of the subsets."""
+        return [all(row) for row in zip(*sets, strict=True)]
+
+    def any_of(self, sets: Iterable[Column]) -> Column:
+        """The markings in some of the subsets."""
+        return [any(row) for row in zip(*sets, strict=True)]
+
+    def neighbours(self, targets: Column, *, every: bool) -> Column:
+        """The markings of which every next marking, or some, is a target."""
+        judged = all if every else any
+        return [judged(targets[after] for _, after in row) for row in self.edges]
+
+    def least(self, label: Label, through: Column, end: Column, *, every: bool) -> Column:
+        """The markings with a rank: 0 in the end, and elsewhere more than a next one has, or than all have."""
+        ranks = self._ranks(label)
+        judged = all if every else any
+        for i, rank in enumerate(ranks):
+            if rank < 0 or (rank == 0 and end[i]):
+                continue
+            row = self.edges[i]
+            nearer = bool(row) and judged(0 <= ranks[after] < rank for _, after in row)
+            if rank == 0 or not through[i] or not nearer:
+                refuse(f"nothing leads nearer to the goal from {shown(self.net, self.markings[i])}")
+        return [rank >= 0 for rank in ranks]
+
+    def greatest(self, label: Label, end: Column, through: Column, *, every: bool) -> Column:
+        """The markings with a rank: `through` holds there, and with it the end, or a next one has a rank, or all."""
+        ranks = [0] * len(self.markings) if isinstance(label, Whole) else self._ranks(label)
+        judged = all if every else any
+        for i, rank in enumerate(ranks):
+            row = self.edges[i]
+            stays = end[i] or not row or judged(ranks[after] >= 0 for _, after in row)
+            if rank >= 0 and not (through[i] and stays):
+                refuse(f"what is to hold always ends in {shown(self.net, self.markings[i])}")
+        return [rank >= 0 for rank in ranks]
+
+    def _ranks(self, label: Label) -> Sequence[int]:
+        if not isinstance(label, Ranks) or len(label.ranks) != len(self.markings):
+            refuse("a listed set wants a rank for each marking as a label")
+        return label.ranks

@@ -1,0 +1,359 @@
+"""What a verdict comes down to in claims: the definitions of SEMANTICS once more, from the net alone.
+
+A document of evidence says "this verdict is so, because these claims are", and whether they are enough is not left to
+who wrote it. Here stands for each verdict what suffices, in terms of the net: which formula contact is, which pairs of
+places send different commands to one machine. Verdicts that are read off the net itself want no claim; they are read
+off it again.
+
+Some verdicts have several ways. That a transition is live may be said of it alone, or by a home marking: from
+everywhere one marking can be reached, and from that one a run fires the transition. That no marking is doomed says the
+same as that none is a deadlock: a deadlock is doomed, and where there is none every run goes on.
+
+The techniques have formulas of their own for the same things (`firable.analysis.verdicts`); tests hold the two to each
+other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from itertools import combinations
+from typing import Final
+
+from firable.analysis.evidence.claims import Claim, ClaimKind, marking_of, negation_in_ctl
+from firable.nets.formula import (
+    And,
+    Compare,
+    Constant,
+    Count,
+    Deadlock,
+    Firable,
+    Formula,
+    Holds,
+    Not,
+    Or,
+    Sign,
+    Start,
+    format_formula,
+    parse_formula,
+)
+from firable.nets.net import Net, Property, PropertyKind, TemporalProperty, Transition
+from firable.nets.queries import Query, QueryKind
+from firable.nets.temporal import Logic, Temporal
+from firable.semantics.arbitration import Arbitration
+from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts
+from firable.semantics.player import Player
+from firable.semantics.trace import Discipline
+
+STEPS_MAX: Final = 100_000
+"""How many steps of the arbitrated run are played."""
+
+
+def tidy(formula: Formula) -> Formula:
+    """The formula as it is read back from its text: equal to every other that is written the same."""
+    return parse_formula(format_formula(formula))
+
+
+def contact(net: Net, *, openable: bool = False) -> Formula:
+    """Some transition is in contact, of all or of those whose external gates can be opened."""
+    of = [t for t in net.transitions if set(t.outputs) - set(t.inputs) and (t.openable or not openable)]
+    return tidy(Or(tuple(map(in_contact_formula, of)))) if of else Constant(value=False)
+
+
+def in_contact_formula(t: Transition) -> Formula:
+    """The state formula "this transition is in contact" (`firable.semantics.firing.in_contact`)."""
+    satisfied: Iterator[Formula] = (Holds(place) for place in (*t.inputs, *t.permissive))
+    open_: Iterator[Formula] = (Not(Holds(place)) for place in t.inhibitive)
+    full = Or(tuple(Holds(place) for place in t.outputs if place not in t.inputs))
+    return And((*satisfied, *open_, full))
+
+
+def competing(net: Net) -> Formula | None:
+    """Two transitions in structural conflict, openable together, are both firable; None for too many pairs to list."""
+    by_input, by_output = structural_conflicts(net)
+    if by_input.more or by_output.more:
+        return None
+    names = [t.name for t in net.transitions]
+    pairs = (pair for pair in dict.fromkeys((*by_input.pairs, *by_output.pairs)) if jointly_openable(net, pair))
+    return _some(And((Firable(names[t]), Firable(names[u]))) for t, u in pairs)
+
+
+def commands_clash(net: Net) -> Formula:
+    """Two places that send different commands to one machine hold a token."""
+    sending = [(place.name, place.command) for place in net.places if place.command is not None]
+    groups: dict[str, list[int]] = {}
+    for i, (_, command) in enumerate(sending):
+        groups.setdefault(command.machine, []).append(i)
+    pairs = ((i, k) for group in groups.values() for i, k in combinations(group, 2))
+    return _together((sending[i][0], sending[k][0]) for i, k in pairs if sending[i][1] != sending[k][1])
+
+
+def completions_clash(net: Net) -> Formula:
+    """Two places that wait for one completion signal hold a token."""
+    waiting: dict[str, list[str]] = {}
+    for place in net.places:
+        if place.completion is not None:
+            waiting.setdefault(place.completion, []).append(place.name)
+    return _together(pair for group in waiting.values() for pair in combinations(group, 2))
+
+
+def _together(pairs: Iterable[tuple[str, str]]) -> Formula:
+    return _some(And((Holds(p), Holds(q))) for p, q in pairs)
+
+
+def _some(parts: Iterable[Formula]) -> Formula:
+    found = tuple(parts)
+    return tidy(Or(found)) if found else Constant(value=False)
+
+
+def senders(net: Net) -> dict[str, dict[str, tuple[str, ...]]]:
+    """For each machine and each name of a command of it, the transitions that put a token where it is sent."""
+    found: dict[str, dict[str, set[int]]] = {}
+    for p, place in enumerate(net.places):
+        if place.command is not None:
+            of = found.setdefault(place.command.machine, {}).setdefault(place.command.command, set())
+            of.update(net.producers[p])
+    return {
+        machine: {name: tuple(net.transitions[t].name for t in sorted(of)) for name, of in names.items()}
+        for machine, names in found.items()
+    }
+
+
+def some_firable(names: Iterable[str]) -> Formula:
+    """One of these transitions may fire."""
+    return _some(Firable(name) for name in names)
+
+
+def tokens_at_least(places: tuple[str, ...], bound: int) -> Formula:
+    """The places hold so many tokens together, a place that stands twice counting twice."""
+    return tidy(Compare(Count(places), Sign.AT_LEAST, Count(added=bound)))
+
+
+def eager_cycle(net: Net) -> frozenset[str] | None:
+    """What fires for ever in the arbitrated run with all gates open; None where there is none, or it takes too long.
+
+    Raises `InputError` F2013 where the arbiters do not fit the conflicts.
+    """
+    player, arbitration = Player(net), Arbitration.of(net)
+    marking, turns = net.initial_marking, arbitration.first_turns
+    seen = {(marking, turns): 0}
+    fired: list[tuple[int, ...]] = []
+    while len(fired) < STEPS_MAX:
+        enabled = player.may_fire(marking)
+        if not enabled:
+            return frozenset()
+        if not jointly_openable(net, enabled):
+            return None
+        step, turns = arbitration.decide(enabled, turns)
+        marking = player.fire(marking, step)
+        fired.append(tuple(step))
+        if (start := seen.setdefault((marking, turns), len(fired))) < len(fired):
+            return frozenset(net.transitions[t].name for step in fired[start:] for t in step)
+    return None
+
+
+class Shown:
+    """The claims that are shown, asked for what they say together."""
+
+    def __init__(self, net: Net, claims: Collection[Claim]) -> None:
+        self.net = net
+        self.claims = frozenset(claims)
+        homes = (c.state_goal for c in claims if c.kind is ClaimKind.ALWAYS_POSSIBLE)
+        self.homes = {home for home in homes if marking_of(net, home) is not None}
+        of_runs = [c for c in claims if c.kind is ClaimKind.FIRES]
+        self.fired = {name for claim in of_runs for name in claim.fires}
+        self.fired_at_home = {name for claim in of_runs if claim.goal in self.homes for name in claim.fires}
+
+    def __contains__(self, claim: Claim) -> bool:
+        return claim in self.claims or (claim.kind is ClaimKind.NEVER and claim.goal == Constant(value=False))
+
+    def live(self, name: str) -> bool:
+        """Whether a transition is shown to be live."""
+        possible = Claim(ClaimKind.ALWAYS_POSSIBLE, Firable(name))
+        return name in self.fired_at_home or possible in self or Claim(ClaimKind.LIVE) in self
+
+    def fires(self, name: str) -> bool:
+        """Whether a transition is shown to fire in some run."""
+        return name in self.fired or Claim(ClaimKind.REACHABLE, Firable(name)) in self or self.live(name)
+
+    def dead(self, name: str) -> bool:
+        """Whether a transition is shown never to fire."""
+        return Claim(ClaimKind.NEVER, Firable(name)) in self
+
+    def nonlive(self, name: str) -> bool:
+        """Whether a transition is shown not to be live."""
+        return self.dead(name) or Claim(ClaimKind.LOST, Firable(name)) in self
+
+    def deadlock_free(self) -> bool:
+        """Whether no deadlock is shown to be reachable."""
+        return Claim(ClaimKind.NEVER, Deadlock()) in self or any(self.live(t.name) for t in self.net.transitions)
+
+    def home(self) -> bool:
+        """Whether some marking is shown to be a home marking."""
+        return bool(self.homes) or Claim(ClaimKind.HOME) in self
+
+    def homeless(self) -> bool:
+        """Whether none is: from one marking something always holds, and from another it never holds again."""
+        lost = {claim.goal for claim in self.claims if claim.kind is ClaimKind.LOST}
+        return any(Not(goal) in lost for goal in lost if isinstance(goal, Formula))
+
+
+def suffices(
+    net: Net, discipline: Discipline, name: str, proved: bool, claims: Collection[Claim], query: Query | None
+) -> bool:
+    """Whether these claims say that a verdict is proved, or that it is violated; `query` is that of a `query.NAME`.
+
+    >>> from firable.nets.catalogue.families import family_net
+    >>> net, free = family_net("token_ring-3"), Claim(ClaimKind.NEVER, Deadlock())
+    >>> suffices(net, Discipline.INTERLEAVING, "deadlock-free", True, [free], None)
+    True
+    """
+    shown, every = Shown(net, claims), [t.name for t in net.transitions]
+    match name:
+        case "contact-free":
+            return _never(shown, contact(net), proved)
+        case "deadlock-free" | "doomed-markings":
+            return shown.deadlock_free() if proved else Claim(ClaimKind.REACHABLE, Deadlock()) in shown
+        case "quasi-live":
+            return all(map(shown.fires, every)) if proved else any(map(shown.dead, every))
+        case "live":
+            return all(map(shown.live, every)) if proved else any(map(shown.nonlive, every))
+        case "reversible":
+            return Claim(ClaimKind.ALWAYS_POSSIBLE if proved else ClaimKind.LOST, Start()) in shown
+        case "home-markings":
+            return shown.home() if proved else shown.homeless()
+        case "conflicting-commands":
+            return _never(shown, commands_clash(net), proved)
+        case "shared-completions":
+            return _never(shown, completions_clash(net), proved)
+        case "effective-conflicts":
+            goal = competing(net)
+            return goal is not None and _never(shown, goal, proved)
+        case "machine-never-stopped":
+            return _stopped(shown) if proved else _never_stopped(shown)
+        case "starvation":
+            return _served(shown, proved)
+        case "self-loops" | "structural-conflicts" | "gate-races" | "output-signals-in-M0" | "steps-serialisable":
+            return read_off(net, discipline, name) is proved
+    kind, _, of = name.partition(".")
+    if kind == "property":
+        return any(_property(shown, one, proved) for one in net.properties if one.name == of)
+    return kind == "query" and query is not None and query.name == of and _query(shown, query, proved)
+
+
+def read_off(net: Net, discipline: Discipline, name: str) -> bool | None:
+    """What the net itself says of a verdict, without a look at its markings; None where it does not."""
+    match name:
+        case "self-loops":
+            return not any(t.self_loops for t in net.transitions)
+        case "structural-conflicts":
+            return not any(listed.pairs for listed in structural_conflicts(net))
+        case "gate-races":
+            return next(gate_races(net), None) is None
+        case "output-signals-in-M0":
+            return not any(place.marked and place.command is not None for place in net.places)
+        case "steps-serialisable" if discipline is Discipline.STEP and _races_have_an_order(net):
+            return True
+    return None
+
+
+def _races_have_an_order(net: Net) -> bool:
+    """Whether the gate races among transitions that may fire together are acyclic."""
+    rivals = conflicts(net).rivals
+    races = [(t, u) for t, u in gate_races(net) if u not in rivals[t] and jointly_openable(net, (t, u))]
+    left = {t for t, _ in races}
+    while left and (free := left - {t for t, u in races if u in left}):
+        left -= free
+    return not left
+
+
+def _never(shown: Shown, bad: Formula, proved: bool) -> bool:
+    return Claim(ClaimKind.NEVER if proved else ClaimKind.REACHABLE, bad) in shown
+
+
+def _stopped(shown: Shown) -> bool:
+    """Each command is never sent, or some run sends it and another one to its machine."""
+    runs = [set(claim.fires) for claim in shown.claims if claim.kind is ClaimKind.FIRES]
+    return all(
+        Claim(ClaimKind.NEVER, some_firable(names[one])) in shown
+        or any(run & {*names[one]} and run & {*names[other]} for run in runs for other in names if other != one)
+        for names in senders(shown.net).values()
+        for one in names
+    )
+
+
+def _never_stopped(shown: Shown) -> bool:
+    """A machine knows one command alone, and it is sent. (Where it knows more, no claim says that none follows.)"""
+    alone = [next(iter(names.values())) for names in senders(shown.net).values() if len(names) == 1]
+    return any(shown.fires(t) for sending in alone for t in sending)
+
+
+def _served(shown: Shown, proved: bool) -> bool:
+    again = eager_cycle(shown.net)
+    if again is None:
+        return False
+    waiting = [t.name for t in shown.net.transitions if t.name not in again]
+    return all(map(shown.nonlive, waiting)) if proved else any(map(shown.live, waiting))
+
+
+def _property(shown: Shown, of: Property | TemporalProperty, proved: bool) -> bool:
+    if isinstance(of, TemporalProperty):
+        return temporal_claim(of.logic, of.formula, proved=proved) in shown
+    return property_claim(of, proved=proved) in shown
+
+
+def property_claim(of: Property, *, proved: bool) -> Claim:
+    """The claim that a property of a net file is, or its opposite."""
+    match of.kind:
+        case PropertyKind.NEVER:
+            return Claim(ClaimKind.NEVER if proved else ClaimKind.REACHABLE, of.formula)
+        case PropertyKind.ALWAYS:
+            return Claim(ClaimKind.NEVER if proved else ClaimKind.REACHABLE, Not(of.formula))
+        case PropertyKind.REACHABLE:
+            return Claim(ClaimKind.REACHABLE if proved else ClaimKind.NEVER, of.formula)
+        case PropertyKind.ALWAYS_POSSIBLE:
+            return Claim(ClaimKind.ALWAYS_POSSIBLE if proved else ClaimKind.LOST, of.formula)
+        case PropertyKind.LEADS_TO:
+            kind = ClaimKind.LEADS_TO if proved else ClaimKind.NOT_LEADS_TO
+            return Claim(kind, of.formula, of.then or Constant(value=False), of.fairness)
+
+
+def temporal_claim(logic: Logic | QueryKind, formula: Temporal, *, proved: bool) -> Claim:
+    """The claim that a formula of a logic holds in M0, or that it does not."""
+    if logic.value == Logic.CTL.value:
+        return Claim(ClaimKind.CTL, formula if proved else negation_in_ctl(formula))
+    return Claim(ClaimKind.LTL if proved else ClaimKind.NOT_LTL, formula)
+
+
+def _query(shown: Shown, query: Query, proved: bool) -> bool:
+    net, every = shown.net, [t.name for t in shown.net.transitions]
+    match query.kind:
+        case QueryKind.CTL | QueryKind.LTL if query.formula is not None:
+            return temporal_claim(query.kind, query.formula, proved=proved) in shown
+        case QueryKind.LIVE:
+            return all(map(shown.live, every)) if proved else any(map(shown.nonlive, every))
+        case QueryKind.QUASI_LIVE:
+            return all(map(shown.fires, every)) if proved else any(map(shown.dead, every))
+        case QueryKind.STABLE_MARKING:
+            return (any if proved else all)(_stable(shown, place.name, proved) for place in net.places)
+        case QueryKind.ONE_SAFE:
+            loops = any(t.self_loops for t in net.transitions)
+            return not loops and _never(shown, contact(net, openable=True), proved)
+        case QueryKind.BOUND:
+            return proved and bound_shown(shown, query.places) is not None
+    return False
+
+
+def _stable(shown: Shown, place: str, proved: bool) -> bool:
+    both = (Holds(place), Not(Holds(place)))
+    if proved:
+        return any(Claim(ClaimKind.NEVER, one) in shown for one in both)
+    return all(Claim(ClaimKind.REACHABLE, one) in shown for one in both)
+
+
+def bound_shown(shown: Shown, places: tuple[str, ...]) -> int | None:
+    """The greatest number of tokens on places that the claims show; None where they show none."""
+    for bound in range(len(places) + 1):
+        reached = not bound or Claim(ClaimKind.REACHABLE, tokens_at_least(places, bound)) in shown
+        if reached and (bound == len(places) or Claim(ClaimKind.NEVER, tokens_at_least(places, bound + 1)) in shown):
+            return bound
+    return None

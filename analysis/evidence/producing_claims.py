@@ -1,0 +1,322 @@
+"""A certificate for a claim, from what the run that decided it has left, or else by a technique that leaves one.
+
+First comes what is at hand: the invariant or the firing sequence of a finding, the markings where the run held all of
+them, listed where they are few and as a decision diagram otherwise. Where the run that decided left nothing behind
+(stubborn sets, a reduced net, a graph with too many markings to list), another technique is asked within the time that
+is left: a decision diagram, invariants, the state equation, k-induction, property-directed reachability. Nothing here
+needs to be right for a check to be sound: what is wrong is refused by the checker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, Final
+
+from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import (
+    Certificate,
+    Continuation,
+    Diagram,
+    FiringSequence,
+    InductiveInvariant,
+    Labelling,
+    Markings,
+    Theorem,
+    TheoremName,
+    Unfolded,
+)
+from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl, is_marking, without_start
+from firable.analysis.evidence.meaning import contact, tidy
+from firable.analysis.evidence.producing_labels import TooLargeError, drawn, labelling, listed
+from firable.analysis.evidence.producing_ranks import progress
+from firable.analysis.evidence.producing_runs import NotFoundError, parting, runs_by_search, runs_on_graph
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.induction.k_induction import decide_by_k_induction
+from firable.analysis.induction.pdr import decide_by_pdr
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.spaces.space import StateSpace
+from firable.analysis.spaces.symbolic import SymbolicSpace, explore_symbolically
+from firable.analysis.structure.commoner import commoner
+from firable.analysis.structure.contact import decide_contact_by_invariants
+from firable.analysis.structure.net_class import asymmetric_choice, extended_free_choice
+from firable.analysis.structure.ordinary import ordinary
+from firable.analysis.structure.state_equation import decide_by_state_equation
+from firable.nets.formula import Formula
+from firable.nets.net import Marking, Net
+from firable.nets.verdict import Witness
+from firable.semantics.trace import Discipline
+
+MARKINGS_MAX: Final = 20_000
+"""How many markings are listed, each in a word of the document."""
+_SECONDS: Final = 30.0
+
+Never = InductiveInvariant | Labelling
+
+
+class LackingError(Exception):
+    """No certificate was found, and why."""
+
+
+class Certifier:
+    """Makes certificates for claims on one net."""
+
+    def __init__(
+        self,
+        net: Net,
+        discipline: Discipline,
+        limits: Limits,
+        space: StateSpace[Any] | None = None,
+        findings: Iterable[tuple[Formula, Finding]] = (),
+    ) -> None:
+        self.net, self.discipline, self.limits, self._given = net, discipline, limits, space
+        self._findings: Mapping[Formula, Finding] = {tidy(goal): found for goal, found in findings}
+        self._contact: Never | None = None
+
+    @cached_property
+    def graph(self) -> ReachabilityGraph | None:
+        """All markings as a graph, where they are few enough to be listed."""
+        graph = self._given
+        if not isinstance(graph, ReachabilityGraph) or not graph.complete:
+            if isinstance(graph, SymbolicSpace) and graph.n_markings > MARKINGS_MAX:
+                return None
+            budget = Budget(MARKINGS_MAX, self.limits.memory_bytes)
+            graph = explore(self.net, self.discipline, budget, deadline=self._part(0.2))
+        return graph.until(self.limits.deadline) if graph.complete and graph.n_markings <= MARKINGS_MAX else None
+
+    @cached_property
+    def markings(self) -> Markings | None:
+        """The same markings as they are written."""
+        return None if self.graph is None else listed(self.graph)
+
+    @cached_property
+    def symbolic(self) -> SymbolicSpace | None:
+        """All markings as a decision diagram, where they are too many to be listed."""
+        if self.graph is not None or self.discipline is Discipline.STEP:
+            return None
+        if isinstance(self._given, SymbolicSpace):
+            return self._given.until(self.limits.deadline)
+        try:
+            return explore_symbolically(self.net, Limits(self._part(0.3), self.limits.memory_bytes)).until(
+                self.limits.deadline
+            )
+        except BudgetExceeded:
+            return None
+
+    @cached_property
+    def diagram(self) -> Diagram | None:
+        """The same markings as they are written."""
+        try:
+            return None if self.symbolic is None else drawn(self.symbolic)
+        except TooLargeError:
+            return None
+
+    def _part(self, share: float) -> Deadline:
+        left = self.limits.deadline.left_seconds
+        return self.limits.deadline.within(_SECONDS if left is None else left * share)
+
+    def certify(self, claim: Claim, witness: Witness | None = None) -> Certificate:
+        """A certificate for a claim; `witness` is the run that the verdict came with.
+
+        Raises `LackingError` where none is found.
+        """
+        try:
+            found = self._certificate(claim, witness)
+        except (BudgetExceeded, IncompleteGraph):
+            raise LackingError("the time for evidence was over") from None
+        except TooLargeError as error:
+            raise LackingError(str(error)) from None
+        if found is None:
+            raise LackingError(f"no certificate was found for '{claim}'")
+        return found
+
+    def _certificate(self, claim: Claim, witness: Witness | None) -> Certificate | None:
+        match claim.kind:
+            case ClaimKind.NEVER:
+                return self._never(claim.state_goal)
+            case ClaimKind.REACHABLE:
+                found = witness or self._way(lambda space: space.satisfying(claim.state_goal))
+                return None if found is None else FiringSequence(found.firings)
+            case ClaimKind.LOST:
+                return self._lost(claim.state_goal, witness)
+            case ClaimKind.NOT_LTL | ClaimKind.NOT_LEADS_TO:
+                return None if witness is None else FiringSequence(witness.firings, witness.cycle)
+            case ClaimKind.LTL:
+                return None if self.markings is None else Unfolded(self.markings)
+            case ClaimKind.LEADS_TO:
+                if self.graph is None or self.markings is None:
+                    raise LackingError(f"ranks for a response are written for up to {MARKINGS_MAX:,} markings")
+                return progress(self.graph, self.markings, claim)
+            case ClaimKind.LIVE | ClaimKind.HOME:
+                return self.theorem()
+            case ClaimKind.FIRES:
+                raise LackingError("runs are looked for together")
+        return self._labelled(claim)
+
+    def _labelled(self, claim: Claim) -> Labelling | None:
+        formula = as_ctl(claim)
+        if formula is None:
+            return None
+        if self.graph is not None and self.markings is not None:
+            return labelling(self.graph, self.markings, formula)
+        if self.symbolic is not None and self.diagram is not None:
+            return labelling(self.symbolic, self.diagram, formula)
+        raise LackingError(f"there are more than {MARKINGS_MAX:,} markings, and no decision diagram of them at hand")
+
+    def _never(self, goal: Formula) -> Never | None:
+        finding = self._findings.get(goal)
+        if finding is not None and isinstance(finding.certificate, Never):
+            return finding.certificate
+        if self.graph is not None and self.markings is not None:
+            return None if self.graph.satisfying(goal).any() else Labelling(self.markings)
+        if goal == contact(self.net) and (found := self.contact_free()) is not None:
+            return found
+        if self.symbolic is not None and self.diagram is not None:
+            return None if self.symbolic.satisfying(goal) else Labelling(self.diagram)
+        return self._induced(self.net, goal)
+
+    def contact_free(self) -> Never | None:
+        """The invariants that exclude contact, of a net of any size; None where they do not."""
+        if self._contact is None:
+            found = decide_contact_by_invariants(self.net, Limits(self._part(0.3), self.limits.memory_bytes))
+            self._contact = found.certificate if isinstance(found.certificate, InductiveInvariant) else None
+        return self._contact
+
+    def _induced(self, net: Net, goal: Formula) -> InductiveInvariant | None:
+        """An inductive invariant against a goal, by the methods that give one, from the quick to the thorough."""
+        limits = self.limits
+        if self.discipline is Discipline.STEP:
+            tries: tuple[Callable[[], Finding], ...] = (
+                lambda: decide_by_k_induction(net, goal, limits, discipline=self.discipline),
+            )
+        else:
+            tries = (
+                lambda: decide_by_state_equation(net, goal, replace(limits, deadline=self._part(0.3))),
+                lambda: decide_by_k_induction(net, goal, replace(limits, deadline=self._part(0.3))),
+                lambda: decide_by_pdr(net, goal, replace(limits, deadline=self._part(0.8))),
+            )
+        for attempt in tries:
+            found = attempt()
+            if isinstance(found.certificate, InductiveInvariant):
+                return found.certificate
+            if found.reachable:
+                return None
+        raise LackingError("no technique that leaves an invariant found one within the time for evidence")
+
+    def _way(self, targets: Callable[[StateSpace[Any]], Any]) -> Witness | None:
+        """A way into a set, from whichever space there is."""
+        space: StateSpace[Any] | None = self.graph or self.symbolic or self._given
+        return None if space is None else space.witness(targets(space))
+
+    def _lost(self, goal: Formula, witness: Witness | None) -> Continuation | None:
+        def lost(space: StateSpace[Any]) -> Any:
+            return space.algebra.negation(space.backward(space.satisfying(goal)))
+
+        space: StateSpace[Any] | None = self.graph or self.symbolic
+        if space is not None and (
+            witness is None or not space.contains(lost(space), self.net.marking(witness.marking))
+        ):
+            witness = self._way(lost)
+        if witness is None:
+            return None
+        marking = self.net.marking(witness.marking)
+        then = self._never_from(marking, goal)
+        return None if then is None else Continuation(witness.firings, then)
+
+    def _never_from(self, marking: Marking, goal: Formula) -> Never | None:
+        """The same as `_never`, of the net that starts in another marking."""
+        spelled, net = tidy(without_start(self.net, goal)), self.net
+        places = tuple(replace(place, marked=bool(marking >> p & 1)) for p, place in enumerate(net.places))
+        net = replace(net, places=places, properties=())
+        if self.symbolic is not None:
+            after = self.symbolic.engine.forward(self.symbolic.engine.single(list(_indexes(marking))))
+            if not after & self.symbolic.satisfying(goal):
+                return Labelling(_alone(drawn(self.symbolic, [after])))
+        budget = Budget(MARKINGS_MAX, self.limits.memory_bytes)
+        graph = explore(net, self.discipline, budget, deadline=self._part(0.3))
+        if graph.complete:
+            return None if graph.satisfying(spelled).any() else Labelling(listed(graph))
+        return self._induced(net, spelled)
+
+    def theorem(self) -> Theorem:
+        """A theorem that says that the net is live; raises `LackingError` where none does."""
+        net, of = self.net, ordinary(self.net)
+        bare = any(t.inhibitive for t in net.transitions) or len(of.transitions) < len(net.transitions)
+        if self.discipline is Discipline.STEP or bare or not net.transitions:
+            raise LackingError("no theorem on a class of nets applies")
+        contact_excluded = self._never(contact(net))
+        if contact_excluded is None:
+            raise LackingError("the net was not proved contact-free")
+        joined = [p for p in range(of.n_places) if of.consumers[p] or of.producers[p]]
+        if all(len(of.consumers[p]) == 1 == len(of.producers[p]) for p in joined):
+            return Theorem(TheoremName.MARKED_GRAPH, contact_excluded)
+        free = extended_free_choice(of.inputs, of.consumers)
+        if not free and not asymmetric_choice(of.inputs, of.consumers):
+            raise LackingError("no theorem on a class of nets applies")
+        found = commoner(of, deadline=self._part(0.5))
+        if not found.holds or not found.traps:
+            raise LackingError("no list of marked traps, one in each siphon, was found")
+        names = tuple(tuple(net.places[p].name for p in trap) for trap in found.traps)
+        return Theorem(TheoremName.FREE_CHOICE if free else TheoremName.ASYMMETRIC_CHOICE, contact_excluded, names)
+
+    def runs_firing(self, names: Iterable[str], home: Marking | None = None) -> list[FiringSequence]:
+        """Runs that fire all these transitions, each as many as it can; after they met a home marking, if it is given.
+
+        Raises `LackingError` where a transition fires in none of them.
+        """
+        try:
+            if self.graph is not None:
+                return runs_on_graph(self.graph, tuple(names), home)
+            prefix: tuple[tuple[str, ...], ...] = ()
+            net = self.net
+            if home is not None and home != net.initial_marking:
+                way = self._way(lambda space: _one(space, home))
+                if way is None:
+                    raise LackingError("no way to the home marking was found")
+                prefix = way.firings
+                places = tuple(replace(place, marked=bool(home >> p & 1)) for p, place in enumerate(net.places))
+                net = replace(net, places=places, properties=())
+            if self.discipline is Discipline.STEP:
+                raise LackingError(f"there are more than {MARKINGS_MAX:,} markings")
+            found = runs_by_search(net, tuple(names), Limits(self._part(0.5), self.limits.memory_bytes))
+            return [FiringSequence((*prefix, *run)) for run in found]
+        except NotFoundError as error:
+            raise LackingError(str(error)) from None
+        except (BudgetExceeded, IncompleteGraph):
+            raise LackingError("the time for evidence was over") from None
+
+    def homes(self) -> Marking | None:
+        """A home marking, M0 if it is one; None where there is none or it is not known."""
+        space: StateSpace[Any] | None = self.graph or (self.symbolic if self.diagram is not None else None)
+        if space is None:
+            return None
+        try:
+            if space.reversible():
+                return self.net.initial_marking
+            home = space.home()
+            if not space.count(home):
+                return None
+            found = space.witness(home)
+        except BudgetExceeded:
+            return None
+        return None if found is None else self.net.marking(found.marking)
+
+    def parted(self) -> Formula | None:
+        """Something that holds for ever from one marking and never again from another: why there is no home marking."""
+        space: StateSpace[Any] | None = self.graph or self.symbolic
+        return None if space is None else parting(space)
+
+
+def _one(space: StateSpace[Any], marking: Marking) -> Any:
+    return space.satisfying(is_marking(space.net, marking))
+
+
+def _indexes(marking: Marking) -> Iterable[int]:
+    return (i for i in range(marking.bit_length()) if marking >> i & 1)
+
+
+def _alone(diagram: Diagram) -> Diagram:
+    """The diagram with its second root alone."""
+    return replace(diagram, roots=(diagram.roots[1],))

@@ -1,0 +1,138 @@
+"""Runs that fire transitions one after the other, and what parts two ends of a net: material for evidence.
+
+That each transition fires in some run is shown by few runs rather than by one for each: on a graph of all markings a
+run goes on to the nearest marking where an open transition may fire, and only where none is left ahead does another
+begin. On nets too large for that, searches by stubborn sets give such runs (`firable.analysis.stubborn`).
+
+That there is no home marking is shown by a formula: it holds for ever from one marking and never again from another.
+Of a bottom component a place that never changes in it, and not in another, will do; else its markings, if they are
+few.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from firable.analysis.compiled import engine_limits
+from firable.analysis.evidence.certificate import FiringSequence
+from firable.analysis.evidence.claims import is_marking
+from firable.analysis.evidence.meaning import tidy
+from firable.analysis.goal import Limits
+from firable.analysis.spaces.reachability import ReachabilityGraph
+from firable.analysis.spaces.space import StateSpace
+from firable.analysis.stubborn import find_firings
+from firable.nets.formula import Formula, Holds, Not, Or
+from firable.nets.net import Marking, Net
+
+Run = tuple[tuple[str, ...], ...]
+PARTING_MAX: Final = 200
+"""How many markings a formula lists."""
+
+
+class NotFoundError(Exception):
+    """A transition that is to fire was not seen firing."""
+
+
+def runs_on_graph(graph: ReachabilityGraph, names: Sequence[str], home: Marking | None) -> list[FiringSequence]:
+    """Runs of a complete graph that fire these transitions, each after it met the home marking, if one is given."""
+    open_ = {graph.net.transition_index[name] for name in names}
+    runs = []
+    while open_:
+        run = _Run(graph)
+        if home is not None and (index := graph.index_of(home)) is not None:
+            run.go(_column(graph, [index]))
+        before = len(open_)
+        while open_ and run.fire_one(open_):
+            open_ -= run.fired
+        if len(open_) == before:
+            missing = graph.net.transitions[min(open_)].name
+            raise NotFoundError(f"no run was found that fires {missing}")
+        runs.append(FiringSequence(tuple(run.firings)))
+    return runs
+
+
+class _Run:
+    """A run through a graph."""
+
+    def __init__(self, graph: ReachabilityGraph) -> None:
+        self.graph, self.at = graph, 0
+        self.firings: list[tuple[str, ...]] = []
+        self.fired: set[int] = set()
+
+    def go(self, targets: Any) -> bool:
+        """Go on to the nearest target; whether there is a way."""
+        graph = self.graph
+        everywhere = np.ones(graph.n_markings, dtype=np.bool_)
+        limits = engine_limits(graph.deadline)
+        found = graph.engine.path_between(self.at, targets.tobytes(), everywhere.tobytes(), **limits)
+        if found is None:
+            return False
+        for fired in found[0]:
+            self._note(tuple(fired))
+        self.at = found[1]
+        return True
+
+    def fire_one(self, open_: set[int]) -> bool:
+        """Go on to the nearest marking in which an open transition may fire, and fire it; whether there is one."""
+        graph = self.graph
+        may = np.zeros(graph.n_markings, dtype=np.bool_)
+        for t in open_:
+            may |= graph.may_fire(t)
+        if not self.go(may):
+            return False
+        fired, after = next((f, to) for f, to in graph.successors(self.at) if open_.intersection(f))
+        self._note(fired)
+        self.at = after
+        return True
+
+    def _note(self, fired: tuple[int, ...]) -> None:
+        self.firings.append(self.graph.witnesses.names(fired))
+        self.fired.update(fired)
+
+
+def runs_by_search(net: Net, names: Sequence[str], limits: Limits) -> list[Run]:
+    """Runs from M0 that fire these transitions under interleaving, by stubborn sets."""
+    found = find_firings(net, limits)
+    wanted, runs = {net.transition_index[name] for name in names}, list[Run]()
+    # The last ones first: the ways to them lead past others.
+    for t in sorted(found.fires, key=found.fires.__getitem__, reverse=True):
+        if t in wanted and (witness := found.witness(net.transitions[t].name)) is not None:
+            runs.append(witness.firings)
+            wanted -= {net.transition_index[name] for fired in witness.firings for name in fired}
+    if wanted:
+        raise NotFoundError(f"no run was found that fires {net.transitions[min(wanted)].name}")
+    return runs
+
+
+def parting(space: StateSpace[Any]) -> Formula | None:
+    """A formula that stays true from some marking, and false from another; None where none is found."""
+    algebra, net = space.algebra, space.net
+    one = space.bottom()
+    elsewhere = algebra.negation(space.backward(one))
+    if not space.count(elsewhere):
+        return None
+    for p, place in enumerate(net.places):
+        full = space.marked(p)
+        inside = space.count(algebra.conjunction([one, full]))
+        if inside not in {0, space.count(one)}:
+            continue
+        formula: Formula = Holds(place.name) if inside else Not(Holds(place.name))
+        holds = space.satisfying(formula)
+        if space.count(algebra.negation(space.backward(holds))):
+            return formula
+    if space.count(one) > PARTING_MAX:
+        return None
+    markings, left = [], one
+    while (witness := space.witness(left)) is not None:
+        markings.append(is_marking(net, net.marking(witness.marking)))
+        left = algebra.conjunction([left, algebra.negation(space.satisfying(markings[-1]))])
+    return tidy(Or(tuple(markings)))
+
+
+def _column(graph: ReachabilityGraph, indexes: Sequence[int]) -> Any:
+    found = np.zeros(graph.n_markings, dtype=np.bool_)
+    found[list(indexes)] = True
+    return found

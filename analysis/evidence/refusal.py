@@ -1,0 +1,24 @@
+"""How the checker says no: the evidence does not show what it claims, or it is not known within the time."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.net import Marking, Net
+
+
+class TimeIsOverError(Exception):
+    """The time for a check ended before it did: nothing is known."""
+
+
+def refuse(reason: str) -> NoReturn:
+    """Raise `InputError` F6002: this does not show what it claims."""
+    message = f"the evidence does not show what it claims: {reason}"
+    hint = "it was edited, or the technique that made it is wrong; whether the claim is true is not known from it"
+    raise InputError([Diagnostic("F6002", message, hint)])
+
+
+def shown(net: Net, marking: Marking) -> str:
+    """A marking for a message."""
+    return "{" + ", ".join(net.names(marking)) + "}"

@@ -1,0 +1,100 @@
+"""Whether a claim is true, by playing everything: the oracle for evidence."""
+
+from __future__ import annotations
+
+from support.naive_space import Markings, NaiveSpace
+
+from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
+from firable.analysis.evidence.obligations import Evidence
+from firable.analysis.temporal.ltl import refuting
+from firable.analysis.temporal.sets import Sets
+from firable.analysis.verdicts.leads_to import leads_to
+from firable.nets.formula import Formula
+from firable.nets.net import Property, PropertyKind
+from firable.nets.temporal import (
+    Eventually,
+    Exists,
+    ForAll,
+    Globally,
+    Next,
+    Temporal,
+    TemporalAnd,
+    TemporalNot,
+    TemporalOr,
+    Until,
+    negated,
+)
+
+
+def true(evidence: Evidence) -> bool:
+    """Whether the claim of the evidence holds of its net."""
+    net, claim = evidence.net, evidence.claim
+    space = NaiveSpace(net, evidence.discipline)
+    if (formula := as_ctl(claim)) is not None:
+        return net.initial_marking in where(space, formula)
+    match claim.kind:
+        case ClaimKind.FIRES:
+            return _fires(space, claim)
+        case ClaimKind.LTL | ClaimKind.NOT_LTL:
+            return (refuting(Sets(space), claim.goal) is None) is (claim.kind is ClaimKind.LTL)
+        case ClaimKind.LEADS_TO | ClaimKind.NOT_LEADS_TO:
+            of = Property("asked", PropertyKind.LEADS_TO, claim.state_goal, claim.then, claim.fairness)
+            return leads_to(space, of).holds is (claim.kind is ClaimKind.LEADS_TO)
+        case ClaimKind.LIVE:
+            return all(space.live())
+        case ClaimKind.HOME:
+            return bool(space.home())
+    raise ValueError(claim)
+
+
+def _fires(space: NaiveSpace, claim: Claim) -> bool:
+    """Some run meets the goal and then fires all: by what has fired so far, from each marking with the goal."""
+    wanted = frozenset(space.net.transition_index[name] for name in claim.fires)
+    todo = [(marking, frozenset[int]()) for marking in space.satisfying(claim.state_goal)]
+    seen = set(todo)
+    while todo:
+        marking, fired = todo.pop()
+        if fired == wanted:
+            return True
+        for label, after in space.graph[marking]:
+            pair = (after, fired | (wanted & set(label)))
+            if pair not in seen:
+                seen.add(pair)
+                todo.append(pair)
+    return False
+
+
+def where(space: NaiveSpace, formula: Temporal) -> Markings:
+    """The markings in which a formula of CTL holds, each fixpoint by its equation."""
+    everything, graph = frozenset(space.graph), space.graph
+
+    def nexts(targets: Markings, *, every: bool) -> Markings:
+        judged = all if every else any
+        return frozenset(m for m, edges in graph.items() if judged(after in targets for _, after in edges))
+
+    def until(left: Markings, right: Markings, *, every: bool) -> Markings:
+        found, moving = right, everything - space.deadlocks
+        while more := (left & moving & nexts(found, every=every)) - found:
+            found |= more
+        return found
+
+    match formula:
+        case TemporalNot(operand):
+            return everything - where(space, operand)
+        case TemporalAnd(operands):
+            return frozenset.intersection(*(where(space, one) for one in operands))
+        case TemporalOr(operands):
+            return frozenset[int]().union(*(where(space, one) for one in operands))
+        case Exists(Next(operand)) | ForAll(Next(operand)):
+            return nexts(where(space, operand), every=isinstance(formula, ForAll))
+        case Exists(Eventually(operand)) | ForAll(Eventually(operand)):
+            return until(everything, where(space, operand), every=isinstance(formula, ForAll))
+        case Exists(Globally(operand)):
+            return everything - where(space, ForAll(Eventually(negated(operand))))
+        case ForAll(Globally(operand)):
+            return everything - where(space, Exists(Eventually(negated(operand))))
+        case Exists(Until(left, right)) | ForAll(Until(left, right)):
+            return until(where(space, left), where(space, right), every=isinstance(formula, ForAll))
+        case _ if isinstance(formula, Formula):
+            return space.satisfying(formula)
+    raise ValueError(formula)
