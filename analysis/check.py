@@ -47,8 +47,8 @@ _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
 _KNOWING_SHARE: Final = 0.15  # of the time, for what is known at once
 _KNOWING_SECONDS_MAX: Final = 30.0
 _LEARNT_FIRST: Final = frozenset(question.name for question in QUESTIONS)
-_FIRST_LANES: Final = ((Method.WALK, Method.REDUCTION, Method.STATE_EQUATION),)
-_FIRST_SLICES_SECONDS: Final = (0.5, 2.0, 10.0)
+_FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION),)
+_FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
 
 
 def check(

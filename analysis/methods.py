@@ -75,7 +75,7 @@ FIRST_KNOWERS: Final = (Method.STRUCTURE, Method.REDUCTION)
 
 GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
     Method.REDUCTION: Technique(
-        "stubborn sets on the reduced net", "firable.analysis.reduction.deciding:decide_by_reduction"
+        "stubborn sets and a diagram on the reduced net", "firable.analysis.reduction.deciding:decide_by_reduction"
     ),
     Method.STATE_EQUATION: Technique(
         "state equation", "firable.analysis.structure.state_equation:decide_by_state_equation"

@@ -45,8 +45,14 @@ _BUDGETS: Final = ((2**15, 2**13), (2**18, 2**16), (2**21, 2**19))
 """Markings of a quick and of a thorough search, in turn; then a quick one without a bound."""
 
 
-def decide_by_stubborn_sets(net: Net, goal: Formula, limits: Limits) -> Finding:
+Turn = tuple[bool, int]
+"""A search: whether it is a thorough one, and how many markings it may find."""
+
+
+def decide_by_stubborn_sets(net: Net, goal: Formula, limits: Limits, *, turns: Iterable[Turn] | None = None) -> Finding:
     """Decide whether a marking that satisfies the goal is reachable; where it is, with a shortest firing sequence.
+
+    `turns` are the searches that are tried, other than the usual ones.
 
     Cost: for each marking of the reduced graph at most the net's size for each choice that the goal leaves; the reduced
     graph has between the length of the sequence and all markings.
@@ -58,11 +64,11 @@ def decide_by_stubborn_sets(net: Net, goal: Formula, limits: Limits) -> Finding:
     """
     runs = _Runs(net, limits)
     if isinstance(goal, Deadlock):
-        last = runs.in_turn(lambda engine, options: engine.deadlocks(all=False, **options))
+        last = runs.in_turn(lambda engine, options: engine.deadlocks(all=False, **options), turns)
         found = next(iter(last.deadlocks()), None) if last else None
     else:
         nodes = nodes_of(net, goal)
-        last = runs.in_turn(lambda engine, options: engine.reach(nodes, **options))
+        last = runs.in_turn(lambda engine, options: engine.reach(nodes, **options), turns)
         found = last.found if last else None
     if last is None:
         return Finding(None, METHOD, bound=_NO_ROOM, cost=runs.cost)
@@ -348,10 +354,10 @@ class _Runs:
         """What all searches so far have cost."""
         return Cost(self.markings, self.edges, perf_counter() - self.began)
 
-    def in_turn(self, ask: _Ask) -> Search | None:
+    def in_turn(self, ask: _Ask, turns: Iterable[Turn] | None = None) -> Search | None:
         """The first search that answers, quick and thorough ones in turn; else the last one; None: no room for any."""
         last = None
-        for thorough, markings in _turns():
+        for thorough, markings in turns or _turns():
             last = self.one(ask, thorough=thorough, markings=markings)
             if last is None or last.complete or last.reason != "markings":
                 break
@@ -381,7 +387,7 @@ def _bound(search: Search) -> str:
     return f"{search.n_markings:,} markings of a reduced graph: {REASONS.get(search.reason or '', search.reason)}"
 
 
-def _turns() -> Iterator[tuple[bool, int]]:
+def _turns() -> Iterator[Turn]:
     for quick, thorough in _BUDGETS:
         yield False, quick
         yield True, thorough

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.cell_nets import cell_nets
 from support.examples import examples
-from support.lively_nets import lively_net
+from support.lively_nets import lively_net, part_of
 from support.naive_space import NaiveSpace
 from support.small_text import net_of
 
@@ -18,9 +18,16 @@ from firable.analysis.check import check
 from firable.analysis.evidence.certificate import InductiveInvariant
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.reduction.components import parts
-from firable.analysis.reduction.deciding import decide_by_reduction, decide_reduced, known_by_reduction
+from firable.analysis.reduction.deciding import (
+    decide_by_diagram,
+    decide_by_reduction,
+    decide_reduced,
+    known_by_reduction,
+)
 from firable.analysis.spaces.space import WitnessError, Witnesses
+from firable.analysis.spaces.symbolic import SymbolicSpace
 from firable.nets.catalogue import catalogue_net
+from firable.nets.catalogue.processes import philosophers
 from firable.nets.formula import And, Deadlock, Formula, Holds, Not, parse_formula
 from firable.nets.net import Net, Place, Transition
 from firable.nets.verdict import Cost, Status, Witness
@@ -197,3 +204,34 @@ def test_what_is_known_on_the_reduced_net_holds_of_the_original(chunk: int) -> N
                 assert Player(net).deadlocked(marking)
             known += 1
     assert known >= 40
+
+
+@pytest.mark.parametrize("chunk", range(4))
+def test_a_diagram_of_the_reduced_net_decides_what_exploration_decides(chunk: int) -> None:
+    for seed in range(25 * chunk, 25 * (chunk + 1)):
+        draw = random.Random(seed)
+        net = lively_net(draw, 9)
+        for goal in (Deadlock(), part_of(draw, net, draw.getrandbits(len(net.places)), 4)):
+            found = decide_reduced(net, goal, Limits(), decide_by_diagram)
+            assert found.reachable is by_playing(net, goal, Limits()).reachable
+
+
+def test_a_deadlock_that_only_a_diagram_knows_is_walked_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_way(*_: object) -> None:
+        raise AssertionError("the walk should have met it")
+
+    monkeypatch.setattr(SymbolicSpace, "witness", no_way)
+    net = philosophers(8)
+    found = decide_by_diagram(net, Deadlock(), Limits())
+    assert found.reachable
+    assert found.witness is not None
+    marking = net.initial_marking
+    for (name,) in found.witness.firings:
+        marking = Player(net).fire(marking, [net.transition_index[name]])
+    assert Player(net).deadlocked(marking)
+
+
+def test_a_diagram_without_room_decides_nothing() -> None:
+    found = decide_by_diagram(philosophers(8), Deadlock(), Limits(memory_bytes=1000))
+    assert found.reachable is None
+    assert found.bound

@@ -9,15 +9,11 @@
 //! shown by one sequence, cut down to what all of it needs, so that all together are replayed in the time that their
 //! firings take. What was not met may fire all the same.
 
-use super::dependencies::{Dependencies, Literal, negation};
+use super::dependencies::{Dependencies, negation};
 use super::marks::Marks;
-use super::relaxed::Relaxed;
-use super::walk::{DRAWS, LENGTH_MAX, Random, Target, UNIT, Walker, cut_down, luby, without_loops};
+use super::walk::{DRAWS, LENGTH_MAX, Plan, Random, Target, UNIT, Walker, cut_down, luby, without_loops};
 use crate::budget::{Stop, Watch};
 use crate::net::Net;
-
-/// Firings along one relaxed plan before the next is made.
-const PLAN_STEPS: usize = 64;
 
 /// A moment: so many firings of a way.
 type Moment = (u32, u32);
@@ -73,7 +69,7 @@ struct Search<'a> {
     position: Vec<u32>,
     fired: Vec<u32>,
     archive: Vec<Start>,
-    relaxed: Relaxed<'a>,
+    plan: Plan<'a>,
     random: Random,
     found: Cover,
 }
@@ -90,7 +86,7 @@ impl<'a> Search<'a> {
             position: vec![CLOSED; count],
             fired: vec![0; count],
             archive: vec![Start { marking: net.initial.clone(), at: None, visits: 0 }],
-            relaxed: Relaxed::new(dependencies, net.places, count),
+            plan: Plan::new(dependencies, net.places, count),
             random: Random::new(seed),
             found: Cover::default(),
         };
@@ -143,8 +139,7 @@ impl<'a> Search<'a> {
         watch.tick(count)?;
         let (mut path, mut met) = (Vec::new(), Vec::new());
         self.meet(&walker, &walker.firable, 0, &mut met);
-        let mut plan: Vec<u32> = Vec::new();
-        let mut planned = 0;
+        self.plan.forget();
         while path.len() < length && !self.open.is_empty() {
             if walker.firable.is_empty() {
                 if self.found.deadlock.is_none() {
@@ -159,17 +154,14 @@ impl<'a> Search<'a> {
             let t = match kind {
                 0 => self.least_fired(&walker),
                 1 => {
-                    if planned == 0 || plan.is_empty() {
+                    if !self.plan.is_fresh() {
                         let target = self.open[self.random.below(self.open.len())];
-                        let goal: &[Literal] = self.dependencies.conditions(target);
-                        if !self.relaxed.plan(&walker.marking, goal, &mut self.random, &mut plan) {
+                        work = self.plan.size();
+                        if !self.plan.towards(&walker, self.dependencies.conditions(target), &mut self.random) {
                             break;
                         }
-                        work = self.relaxed.size();
-                        planned = PLAN_STEPS;
                     }
-                    planned -= 1;
-                    self.along(&walker, &mut plan)
+                    self.plan.follow(&walker, &mut self.random)
                 }
                 _ => walker.firable[self.random.below(walker.firable.len())],
             };
@@ -197,20 +189,6 @@ impl<'a> Search<'a> {
             }
         }
         best
-    }
-
-    /// A transition of the plan that is firable, which is taken out of it; now and then, and where there is none, any.
-    fn along(&mut self, walker: &Walker<'_>, plan: &mut Vec<u32>) -> u32 {
-        if self.random.below(16) > 0 {
-            let begin = self.random.below(plan.len());
-            for k in 0..plan.len() {
-                let at = (begin + k) % plan.len();
-                if walker.may_fire(plan[at]) {
-                    return plan.swap_remove(at);
-                }
-            }
-        }
-        walker.firable[self.random.below(walker.firable.len())]
     }
 
     /// Notes those of some transitions that are open and firable, after so many firings of a walk.

@@ -5,6 +5,7 @@
 //! disjunction. Nothing here knows of transitions: firable, deadlock and start come as the formulas that they are.
 
 use super::dependencies::{Literal, is_true};
+use super::walk::Random;
 
 /// A node of a formula; operands are indexes of earlier nodes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -84,6 +85,45 @@ impl Formula {
             };
         }
         self.price[self.price.len() - 1]
+    }
+
+    /// Literals that make the formula true if all of them are, and have the least price, as if each were paid by itself;
+    /// false where all cost `u32::MAX` or more. Among equal ones one is drawn.
+    pub(super) fn cheapest(
+        &mut self,
+        price: impl Fn(Literal) -> u64,
+        random: &mut Random,
+        into: &mut Vec<Literal>,
+    ) -> bool {
+        let never = u64::from(u32::MAX);
+        for (i, node) in self.nodes.iter().enumerate() {
+            self.price[i] = match node {
+                Node::Literal(l) => price(*l),
+                Node::All(operands) => operands.iter().map(|&o| self.price[o as usize]).fold(0, u64::saturating_add),
+                Node::Any(operands) => operands.iter().map(|&o| self.price[o as usize]).min().unwrap_or(never),
+            };
+        }
+        if self.price[self.price.len() - 1] >= never {
+            return false;
+        }
+        self.todo.push(self.nodes.len() as u32 - 1);
+        let mut next = 0;
+        while let Some(&node) = self.todo.get(next) {
+            next += 1;
+            if std::mem::replace(&mut self.seen[node as usize], true) {
+                continue;
+            }
+            match &self.nodes[node as usize] {
+                Node::Literal(l) => into.push(*l),
+                Node::All(operands) => self.todo.extend(operands),
+                Node::Any(operands) => {
+                    let cheapest = operands.iter().min_by_key(|&&o| (self.price[o as usize], random.below(1 << 16)));
+                    self.todo.extend(cheapest);
+                }
+            }
+        }
+        self.todo.drain(..).for_each(|node| self.seen[node as usize] = false);
+        true
     }
 
     /// Literals that are true at a marking which satisfies the formula, and enough to make it true.

@@ -11,7 +11,8 @@
 //! Cost: linear in the net for each plan. The rejected alternative, a plan for each successor to choose the best, as
 //! planners do, looks at a hundred markings for one step of a walk.
 
-use super::dependencies::{Dependencies, Literal, is_true};
+use super::dependencies::{Dependencies, Literal, is_true, negation};
+use super::formula::Formula;
 use super::marks::Marks;
 use super::walk::Random;
 
@@ -50,6 +51,12 @@ impl<'a> Relaxed<'a> {
         if goal.iter().any(|&l| self.layer[l as usize] == NEVER) {
             return false;
         }
+        self.extract(goal, into);
+        true
+    }
+
+    fn extract(&mut self, goal: &[Literal], into: &mut Vec<u32>) {
+        into.clear();
         self.wanted.clear();
         self.planned.clear();
         let mut todo: Vec<Literal> = goal.to_vec();
@@ -63,6 +70,50 @@ impl<'a> Relaxed<'a> {
                 todo.extend(self.net.conditions(t));
             }
         }
+    }
+
+    /// The transitions of a plan from a marking to one that satisfies a formula; false where there is none.
+    pub(super) fn plan_to(
+        &mut self,
+        formula: &mut Formula,
+        marking: &[u64],
+        random: &mut Random,
+        into: &mut Vec<u32>,
+    ) -> bool {
+        self.spread(marking, random);
+        let mut goal = Vec::new();
+        let reached = formula.cheapest(|l| u64::from(self.layer[l as usize]), random, &mut goal);
+        self.extract(if reached { &goal } else { &[] }, into);
+        reached
+    }
+
+    /// The transitions of a plan from a marking to one in which no transition is firable, if places had the values that
+    /// are drawn for this.
+    ///
+    /// Of each transition, in an order that is drawn, one condition must become false, or be so: the one that takes the
+    /// fewest layers, unless it contradicts what was wanted before. False where nothing is left to want of one.
+    pub(super) fn plan_to_deadlock(&mut self, marking: &[u64], random: &mut Random, into: &mut Vec<u32>) -> bool {
+        self.spread(marking, random);
+        let net = self.net;
+        let count = self.missing.len();
+        let mut chosen = Marks::new(self.layer.len());
+        let mut goal: Vec<Literal> = Vec::new();
+        let first = random.below(count.max(1));
+        for t in (0..count).map(|k| ((k + first) % count) as u32).filter(|&t| net.able(t)) {
+            let mut refused = net.conditions(t).iter().map(|&l| negation(l));
+            if refused.clone().any(|l| chosen.has(l)) {
+                continue;
+            }
+            let possible = refused.by_ref().filter(|&l| self.layer[l as usize] != NEVER && !chosen.has(negation(l)));
+            match possible.min_by_key(|&l| (self.layer[l as usize], random.below(1 << 16))) {
+                Some(l) => {
+                    chosen.insert(l);
+                    goal.push(l);
+                }
+                None => return false,
+            }
+        }
+        self.extract(&goal, into);
         true
     }
 
@@ -112,6 +163,7 @@ impl<'a> Relaxed<'a> {
 #[cfg(test)]
 mod tests {
     use super::super::dependencies::literal;
+    use super::super::formula::Node;
     use super::*;
     use crate::net::{Net, Transition};
 
@@ -129,5 +181,15 @@ mod tests {
         assert!(!relaxed.plan(&net.initial, &[literal(4, true)], &mut random, &mut plan));
         assert!(relaxed.plan(&net.initial, &[literal(0, true)], &mut random, &mut plan));
         assert!(plan.is_empty());
+        // Of 4 and 2 only the second can be had; and where 0, 1 and 2 are empty nothing is firable.
+        let nodes = vec![Node::Literal(literal(4, true)), Node::Literal(literal(2, true)), Node::Any(vec![0, 1])];
+        let mut formula = Formula::new(nodes, 5).expect("well formed");
+        assert!(relaxed.plan_to(&mut formula, &net.initial, &mut random, &mut plan));
+        plan.sort_unstable();
+        assert_eq!(plan, [1, 2]);
+        assert!(relaxed.plan_to_deadlock(&net.initial, &mut random, &mut plan));
+        assert!(!plan.is_empty());
+        let mut never = Formula::new(vec![Node::Literal(literal(4, true))], 5).expect("well formed");
+        assert!(!relaxed.plan_to(&mut never, &net.initial, &mut random, &mut plan) && plan.is_empty());
     }
 }

@@ -3,9 +3,9 @@
 //!
 //! A walk takes about twenty nanoseconds for each transition that a firing touches: how many conditions of a transition
 //! are false is counted, and only the needers of what was flipped are looked at, whatever the size of the net. Every
-//! third walk is blind; every third draws a few transitions and fires the one that was fired least; every third
+//! fourth walk is blind; every fourth draws a few transitions and fires the one that was fired least; every fourth
 //! the one after which the goal is nearest (literals that still have to become true; firable transitions, for a
-//! deadlock). The lengths follow the sequence of Luby, Sinclair and Zuckerman ("Optimal speedup of Las Vegas algorithms",
+//! deadlock); and every fourth follows relaxed plans, which see what has to happen long before. The lengths follow the sequence of Luby, Sinclair and Zuckerman ("Optimal speedup of Las Vegas algorithms",
 //! 1993), which is within a logarithm of the best choice of restarts, whatever that is.
 //!
 //! What was found is cut down before it is shown: from the end backwards, a firing is kept if it makes a literal true
@@ -19,6 +19,7 @@ use std::collections::HashMap;
 use super::dependencies::{Dependencies, Literal, is_true, negation};
 use super::formula::Formula;
 use super::marks::Marks;
+use super::relaxed::Relaxed;
 use crate::budget::{Stop, Watch};
 use crate::marking::mix;
 use crate::net::Net;
@@ -29,6 +30,8 @@ pub(super) const UNIT: usize = 1 << 10;
 pub(super) const LENGTH_MAX: usize = 1 << 20;
 /// Words of markings that are remembered to find loops.
 const REMEMBERED_MAX: usize = 1 << 24;
+/// Firings along one relaxed plan before the next is made.
+const PLAN_STEPS: usize = 64;
 /// How many transitions a guided walk draws to choose from.
 pub(super) const DRAWS: usize = 4;
 
@@ -47,6 +50,7 @@ enum Guide {
     Blind,
     LeastFired,
     Nearest,
+    Planned,
 }
 
 /// A place in the net that walks on.
@@ -185,12 +189,14 @@ fn find(
     let mut fired = vec![0u32; count];
     let mut path = Vec::new();
     let unit = UNIT.max(count.min(LENGTH_MAX / 64));
+    let mut plan = Plan::new(dependencies, net.places, count);
     for round in 1_u64.. {
-        let guide = [Guide::LeastFired, Guide::Nearest, Guide::Blind][round as usize % 3];
-        let length = LENGTH_MAX.min(unit.saturating_mul(luby(round.div_ceil(3)) as usize));
+        let guide = [Guide::LeastFired, Guide::Nearest, Guide::Blind, Guide::Planned][round as usize % 4];
+        let length = LENGTH_MAX.min(unit.saturating_mul(luby(round.div_ceil(4)) as usize));
         let mut walker = Walker::new(dependencies, &net.initial, count);
         watch.tick(count)?;
         path.clear();
+        plan.forget();
         for _ in 0..length {
             if target.met(&walker) {
                 let needed = cut_down(dependencies, target, &walker.marking, &path, count, net.places);
@@ -202,7 +208,10 @@ fn find(
             if *steps >= max_steps {
                 return Ok(None);
             }
-            let (t, work) = choose(&mut walker, target, guide, &fired, &mut random);
+            let (t, work) = match guide {
+                Guide::Planned => plan.next(&walker, target, &mut random),
+                _ => choose(&mut walker, target, guide, &fired, &mut random),
+            };
             let work = work + walker.flip(t) + target.size();
             fired[t as usize] = fired[t as usize].saturating_add(1);
             path.push(t);
@@ -243,6 +252,69 @@ fn choose(
         }
     }
     (best.1, work)
+}
+
+/// A relaxed plan that a walk follows, and is made anew when it has been followed for a while.
+pub(super) struct Plan<'a> {
+    relaxed: Relaxed<'a>,
+    left: Vec<u32>,
+    steps: usize,
+}
+
+impl<'a> Plan<'a> {
+    pub(super) fn new(net: &'a Dependencies, places: usize, transitions: usize) -> Self {
+        Plan { relaxed: Relaxed::new(net, places, transitions), left: Vec::new(), steps: 0 }
+    }
+
+    /// Lets go of the plan.
+    pub(super) fn forget(&mut self) {
+        self.left.clear();
+    }
+
+    /// Whether there is something left to do for the plan.
+    pub(super) fn is_fresh(&self) -> bool {
+        self.steps > 0 && !self.left.is_empty()
+    }
+
+    /// Makes a plan from where a walk stands to some literals; false where there is none.
+    pub(super) fn towards(&mut self, walker: &Walker<'_>, goal: &[Literal], random: &mut Random) -> bool {
+        self.steps = PLAN_STEPS;
+        self.relaxed.plan(&walker.marking, goal, random, &mut self.left)
+    }
+
+    /// What the work of making one is.
+    pub(super) fn size(&self) -> usize {
+        self.relaxed.size()
+    }
+
+    /// A transition of the plan that is firable, which is taken out of it; now and then, and where there is none, any.
+    pub(super) fn follow(&mut self, walker: &Walker<'_>, random: &mut Random) -> u32 {
+        self.steps = self.steps.saturating_sub(1);
+        if random.below(16) > 0 && !self.left.is_empty() {
+            let (begin, count) = (random.below(self.left.len()), self.left.len());
+            let firable = (begin..begin + count).map(|k| k % count).find(|&at| walker.may_fire(self.left[at]));
+            if let Some(at) = firable {
+                return self.left.swap_remove(at);
+            }
+        }
+        walker.firable[random.below(walker.firable.len())]
+    }
+
+    /// The next transition of a plan to the target, and the work of finding it.
+    fn next(&mut self, walker: &Walker<'_>, target: &mut Target, random: &mut Random) -> (u32, usize) {
+        let mut work = 0;
+        if !self.is_fresh() {
+            self.steps = PLAN_STEPS;
+            work = self.size() + target.size();
+            match target {
+                Target::Deadlock => _ = self.relaxed.plan_to_deadlock(&walker.marking, random, &mut self.left),
+                Target::Formula(formula) => {
+                    self.relaxed.plan_to(formula, &walker.marking, random, &mut self.left);
+                }
+            }
+        }
+        (self.follow(walker, random), work)
+    }
 }
 
 /// The firings of a path that the target needs, in their order.
