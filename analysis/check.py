@@ -17,7 +17,7 @@ The report's `course` tells what was tried. A technique that is asked for by nam
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -44,8 +44,7 @@ from firable.semantics.trace import Discipline
 FIRST_MARKINGS: Final = 200_000
 """How many markings `auto` explores before it lets techniques race."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
-_KNOWING_SHARE: Final = 0.15  # of the time, for what is known at once
-_KNOWING_SECONDS_MAX: Final = 30.0
+_KNOWING_SECONDS_MAX: Final = 30.0  # for what is known at once
 _LEARNT_FIRST: Final = frozenset(question.name for question in QUESTIONS)
 _FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION),)
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
@@ -115,8 +114,8 @@ class _Check:
 
     def _begin(self, settling: Settling, deadline: Deadline) -> None:
         """Settle, beside the search for all markings, what others follow from, by quick techniques."""
-        for of in FIRST_KNOWERS:
-            settling.learn(of, _LEARNT_FIRST, self._moment(deadline))
+        for of, share in FIRST_KNOWERS.items():
+            settling.learn(of, _LEARNT_FIRST, _moment(deadline, share))
         settling.ask(_asked_of(DEADLOCK_FREE), (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
 
     def by(self, method: Method) -> CheckReport:
@@ -129,7 +128,7 @@ class _Check:
                 return _told(self._report(self._nothing()), [f"{words} gave up: {error}"])
             return _told(self._report(space), [f"{words}: {_size(space)}"])
         report = self._report(self._nothing())
-        knowers = [of for of in KNOWERS if of is method]
+        knowers = {of: 1.0 for of in KNOWERS if of is method}
         lanes = ((method,),) if method in GOALS else ()
         words = (KNOWERS | GOALS)[method].words
         return self._settled(report, self._settling(), knowers, lanes, [f"{words}, and nothing else"])
@@ -190,12 +189,12 @@ class _Check:
         return graph
 
     def _settled(
-        self, report: CheckReport, settling: Settling, knowers: Iterable[Method], lanes: Lanes, course: list[str]
+        self, report: CheckReport, settling: Settling, knowers: Mapping[Method, float], lanes: Lanes, course: list[str]
     ) -> CheckReport:
         """The report with those of its unknown verdicts settled that can be.
 
-        The knowers are asked only as long as something is open; the time left is shared out among the verdicts that
-        come down to goals.
+        The knowers, each with its part of the time, are asked only as long as something is open; the time left is
+        shared out among the verdicts that come down to goals.
         """
 
         def open_() -> list[Verdict]:
@@ -203,8 +202,8 @@ class _Check:
             return [verdict for verdict in unknown if verdict.name not in settling.found]
 
         settling.conclude(report.verdicts)
-        for of in knowers:
-            settling.learn(of, {verdict.name for verdict in open_()}, self._moment(self.deadline))
+        for of, share in knowers.items():
+            settling.learn(of, {verdict.name for verdict in open_()}, _moment(self.deadline, share))
             settling.conclude(report.verdicts)
         fired = self._fired(report.space) if open_() else set()
         waiting = open_()
@@ -215,12 +214,8 @@ class _Check:
             settling.found.get(verdict.name, verdict) if verdict.status is Status.UNKNOWN else verdict
             for verdict in report.verdicts
         )
-        return _told(replace(report, verdicts=verdicts, findings=settling.findings), [*course, *settling.course])
-
-    def _moment(self, deadline: Deadline) -> Deadline:
-        """When a technique that knows things at once must have said them."""
-        left = deadline.left_seconds
-        return deadline.within(_KNOWING_SECONDS_MAX if left is None else left * _KNOWING_SHARE)
+        course = [*course, *settling.course] if verdicts != report.verdicts else course
+        return _told(replace(report, verdicts=verdicts, findings=settling.findings), course)
 
     def _fired(self, space: StateSpace[Any]) -> set[str]:
         """The transitions that are known to fire, as far as there is time to ask."""
@@ -239,6 +234,11 @@ def _held(of: Technique[Callable[[Net, Limits], StateSpace[Any]]], net: Net, lim
     space = of.load()(net, limits)
     space.require_complete()
     return space
+
+
+def _moment(deadline: Deadline, share: float) -> Deadline:
+    """When a technique that knows things at once must have said them."""
+    return _share(deadline, share).within(_KNOWING_SECONDS_MAX)
 
 
 def _share(deadline: Deadline, share: float) -> Deadline:

@@ -70,8 +70,11 @@ KNOWERS: Final[dict[Method, Technique[Knower]]] = {
     Method.STUBBORN_SETS: Technique("stubborn sets, at large", "firable.analysis.stubborn:known_firings"),
 }
 
-FIRST_KNOWERS: Final = (Method.STRUCTURE, Method.REDUCTION)
-"""Whom `auto` asks, in this order; stubborn sets know what those on the reduced net know, and later."""
+FIRST_KNOWERS: Final = {Method.REDUCTION: 0.5, Method.STRUCTURE: 0.3}
+"""Whom `auto` asks, in this order, and for which part of the time that is left.
+
+Stubborn sets know what those on the reduced net know, and later.
+"""
 
 GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
     Method.REDUCTION: Technique(
@@ -88,7 +91,7 @@ GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
 }
 
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (
-    (Method.WALK, Method.REDUCTION, Method.STUBBORN_SETS, Method.BOUNDED),
+    (Method.REDUCTION, Method.WALK, Method.STUBBORN_SETS, Method.BOUNDED),
     (Method.STATE_EQUATION, Method.K_INDUCTION, Method.PDR),
 )
-"""How `auto` races them: what finds violations beside what proves; each lane from the quick to the thorough."""
+"""How `auto` races them: what finds violations beside what proves; each lane in turns that grow."""
