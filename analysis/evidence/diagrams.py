@@ -71,6 +71,7 @@ class Diagrams(Nodes):
         if sorted(of.order) != sorted(net.place_index):
             refuse("the order of the diagram does not name each place once")
         self.level_of = {net.place_index[name]: level for level, name in enumerate(of.order, start=1)}
+        self._backs: dict[int, dict[Key, int]] = {}
         self.roots = self._read(of)
         self.whole = self.roots[0]
         self._require_closed()
@@ -169,7 +170,7 @@ class Diagrams(Nodes):
         event = self._events.get(t)
         if event is None:
             return EMPTY
-        literals = event.literals
+        literals, nothing = event.literals, (EMPTY, EMPTY, 0)
 
         def parts(key: Key) -> Made:
             a, b, i = key
@@ -178,14 +179,15 @@ class Diagrams(Nodes):
             if i == len(literals):
                 return self.both(a, b)
             at, before, after = literals[i]
-            level = max(self.levels[a], self.levels[b], at)
-            if level > at:
-                lo, hi = ((self.part(a, level, value=v), self.part(b, level, value=v), i) for v in (False, True))
-                return level, lo, hi
+            if max(self.levels[a], self.levels[b]) > at:
+                level, (a0, b0), (a1, b1) = self.split(a, b)
+                return level, (a0, b0, i), (a1, b1, i)
             below = self.part(a, at, value=before), self.part(b, at, value=after), i + 1
-            return (at, (EMPTY, EMPTY, i), below) if before else (at, below, (EMPTY, EMPTY, i))
+            return (at, nothing, below) if before else (at, below, nothing)
 
-        return self.made((self.whole, targets, 0), {}, parts)
+        # Most of a set that grows stays as it was, and so does what leads into it.
+        known = self._backs.setdefault(t, {nothing: EMPTY})
+        return self.made((self.whole, targets, 0), known, parts)
 
     @cached_property
     def deadlocks(self) -> int:

@@ -88,10 +88,14 @@ class Nodes:
                 todo += [part for part in (lo, hi) if part not in known]
         return known[root]
 
-    def _split(self, a: int, b: int) -> tuple[int, Key, Key]:
-        level = max(self.levels[a], self.levels[b])
-        lo = self.part(a, level, value=False), self.part(b, level, value=False)
-        return level, lo, (self.part(a, level, value=True), self.part(b, level, value=True))
+    def split(self, a: int, b: int) -> tuple[int, tuple[int, int], tuple[int, int]]:
+        """The higher level of two nodes, and the parts of both there, without and with a token."""
+        above, other = self.levels[a], self.levels[b]
+        if above == other:
+            return above, (self.lows[a], self.lows[b]), (self.highs[a], self.highs[b])
+        if above > other:
+            return above, (self.lows[a], b), (self.highs[a], EMPTY)
+        return other, (a, self.lows[b]), (EMPTY, self.highs[b])
 
     def both(self, a: int, b: int) -> int:
         """The intersection."""
@@ -100,7 +104,7 @@ class Nodes:
             a, b = key
             if a == b or EMPTY in key:
                 return min(a, b)
-            return self._split(a, b)
+            return self.split(a, b)
 
         return self.made((a, b), self._both, parts)
 
@@ -111,7 +115,7 @@ class Nodes:
             a, b = key
             if a == b or EMPTY in key:
                 return max(a, b)
-            return self._split(a, b)
+            return self.split(a, b)
 
         return self.made((a, b), self._either, parts)
 
@@ -122,7 +126,7 @@ class Nodes:
             a, b = key
             if a in (b, EMPTY):
                 return EMPTY
-            return a if b == EMPTY else self._split(a, b)
+            return a if b == EMPTY else self.split(a, b)
 
         return self.made((a, b), self._less, parts)
 
@@ -138,7 +142,7 @@ class Nodes:
                 return False
             self.tick()
             self._included.add((a, b))
-            _, lo, hi = self._split(a, b)
+            _, lo, hi = self.split(a, b)
             todo += [(lo[0], lo[1]), (hi[0], hi[1])]
         return True
 

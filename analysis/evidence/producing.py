@@ -12,7 +12,7 @@ from functools import partial
 from typing import Final
 
 from firable.analysis.evidence.certificate import Certificate, FiringSequence
-from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking
+from firable.analysis.evidence.claims import TRUE, Claim, ClaimKind, is_marking
 from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.meaning import (
     commands_clash,
@@ -29,7 +29,9 @@ from firable.analysis.evidence.meaning import (
     tidy,
     tokens_at_least,
 )
+from firable.analysis.evidence.obligations import played
 from firable.analysis.evidence.producing_claims import Certifier, LackingError
+from firable.analysis.evidence.runs import holds
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
 from firable.nets.formula import Constant, Deadlock, Firable, Formula, Holds, Not, Start
@@ -201,7 +203,17 @@ class _Verdicts:
             raise LackingError("no home marking is known")
         claim = self._home_claim(home)
         shown: Shown = [(claim, self.certifier.certify(claim))]
-        return shown + _fired(claim.state_goal, self.certifier.runs_firing(names, home))
+        return shown + self._fired(claim.state_goal, self.certifier.runs_firing(names, home))
+
+    def _fired(self, goal: Formula, runs: Iterable[FiringSequence]) -> Shown:
+        """What each run fires from where the goal first holds."""
+        shown: Shown = []
+        for run in runs:
+            markings = played(self.net, self.certifier.discipline, run.firings)
+            begin = next(i for i, marking in enumerate(markings) if holds(self.net, goal, marking))
+            fires = tuple(dict.fromkeys(name for fired in run.firings[begin:] for name in fired))
+            shown.append((Claim(ClaimKind.FIRES, goal, fires=fires), run))
+        return shown
 
     def _quasi_live(self, verdict: Verdict) -> Shown:
         names = [t.name for t in self.net.transitions]
@@ -212,7 +224,7 @@ class _Verdicts:
                 shown.append((Claim(ClaimKind.REACHABLE, goal), run))
         known = {claim.state_goal.transition for claim, _ in shown if isinstance(claim.state_goal, Firable)}
         left = [name for name in names if name not in known]
-        return shown + (_fired(Constant(value=True), self.certifier.runs_firing(left)) if left else [])
+        return shown + (self._fired(TRUE, self.certifier.runs_firing(left)) if left else [])
 
     def _not_live(self, verdict: Verdict, *, dead: bool) -> Iterator[tuple[Claim, Certificate]]:
         """Of the transitions that a verdict says to be dead, or not live, the first of which it can be shown."""
@@ -262,7 +274,7 @@ class _Verdicts:
                 for run in runs:
                     fired = {name for names in run.firings for name in names}
                     if {first, second} <= fired:
-                        return Claim(ClaimKind.FIRES, Constant(value=True), fires=(first, second)), run
+                        return Claim(ClaimKind.FIRES, TRUE, fires=(first, second)), run
         return None
 
     def _never_stopped(self) -> Iterator[tuple[Claim, Certificate]]:
@@ -270,7 +282,7 @@ class _Verdicts:
         for sending in alone:
             for name in sending:
                 try:
-                    yield from _fired(Constant(value=True), self.certifier.runs_firing((name,)))
+                    yield from self._fired(TRUE, self.certifier.runs_firing((name,)))
                 except LackingError:
                     continue
                 return
@@ -341,10 +353,3 @@ _DEAD: Final = frozenset({QueryKind.LIVE, QueryKind.QUASI_LIVE})
 
 def _possible(name: str) -> Claim:
     return Claim(ClaimKind.ALWAYS_POSSIBLE, Firable(name))
-
-
-def _fired(goal: Formula, runs: Iterable[FiringSequence]) -> Shown:
-    return [
-        (Claim(ClaimKind.FIRES, goal, fires=tuple(dict.fromkeys(name for fired in run.firings for name in fired))), run)
-        for run in runs
-    ]

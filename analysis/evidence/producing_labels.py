@@ -154,6 +154,7 @@ class _Labels:
                     break
             if found == space.reach:
                 break
+            order.reverse()  # there and back: what one direction leaves for many turns is the other's next one
             if len(turns) > TURNS_MAX:
                 raise TooLargeError(f"going back takes more than {TURNS_MAX:,} turns")
         self.labels[node] = Back(tuple(turns))

@@ -44,6 +44,7 @@ def runs_on_graph(graph: ReachabilityGraph, names: Sequence[str], home: Marking 
         run = _Run(graph)
         if home is not None and (index := graph.index_of(home)) is not None:
             run.go(_column(graph, [index]))
+            run.fired.clear()  # what fired on the way there does not count
         before = len(open_)
         while open_ and run.fire_one(open_):
             open_ -= run.fired

@@ -2,7 +2,7 @@
 
 import json
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import replace
 from typing import Any
@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.dense_nets import PLACES, dense_nets
-from support.evidence import certified, document, evidence_of_finding
+from support.evidence import certified, document
+from support.evidence_examples import EXAMPLES, induced
 from support.examples import examples
 from support.second_solver import by_cvc5
 from support.true_claims import true
 from support.whole_nets import formulas
 
-from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import (
     Clause,
     Equation,
@@ -30,33 +30,25 @@ from firable.analysis.evidence.certificate import (
     Whole,
 )
 from firable.analysis.evidence.checker import check_document, check_evidence
-from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.claims import STATE_GOALS, Claim, ClaimKind
 from firable.analysis.evidence.document import document_from_text, seal
 from firable.analysis.evidence.meaning import contact
 from firable.analysis.evidence.obligations import Evidence, obligations, sums_text
 from firable.analysis.evidence.producing_claims import Certifier
 from firable.analysis.evidence.producing_labels import listed
 from firable.analysis.goal import Limits
-from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.spaces.reachability import explore
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.nets.catalogue import catalogue_net
 from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Start, parse_formula
+from firable.nets.formula import And, Firable, Formula, Holds, Not, Start, parse_formula
 from firable.nets.interchange import net_digest, net_from_json
-from firable.nets.net import Net, Place, Transition
+from firable.nets.net import Fairness, Net, Place, Transition
 from firable.semantics.trace import Discipline
 
 KINDS = [ClaimKind.NEVER, ClaimKind.REACHABLE, ClaimKind.ALWAYS_POSSIBLE, ClaimKind.LOST]
 DISCIPLINES = [Discipline.INTERLEAVING, Discipline.STEP]
-BOTH_EAT = And((Holds("p1.eating"), Holds("p2.eating")))
-
-
-def induced(net: Net, goal: Formula, discipline: Discipline = Discipline.INTERLEAVING) -> Evidence | None:
-    limits = Limits(Deadline.after(20))
-    found = decide_by_k_induction(net, goal, limits, discipline=discipline, depth_max=3)
-    return evidence_of_finding(net, goal, found, discipline)
 
 
 def text_of(evidence: Evidence) -> str:
@@ -153,21 +145,6 @@ def sealed(data: dict[str, Any]) -> str:
     return json.dumps(data | {"seal": seal(data)})
 
 
-TRAPPED = Net(  # no sum of tokens stays the same, and yet somewhere there is always a token
-    "trapped",
-    (Place("a", marked=True), Place("b"), Place("c")),
-    (Transition("fork", ("a",), ("b", "c")), Transition("up", ("c",), ("a",)), Transition("over", ("c",), ("b",))),
-)
-
-EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
-    "invariant": lambda: induced(family_net("philosophers-3"), BOTH_EAT),
-    "traps": lambda: induced(TRAPPED, parse_formula("not a and not b and not c")),
-    "markings": lambda: certified(catalogue_net("conceptual_one_robot"), Claim(ClaimKind.NEVER, Deadlock())),
-    "distances": lambda: certified(catalogue_net("conceptual_one_robot"), Claim(ClaimKind.ALWAYS_POSSIBLE, Start())),
-    "sequence": lambda: induced(family_net("philosophers-3"), Deadlock()),
-}
-
-
 @pytest.fixture(params=EXAMPLES)
 def example(request: pytest.FixtureRequest) -> Evidence:
     found = EXAMPLES[request.param]()
@@ -199,7 +176,7 @@ def test_a_text_that_ends_early_is_refused(example: Evidence) -> None:
 
 
 def _edits(value: Any) -> Iterator[Any]:
-    """The value with one thing changed somewhere in it: an element left out, a number or a truth value changed."""
+    """The value with one thing changed somewhere in it: an element left out, moved, another number or truth value."""
     match value:
         case dict():
             for key, inner in value.items():
@@ -208,6 +185,8 @@ def _edits(value: Any) -> Iterator[Any]:
         case list():
             for i, inner in enumerate(value):
                 yield value[:i] + value[i + 1 :]
+                if i and value[i - 1] != inner:
+                    yield [*value[: i - 1], inner, value[i - 1], *value[i + 1 :]]
                 for edited in _edits(inner):
                     yield [*value[:i], edited, *value[i + 1 :]]
         case bool():
@@ -223,11 +202,16 @@ def test_an_edited_certificate_that_is_sealed_anew_is_refused_or_a_proof_all_the
     edits += [(data, "sets", edited) for edited in _edits(data["sets"])]
     assert edits
     refused = 0
-    for inside, key, edited in random.Random(0).sample(edits, min(40, len(edits))):
+    for inside, key, edited in random.Random(0).sample(edits, min(60, len(edits))):
         kept, inside[key] = inside[key], edited
         refused += refuses(sealed(data))  # where not, the claim is true: it has not changed
         inside[key] = kept
     assert refused
+
+
+def test_every_obligation_is_discharged_by_a_second_solver(example: Evidence) -> None:
+    texts = [obligation.text(example) for obligation in obligations(example)]
+    assert {by_cvc5(text) for text in [*texts, *filter(None, [sums_text(example)])]} <= {"unsat"}
 
 
 def test_the_markings_need_each_of_them() -> None:
@@ -256,7 +240,21 @@ def test_another_goal_sealed_anew_is_proved_for_itself_or_refused(example: Evide
         data = json.loads(text_of(example))
         data["verdicts"][0]["shown"][0]["claim"]["goal"] = goal
         if not refuses(sealed(data)):
-            assert true(replace(example, claim=Claim(example.claim.kind, parse_formula(goal))))
+            assert true(replace(example, claim=replace(example.claim, goal=parse_formula(goal))))
+
+
+def test_another_kind_of_claim_is_refused_or_true(example: Evidence) -> None:
+    goal = example.claim.goal
+    for kind in ClaimKind:
+        if isinstance(goal, Formula) or kind not in STATE_GOALS:
+            evidence = replace(example, claim=replace(example.claim, kind=kind))
+            assert kind is example.claim.kind or refuses(evidence) or true(evidence)
+
+
+@pytest.mark.parametrize("fairness", Fairness)
+def test_less_fairness_is_refused_or_true(example: Evidence, fairness: Fairness) -> None:
+    evidence = replace(example, claim=replace(example.claim, fairness=fairness))
+    assert refuses(evidence) or true(evidence)
 
 
 def test_another_net_is_refused_or_the_claim_is_true_of_it(example: Evidence) -> None:

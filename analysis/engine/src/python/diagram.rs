@@ -20,7 +20,7 @@ use crate::net::Transition;
 use crate::symbolic::algebra::Binary;
 use crate::symbolic::cache::ANY;
 use crate::symbolic::count::Natural;
-use crate::symbolic::listing::Line;
+use crate::symbolic::listing::Listing;
 use crate::symbolic::space::{Events, Symbolic};
 use crate::symbolic::zdd::{EMPTY, Node};
 
@@ -292,12 +292,7 @@ impl Diagram {
         self.shared.set(py, |space, roots, watch| space.endless(roots, set, watch))
     }
 
-    fn nodes(
-        &self,
-        py: Python<'_>,
-        sets: Vec<PyRef<'_, MarkingSet>>,
-        most: usize,
-    ) -> PyResult<Option<(Vec<Line>, Vec<u32>)>> {
+    fn nodes(&self, py: Python<'_>, sets: Vec<PyRef<'_, MarkingSet>>, most: usize) -> PyResult<Option<Listing>> {
         let sets = sets.iter().map(|set| self.mine(set)).collect::<PyResult<Vec<Node>>>()?;
         self.shared.work(py, |space, _, watch| space.listed(&sets, most, watch))
     }

@@ -12,15 +12,12 @@ use crate::budget::{Stop, Watch};
 
 /// A level, and the numbers of the rows of its two parts.
 pub type Line = (u32, u32, u32);
+/// The rows of some sets, and the number of each set's own.
+pub type Listing = (Vec<Line>, Vec<u32>);
 
 impl Symbolic {
     /// The nodes of some sets, and the number of each set's own; None where they are more than `most`.
-    pub fn listed(
-        &mut self,
-        sets: &[Node],
-        most: usize,
-        watch: &mut Watch<'_>,
-    ) -> Result<Option<(Vec<Line>, Vec<u32>)>, Stop> {
+    pub fn listed(&mut self, sets: &[Node], most: usize, watch: &mut Watch<'_>) -> Result<Option<Listing>, Stop> {
         let store = &self.diagram().store;
         let mut number: HashMap<Node, u32> = HashMap::from([(EMPTY, 0), (UNIT, 1)]);
         let mut lines: Vec<Line> = Vec::new();

@@ -1,0 +1,135 @@
+"""One example of evidence for each kind of certificate, to be damaged, edited and weakened."""
+
+from collections.abc import Callable
+
+from support.evidence import certified, evidence_of_finding
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import Certificate, FiringSequence
+from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
+from firable.analysis.evidence.obligations import Evidence
+from firable.analysis.evidence.producing_claims import Certifier
+from firable.analysis.evidence.producing_labels import drawn, labelling
+from firable.analysis.goal import Limits
+from firable.analysis.induction.k_induction import decide_by_k_induction
+from firable.analysis.spaces.symbolic import explore_symbolically
+from firable.nets.catalogue import catalogue_net
+from firable.nets.catalogue.families import family_net
+from firable.nets.formula import And, Deadlock, Formula, Holds, Start, parse_formula
+from firable.nets.net import Fairness, Net, Place, Transition
+from firable.nets.temporal import parse_temporal
+from firable.semantics.trace import Discipline
+
+BOTH_EAT = And((Holds("p1.eating"), Holds("p2.eating")))
+
+TRAPPED = Net(  # no sum of tokens stays the same, and yet somewhere there is always a token
+    "trapped",
+    (Place("a", marked=True), Place("b"), Place("c")),
+    (Transition("fork", ("a",), ("b", "c")), Transition("up", ("c",), ("a",)), Transition("over", ("c",), ("b",))),
+)
+# Two things wait for their turn: `go` stays enabled, `now` only now and then.
+TURNS = Net(
+    "turns",
+    (Place("a", marked=True), Place("b"), Place("asked", marked=True), Place("done")),
+    (
+        Transition("tick", ("a",), ("b",)),
+        Transition("tock", ("b",), ("a",)),
+        Transition("go", ("asked",), ("done",)),
+        Transition("again", ("done",), ("asked",)),
+    ),
+)
+SOMETIMES = Net(
+    "sometimes",
+    TURNS.places,
+    (
+        Transition("tick", ("a",), ("b",)),
+        Transition("tock", ("b",), ("a",)),
+        Transition("now", ("asked",), ("done",), permissive=("b",)),
+        Transition("again", ("done",), ("asked",)),
+    ),
+)
+CHOICE = Net(  # free choice: a token goes one way or the other and comes back
+    "choice",
+    (Place("a", marked=True), Place("b"), Place("c")),
+    (
+        Transition("left", ("a",), ("b",)),
+        Transition("right", ("a",), ("c",)),
+        Transition("back", ("b",), ("a",)),
+        Transition("home", ("c",), ("a",)),
+    ),
+)
+CIRCUIT = Net(  # a marked graph of two circuits
+    "circuit",
+    (Place("a", marked=True), Place("b"), Place("c", marked=True), Place("d")),
+    (
+        Transition("go", ("a", "c"), ("b", "d")),
+        Transition("one", ("b",), ("a",)),
+        Transition("two", ("d",), ("c",)),
+    ),
+)
+ENDING = Net("ending", (Place("a", marked=True), Place("b")), (Transition("end", ("a",), ("b",)),))
+
+
+def induced(net: Net, goal: Formula, discipline: Discipline = Discipline.INTERLEAVING) -> Evidence | None:
+    """What k-induction finds of a goal."""
+    found = decide_by_k_induction(net, goal, Limits(Deadline.after(20)), discipline=discipline, depth_max=3)
+    return evidence_of_finding(net, goal, found, discipline)
+
+
+def on_diagram(net: Net, claim: Claim) -> Evidence | None:
+    """The labels of a claim on the decision diagram of a net; None where it does not hold."""
+    space, formula = explore_symbolically(net), as_ctl(claim)
+    assert formula is not None
+    labels = labelling(space, drawn(space), formula)
+    return None if labels is None else Evidence(net, Discipline.INTERLEAVING, claim, labels)
+
+
+def _ctl(text: str) -> Claim:
+    return Claim(ClaimKind.CTL, parse_temporal(text))
+
+
+def _leads(fairness: Fairness, kind: ClaimKind = ClaimKind.LEADS_TO) -> Claim:
+    return Claim(kind, Holds("asked"), Holds("done"), fairness)
+
+
+def _of(net: Net, claim: Claim, certificate: Certificate) -> Evidence:
+    return Evidence(net, Discipline.INTERLEAVING, claim, certificate)
+
+
+def _theorem(net: Net, claim: Claim) -> Evidence:
+    return _of(net, claim, Certifier(net, Discipline.INTERLEAVING, Limits()).theorem())
+
+
+def _invented(net: Net, claim: Claim, firings: str, cycle: str = "") -> Evidence:
+    prefix, around = (tuple((name,) for name in names.split()) for names in (firings, cycle))
+    return _of(net, claim, FiringSequence(prefix, around))
+
+
+_END = "deadlock or p1.eating or p2.eating"
+_ROBOT = "conceptual_one_robot"
+EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
+    "invariant": lambda: induced(family_net("philosophers-3"), BOTH_EAT),
+    "traps": lambda: induced(TRAPPED, parse_formula("not a and not b and not c")),
+    "markings": lambda: certified(catalogue_net(_ROBOT), Claim(ClaimKind.NEVER, Deadlock())),
+    "distances": lambda: certified(catalogue_net(_ROBOT), Claim(ClaimKind.ALWAYS_POSSIBLE, Start())),
+    "sequence": lambda: induced(family_net("philosophers-3"), Deadlock()),
+    "labels": lambda: certified(family_net("philosophers-2"), _ctl(f"AG EF deadlock and AF ({_END})")),
+    "diagram": lambda: on_diagram(family_net("philosophers-3"), Claim(ClaimKind.NEVER, BOTH_EAT)),
+    "back": lambda: on_diagram(family_net("token_ring-3"), Claim(ClaimKind.ALWAYS_POSSIBLE, Start())),
+    "rounds": lambda: on_diagram(ENDING, _ctl("AF b")),
+    "root": lambda: on_diagram(CHOICE, _ctl("EG not c")),
+    "continuation": lambda: certified(family_net("philosophers-3"), Claim(ClaimKind.LOST, Start())),
+    "fires": lambda: _invented(
+        TURNS, Claim(ClaimKind.FIRES, Holds("b"), fires=("go", "tock")), "tick tock tick go tock"
+    ),
+    "weak": lambda: certified(TURNS, _leads(Fairness.WEAK)),
+    "strong": lambda: certified(SOMETIMES, _leads(Fairness.STRONG)),
+    "unanswered": lambda: _invented(
+        SOMETIMES, _leads(Fairness.WEAK, ClaimKind.NOT_LEADS_TO), "tick now again", "tock tick"
+    ),
+    "unfolded": lambda: certified(TURNS, Claim(ClaimKind.LTL, parse_temporal("G (fires(go) -> X done)"))),
+    "lasso": lambda: _invented(TURNS, Claim(ClaimKind.NOT_LTL, parse_temporal("G F done")), "tick", "tock tick"),
+    "marked graph": lambda: _theorem(CIRCUIT, Claim(ClaimKind.LIVE)),
+    "free choice": lambda: _theorem(CHOICE, Claim(ClaimKind.ALWAYS_POSSIBLE, Start())),
+}
+"""The evidence of each kind, true and shown."""
