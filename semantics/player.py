@@ -58,30 +58,6 @@ class Player:
         """The transitions that are firable and that some valuation opens: the firings of analysis, gates free."""
         return tuple(t for t in self.firable(marking) if self.net.transitions[t].openable)
 
-    @cached_property
-    def _at(self) -> tuple[tuple[int, ...], ...]:
-        """For each place, the transitions joined to it by an arc or an internal gate."""
-        found: list[set[int]] = [set() for _ in self.net.places]
-        for t, transition in enumerate(self.net.transitions):
-            joined = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
-            for place in joined:
-                found[self.net.place_index[place]].add(t)
-        return tuple(tuple(sorted(transitions)) for transitions in found)
-
-    def may_fire_next(self, marking: Marking, may_fire: Iterable[int], after: Marking) -> FiringSet:
-        """`may_fire(after)`, where `may_fire` could fire at `marking`: only what changed is looked at again.
-
-        So a run costs what its firings touch, and not the number of transitions for each.
-        """
-        changed, again = marking ^ after, set[int]()
-        while changed:
-            bit = changed & -changed
-            again.update(self._at[bit.bit_length() - 1])
-            changed ^= bit
-        holds = holds_in(after)
-        found = {t for t in again if self.net.transitions[t].openable and firable(BOOL, self.net, t, holds)}
-        return tuple(sorted(found | (set(may_fire) - again)))
-
     def enabled(self, marking: Marking, signals: Mapping[str, bool]) -> FiringSet:
         """The transitions that are firable and whose gates are open; a signal that is not given is 0."""
         holds = holds_in(marking)

@@ -109,7 +109,8 @@ class Behaviour(Generic[S]):
     def dead(self) -> tuple[str, ...]:
         """The transitions that never fire."""
         self.space.require_complete()
-        return tuple(t.name for i, t in enumerate(self.space.net.transitions) if i not in self.fired)
+        fired = frozenset(self.fired)
+        return tuple(t.name for i, t in enumerate(self.space.net.transitions) if i not in fired)
 
     @cached_property
     def _live(self) -> Sequence[bool]:
@@ -218,7 +219,8 @@ def all_live(behaviour: Behaviour[Any]) -> Verdict:
         if not nonlive:
             return yes()
         # One is shown, as each costs a closure; a dead one only where there is no other, since it has its own verdict.
-        name = next((name for name in nonlive if name not in behaviour.dead), nonlive[0])
+        dead = frozenset(behaviour.dead)
+        name = next((name for name in nonlive if name not in dead), nonlive[0])
         again = space.backward(space.may_fire(space.net.transition_index[name]))
         witness = space.witness(space.algebra.negation(again), f"{name} can never fire after this")
         if witness is None:

@@ -227,10 +227,7 @@ class _Walk:
 
     def fire(self, t: int, enabled: Column) -> None:
         """Go on to an edge inside the component that fires a transition, and take it."""
-        sources = np.zeros_like(self.within)
-        for index in indexes(enabled):
-            sources[index] = any(t in fired and self.within[target] for fired, target in self.graph.successors(index))
-        self.go(sources)
+        self.go(enabled & self.graph.before(self.within, [t]))
         self.step(t)
 
     def step(self, t: int | None = None) -> None:

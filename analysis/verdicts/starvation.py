@@ -21,11 +21,13 @@ from firable.analysis.question import Answer, Question, no, unknown, yes
 from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.analysis.verdicts.behaviour import Behaviour
-from firable.nets.net import Net
+from firable.nets.net import Marking, Net
 from firable.nets.verdict import Verdict, Weight, Witness
+from firable.semantics.algebra import BOOL
 from firable.semantics.arbitration import Arbitration
 from firable.semantics.conflict import jointly_openable
-from firable.semantics.player import FiringSet, Player
+from firable.semantics.firing import firable
+from firable.semantics.player import FiringSet, Player, holds_in
 from firable.semantics.trace import Discipline
 
 STARVATION: Final = Question(
@@ -78,20 +80,72 @@ def eager_run(net: Net, *, steps_max: int = STEPS_MAX, deadline: Deadline = NEVE
     marking, turns = net.initial_marking, arbitration.first_turns
     seen = {(marking, turns): 0}
     fired: list[tuple[str, ...]] = []
-    enabled = player.may_fire(marking)
+    running = Enabled(net, marking)
+    enabled = tuple(sorted(running.transitions))
     while len(fired) < steps_max and not deadline.over:
         if not enabled:
             return EagerRun(tuple(fired), ())
         if not jointly_openable(net, enabled):
             raise GatesCannotBeOpenError("transitions that are firable together want a signal both 1 and 0")
         step, turns = arbitration.decide(enabled, turns)
-        after = player.fire(marking, step)
-        enabled = player.may_fire_next(marking, enabled, after)
-        marking = after
+        marking = player.fire(marking, step)
+        enabled = running.after(marking)
         fired.append(tuple(net.transitions[t].name for t in step))
         if (start := seen.setdefault((marking, turns), len(fired))) < len(fired):
             return EagerRun(tuple(fired[:start]), tuple(fired[start:]))
     return EagerRun(tuple(fired), (), complete=False)
+
+
+class Enabled:
+    """Which transitions may fire in the course of a run, external gates free.
+
+    Of a transition that may not, one place is watched that keeps it from firing, and until that place changes nothing
+    is asked again: the one that changed least so far. So a run costs what happens in it, and not the number of
+    transitions, nor that of their arcs, for each firing.
+    """
+
+    def __init__(self, net: Net, marking: Marking) -> None:
+        self.net, self.marking = net, marking
+        self.transitions: set[int] = set()
+        self.at: list[list[int]] = [[] for _ in net.places]
+        self.watched: list[set[int]] = [set() for _ in net.places]
+        self.changes = [0] * len(net.places)
+        for t, transition in enumerate(net.transitions):
+            joined = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
+            for place in {net.place_index[name] for name in joined}:
+                self.at[place].append(t)
+            if transition.openable:
+                self._look(t)
+
+    def after(self, marking: Marking) -> FiringSet:
+        """What may fire in the next marking of the run."""
+        changed, again = self.marking ^ marking, set[int]()
+        self.marking = marking
+        while changed:
+            bit = changed & -changed
+            changed ^= bit
+            place = bit.bit_length() - 1
+            self.changes[place] += 1
+            again |= self.watched[place]
+            self.watched[place].clear()
+            again.update(t for t in self.at[place] if t in self.transitions)
+        for t in again:
+            self._look(t)
+        return tuple(sorted(self.transitions))
+
+    def _look(self, t: int) -> None:
+        if firable(BOOL, self.net, t, holds_in(self.marking)):
+            self.transitions.add(t)
+            return
+        self.transitions.discard(t)
+        of = self.net.masks[t]
+        wrong = ((of.inputs | of.permissive) & ~self.marking) | ((of.outputs | of.inhibitive) & self.marking)
+        places = []
+        while wrong:
+            bit = wrong & -wrong
+            wrong ^= bit
+            places.append(bit.bit_length() - 1)
+        self.watched[min(places, key=lambda place: self.changes[place])].add(t)
 
 
 def scan(net: Net, valuations: Iterable[Mapping[str, bool]]) -> tuple[tuple[str, ...], ...]:

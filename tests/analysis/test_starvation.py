@@ -5,12 +5,13 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.dense_nets import dense_nets
 from support.examples import examples
 from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
 from firable.analysis.spaces.reachability import Budget, explore
-from firable.analysis.verdicts.starvation import EagerRun, GatesCannotBeOpenError, eager_run, starved
+from firable.analysis.verdicts.starvation import EagerRun, Enabled, GatesCannotBeOpenError, eager_run, starved
 from firable.nets.net import Arbiter, ArbitrationRule, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.verdict import Status
 from firable.semantics.conflict import jointly_openable
@@ -116,3 +117,12 @@ def test_the_witness_of_starvation_is_a_run_of_the_graph_that_recurs_without_the
     assert not fired & set(verdict.subjects)
     if discipline is Discipline.INTERLEAVING:
         assert all(len(step) == 1 for step in (*verdict.witness.firings, *verdict.witness.cycle))
+
+
+@given(dense_nets(signals=True), st.lists(st.integers(0, 31), min_size=1, max_size=8))
+def test_what_is_enabled_in_the_course_of_a_run_is_what_may_fire(net: Net, markings: list[int]) -> None:
+    player, first = Player(net), markings[0]
+    running = Enabled(net, first)
+    assert running.transitions == set(player.may_fire(first))
+    for marking in markings[1:]:
+        assert running.after(marking) == player.may_fire(marking)

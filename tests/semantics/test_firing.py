@@ -174,9 +174,3 @@ def test_a_step_is_recognised_among_many_signals() -> None:
     assert player.is_step(net.initial_marking, (1, 5, n))
     assert not player.is_step(net.initial_marking, (1, 5))  # `free` could fire too
     assert not player.is_step(net.initial_marking, (0, n))  # they share p0
-
-
-@given(dense_nets(signals=True), st.integers(0, 31), st.integers(0, 31))
-def test_what_may_fire_next_is_what_may_fire(net: Net, marking: int, after: int) -> None:
-    player = Player(net)
-    assert player.may_fire_next(marking, player.may_fire(marking), after) == player.may_fire(after)
