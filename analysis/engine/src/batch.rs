@@ -1,12 +1,13 @@
 //! Up to 64 markings taken together as bit slices, one word for each place: the unit in which everything fires.
 
 use crate::marking::{Width, linear_hash, slice};
+use crate::span::Span;
 
 /// Up to 64 markings, sliced.
 pub struct Batch {
     /// The markings, end to end.
     pub markings: Vec<u64>,
-    /// Their linear hashes.
+    /// What is linear over exclusive or and stands for each: its hash (`cut`) or its key (`cut_by`).
     pub hashes: [u64; 64],
     /// Bit `j` of slice `p` says whether marking `j` holds place `p`.
     pub slices: Vec<u64>,
@@ -31,12 +32,23 @@ impl Batch {
     /// Slices the markings that stand end to end in `self.markings`.
     #[inline(always)]
     pub fn cut<W: Width>(&mut self, width: W) {
-        let words = width.words();
-        self.count = self.markings.len() / words;
-        self.valid = if self.count == 64 { !0 } else { (1 << self.count) - 1 };
-        for (hash, marking) in self.hashes.iter_mut().zip(self.markings.chunks_exact(words)) {
+        self.slice(width);
+        for (hash, marking) in self.hashes.iter_mut().zip(self.markings.chunks_exact(width.words())) {
             *hash = linear_hash(width, marking);
         }
+    }
+
+    /// The same, with the keys of a span for hashes.
+    #[inline(always)]
+    pub fn cut_by<W: Width>(&mut self, width: W, span: &Span) {
+        self.slice(width);
+        span.keys(&self.slices, &mut self.hashes);
+    }
+
+    #[inline(always)]
+    fn slice<W: Width>(&mut self, width: W) {
+        self.count = self.markings.len() / width.words();
+        self.valid = if self.count == 64 { !0 } else { (1 << self.count) - 1 };
         slice(width, &self.markings, &mut self.slices);
     }
 }

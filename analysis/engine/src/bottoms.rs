@@ -58,7 +58,7 @@ impl Bottoms {
         let memory = space.memory.clone();
         let mut tops = memory.filled(0u32, space.len())?;
         with_width!(space.net.words, width => {
-            let mut fan = Fan::forward(space);
+            let mut fan = Fan::forward(space, watch)?;
             let stuck = descend(width, space, &mut fan, &mut tops, &memory, watch)?;
             let left = join(width, space, &mut fan, &mut tops, stuck, watch)?;
             if left.is_empty() {

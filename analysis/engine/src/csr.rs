@@ -3,11 +3,15 @@
 //! They are stored only where a question walks over them again and again, 4 bytes an edge and 8 a marking within the
 //! memory budget: for the components, and to turn the edges of steps round.
 
+use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
 use crate::edges::Edges;
+use crate::exact::ROOM;
 use crate::explore::Space;
 use crate::fan::Fan;
-use crate::marking::Width;
+use crate::marking::{Width, transpose};
+use crate::span::Span;
+use crate::table::NONE;
 use crate::with_width;
 
 /// Successors as compressed rows.
@@ -50,6 +54,11 @@ impl Csr {
             for index in 0..count {
                 offsets[index + 1] += offsets[index];
             }
+        } else if let (Some(span), None, None) = (space.set.span(), within, space.stop) {
+            space.index(watch)?;
+            with_width!(space.net.words, width => {
+                fill_by_key(width, space, span, &mut offsets, &mut targets, watch)
+            })?;
         } else {
             with_width!(space.net.words, width => {
                 fill(width, space, within, &mut offsets, &mut targets, memory, watch)
@@ -88,6 +97,58 @@ impl Csr {
     }
 }
 
+/// All rows of a whole graph under interleaving, where markings have keys. What fires at 64 markings is turned, so that
+/// edges come row by row and a key is all that is kept of one until its target is known.
+fn fill_by_key<W: Width>(
+    width: W,
+    space: &Space,
+    span: &Span,
+    offsets: &mut [u64],
+    targets: &mut Vec<u32>,
+    watch: &mut Watch<'_>,
+) -> Result<(), Stop> {
+    let (count, net) = (space.len(), &space.net);
+    let mut batch = Batch::new(width.words());
+    let mut fires = vec![[0_u64; 64]; net.transitions.len().div_ceil(64)];
+    let (mut keys, mut waiting, mut found) = ([0; ROOM], 0, [NONE; ROOM]);
+    let mut look = |keys: &[u64]| targets.extend_from_slice(space.set.find(keys, &mut found).unwrap_or_default());
+    let mut edges = 0;
+    for first in (0..count).step_by(64) {
+        let end = count.min(first + 64);
+        batch.markings.clear();
+        space.table.store.copy_range(first, end, &mut batch.markings);
+        batch.cut_by(width, span);
+        for (block, fires) in fires.iter_mut().enumerate() {
+            let transitions = 64 * block..net.transitions.len().min(64 * block + 64);
+            fires.fill(0);
+            for (fires, t) in fires.iter_mut().zip(transitions) {
+                let (base, blocked) = net.forward.test(t, &batch.slices, batch.valid);
+                *fires = base & !blocked & net.forward.edge(t);
+            }
+            transpose(fires);
+        }
+        for (j, offset) in (0..64).zip(&mut offsets[first + 1..=end]) {
+            for (fires, flips) in fires.iter().zip(span.flips.chunks(64)) {
+                let mut rest = fires[j];
+                edges += u64::from(rest.count_ones());
+                while rest != 0 {
+                    keys[waiting % ROOM] = batch.hashes[j] ^ flips[rest.trailing_zeros() as usize];
+                    rest &= rest - 1;
+                    waiting += 1;
+                    if waiting == ROOM {
+                        look(&keys);
+                        waiting = 0;
+                    }
+                }
+            }
+            *offset = edges;
+        }
+        watch.tick(64 + (edges - offsets[first]) as usize + net.transitions.len())?;
+    }
+    look(&keys[..waiting]);
+    Ok(())
+}
+
 /// The rows under interleaving. Edges come one transition after the other for 64 markings; each is put where the row of its
 /// marking stands, so that rows keep the order of the transitions.
 fn fill<W: Width>(
@@ -101,7 +162,7 @@ fn fill<W: Width>(
 ) -> Result<(), Stop> {
     let count = space.len();
     let transitions = space.net.transitions.len();
-    let mut fan = Fan::forward(space);
+    let mut fan = Fan::forward(space, watch)?;
     let mut kept: Vec<(u8, u32)> = Vec::new();
     for first in (0..count).step_by(64) {
         let end = count.min(first + 64);

@@ -68,7 +68,7 @@ impl<'a> Edges<'a> {
         for &source in sources {
             batch.markings.extend_from_slice(space.marking(source as usize));
         }
-        with_width!(space.net.words, width => batch.cut(width));
+        with_width!(space.net.words, width => space.cut(width, batch));
         self.firable.iter_mut().for_each(Vec::clear);
         for t in 0..space.net.transitions.len() {
             let (base, blocked) = space.net.forward.test(t, &batch.slices, batch.valid);
@@ -86,7 +86,8 @@ impl<'a> Edges<'a> {
     }
 
     /// Visits the edges of up to 64 markings in their order, those of one marking in the order of the transitions
-    /// (interleaving) or of the choices (step). Targets that were not found, of an incomplete graph, are left out.
+    /// (interleaving) or of the choices (step). Targets that were not found, of an incomplete graph, are left out. Whoever
+    /// visits many calls `Space::index` before.
     pub fn visit(
         &mut self,
         sources: &[u32],
@@ -129,8 +130,8 @@ impl<'a> Edges<'a> {
                         for k in 0..words {
                             after[k] = marking[k] ^ flip[k];
                         }
-                        let hash = hash ^ space.net.flip_hashes[t as usize];
-                        if let Some(target) = space.table.find(width, &after, hash) {
+                        let hash = hash ^ space.flip_hash(t as usize);
+                        if let Some(target) = space.find_told(width, &after, hash) {
                             visit(source, Fired::One(t), target)?;
                         }
                     }

@@ -17,10 +17,11 @@ use std::time::{Duration, Instant};
 
 use crate::batch::Batch;
 use crate::budget::{Found, Memory, Stop, Watch};
+use crate::known::{Arrivals, ByKey, Hashed, Set};
 use crate::marking::{Dynamic, Width, holds, linear_hash};
 use crate::net::{Net, Rules};
 use crate::step::{Components, Factor, Steps};
-use crate::table::{Candidates, NONE, Table};
+use crate::table::{NONE, Table};
 use crate::with_width;
 
 /// The discipline and the budgets of an exploration.
@@ -43,8 +44,10 @@ pub struct Space {
     pub net: Arc<Net>,
     /// Whether edges are synchronous steps.
     pub step: bool,
-    /// The markings and their index.
+    /// The markings, and under steps their index.
     pub table: Table,
+    /// What tells a known marking.
+    pub set: Set,
     /// The index at which each level begins.
     pub levels: Vec<u32>,
     /// Edges that each transition takes part in.
@@ -79,8 +82,10 @@ impl Space {
         memory.claim(net.bytes() + count * (8 + 8 + 4 + 4))?;
         let table = Table::new(net.words, &memory)?;
         let components = Components::new(&net);
+        let set = if limits.step { Set::Hashed } else { Set::new(&net, &memory) };
         let mut space = Space {
             step: limits.step,
+            set,
             table,
             levels: Vec::new(),
             fired: vec![0; count],
@@ -114,11 +119,6 @@ impl Space {
     }
 
     fn run<W: Width>(&mut self, width: W, max: usize, watch: &mut Watch<'_>) -> Result<(), Stop> {
-        let initial = self.net.initial.clone();
-        self.table.insert(width, &initial, linear_hash(width, &initial), max, &self.memory)?;
-        if self.step {
-            self.memory.push(&mut self.parents, NONE)?;
-        }
         self.memory.push(&mut self.levels, 0)?;
         let net = Arc::clone(&self.net);
         if self.step {
@@ -128,7 +128,15 @@ impl Space {
             steps.forget(&self.memory);
             result
         } else {
-            self.run_interleaving(width, &net, max, watch)
+            // Apart from the rest while it grows.
+            let mut set = std::mem::replace(&mut self.set, Set::Hashed);
+            let result = match &mut set {
+                Set::Hashed => self.run_interleaving(width, &net, &mut Hashed::new(net.words), max, watch),
+                Set::Narrow(keyed) => self.run_interleaving(width, &net, &mut ByKey::new(keyed), max, watch),
+                Set::Wide(keyed) => self.run_interleaving(width, &net, &mut ByKey::new(keyed), max, watch),
+            };
+            self.set = set;
+            result
         }
     }
 
@@ -148,18 +156,19 @@ impl Space {
         &mut self,
         width: W,
         net: &Net,
+        arrivals: &mut impl Arrivals<W>,
         max: usize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
-        let words = width.words();
-        let mut batch = Batch::new(words);
-        let mut candidates = Candidates::new(words);
+        let mut batch = Batch::new(width.words());
+        batch.markings.extend_from_slice(&net.initial);
+        arrivals.first(width, &mut batch, (&mut self.table, max, &self.memory))?;
         let (mut next, mut end) = (0, 1);
         while self.level_end(next, &mut end)? {
             let stop = end.min(next + 64);
             batch.markings.clear();
             self.table.store.copy_range(next, stop, &mut batch.markings);
-            batch.cut(width);
+            arrivals.cut(width, &mut batch);
             let mut alive = 0;
             let before = self.edges;
             for t in 0..net.transitions.len() {
@@ -178,15 +187,10 @@ impl Space {
                 let edges = u64::from(fire.count_ones());
                 self.fired[t] += edges;
                 self.edges += edges;
-                if candidates.push(width, &batch, fire, net.flip(t, words), net.flip_hashes[t]) {
-                    self.table.insert_batch(width, &mut candidates, max, &self.memory)?;
-                }
+                arrivals.push(width, net, &batch, t, fire, (&mut self.table, max, &self.memory))?;
             }
             self.note_deadlocks(next, batch.valid & !alive)?;
-            // What is left waits for the next batch; only a level must be whole before it is taken up.
-            if stop == end {
-                self.table.insert_batch(width, &mut candidates, max, &self.memory)?;
-            }
+            arrivals.end(width, net, &batch, stop == end, (&mut self.table, max, &self.memory))?;
             watch.found = Found { markings: self.table.store.len() as u64, edges: self.edges };
             watch.tick((stop - next) + (self.edges - before) as usize + net.transitions.len())?;
             next = stop;
@@ -203,6 +207,9 @@ impl Space {
         watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
         let words = width.words();
+        let initial = &net.initial;
+        self.table.insert(width, initial, linear_hash(width, initial), max, &self.memory)?;
+        self.memory.push(&mut self.parents, NONE)?;
         let mut batch = Batch::new(words);
         let mut firable: Vec<Vec<u32>> = vec![Vec::new(); 64];
         let (mut next, mut end) = (0, 1);
@@ -274,11 +281,6 @@ impl Space {
             dead &= dead - 1;
         }
         Ok(())
-    }
-
-    /// The index of a marking, if it was found.
-    pub fn find(&self, marking: &[u64]) -> Option<u32> {
-        with_width!(self.net.words, width => self.table.find(width, marking, linear_hash(width, marking)))
     }
 
     /// The marking of an index.

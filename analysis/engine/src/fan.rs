@@ -7,6 +7,8 @@
 //! are read back, and cost more than the markings.
 
 use crate::batch::Batch;
+use crate::budget::{Stop, Watch};
+use crate::exact::ROOM;
 use crate::explore::Space;
 use crate::marking::Width;
 use crate::net::Rules;
@@ -17,33 +19,41 @@ pub struct Fan<'a> {
     space: &'a Space,
     rules: &'a Rules,
     batch: Batch,
+    /// What the table is asked for, where markings are hashed.
     candidates: Candidates,
+    /// The same where they have keys.
+    keys: Vec<u64>,
     /// For each candidate, the marking of the batch and the transition.
     edges: Vec<(u8, u32)>,
     found: Vec<u32>,
+    /// The same, where they have keys.
+    by_key: Box<[u32; ROOM]>,
 }
 
 impl<'a> Fan<'a> {
     /// Goes along the edges.
-    pub fn forward(space: &'a Space) -> Self {
-        Fan::new(space, &space.net.forward)
+    pub fn forward(space: &'a Space, watch: &mut Watch<'_>) -> Result<Self, Stop> {
+        Fan::new(space, &space.net.forward, watch)
     }
 
     /// Goes against the edges.
-    pub fn backward(space: &'a Space) -> Self {
-        Fan::new(space, &space.net.backward)
+    pub fn backward(space: &'a Space, watch: &mut Watch<'_>) -> Result<Self, Stop> {
+        Fan::new(space, &space.net.backward, watch)
     }
 
-    fn new(space: &'a Space, rules: &'a Rules) -> Self {
+    fn new(space: &'a Space, rules: &'a Rules, watch: &mut Watch<'_>) -> Result<Self, Stop> {
         debug_assert!(!space.step);
-        Fan {
+        space.index(watch)?;
+        Ok(Fan {
             space,
             rules,
             batch: Batch::new(space.net.words),
             candidates: Candidates::new(space.net.words),
+            keys: Vec::new(),
             edges: Vec::new(),
             found: Vec::new(),
-        }
+            by_key: Box::new([NONE; ROOM]),
+        })
     }
 
     /// Loads up to 64 markings.
@@ -53,7 +63,7 @@ impl<'a> Fan<'a> {
         for &index in markings {
             self.batch.markings.extend_from_slice(self.space.table.store.get(width, index as usize));
         }
-        self.batch.cut(width);
+        self.space.cut(width, &mut self.batch);
     }
 
     /// Loads up to 64 markings that follow each other.
@@ -61,7 +71,7 @@ impl<'a> Fan<'a> {
     pub fn load_range<W: Width>(&mut self, width: W, first: usize, end: usize) {
         self.batch.markings.clear();
         self.space.table.store.copy_range(first, end, &mut self.batch.markings);
-        self.batch.cut(width);
+        self.space.cut(width, &mut self.batch);
     }
 
     /// Calls `visit` with the marking (of the batch), the transition and the neighbour of each edge, one transition
@@ -88,10 +98,23 @@ impl<'a> Fan<'a> {
             if fire == 0 {
                 continue;
             }
-            self.candidates.push(width, &self.batch, fire, net.flip(t, words), net.flip_hashes[t]);
-            while fire != 0 {
-                self.edges.push((fire.trailing_zeros() as u8, t as u32));
-                fire &= fire - 1;
+            match self.space.set.span() {
+                None => {
+                    self.candidates.push(width, &self.batch, fire, net.flip(t, words), net.flip_hashes[t]);
+                    while fire != 0 {
+                        self.edges.push((fire.trailing_zeros() as u8, t as u32));
+                        fire &= fire - 1;
+                    }
+                }
+                Some(span) => {
+                    let flip = span.flips[t];
+                    while fire != 0 {
+                        let j = fire.trailing_zeros();
+                        self.keys.push(self.batch.hashes[j as usize] ^ flip);
+                        self.edges.push((j as u8, t as u32));
+                        fire &= fire - 1;
+                    }
+                }
             }
             if self.edges.len() >= 64 {
                 pending &= !self.ask(width, visit);
@@ -103,14 +126,21 @@ impl<'a> Fan<'a> {
     /// Looks the candidates up and visits those that are markings; returns what is done with.
     #[inline(always)]
     fn ask<W: Width>(&mut self, width: W, visit: &mut impl FnMut(usize, u32, u32) -> bool) -> u64 {
-        self.space.table.find_batch(width, &mut self.candidates, &mut self.found);
+        let found = match self.space.set.find(&self.keys, &mut self.by_key) {
+            Some(found) => found,
+            None => {
+                self.space.table.find_batch(width, &mut self.candidates, &mut self.found);
+                self.found.as_slice()
+            }
+        };
         let mut done = 0;
-        for (&(j, t), &found) in self.edges.iter().zip(&self.found) {
+        for (&(j, t), &found) in self.edges.iter().zip(found) {
             if found != NONE && visit(usize::from(j), t, found) {
                 done |= 1 << j;
             }
         }
         self.edges.clear();
+        self.keys.clear();
         done
     }
 

@@ -48,7 +48,7 @@ pub fn backward(space: &Space, targets: &[u8], within: Option<&[u8]>, watch: &mu
         }
     } else {
         let transitions = space.net.transitions.len();
-        let mut fan = Fan::backward(space);
+        let mut fan = Fan::backward(space, watch)?;
         with_width!(space.net.words, width => {
             while agenda.take(&mut taken) {
                 let mut edges = 0;
@@ -113,7 +113,7 @@ fn into_few<W: Width>(
     found: &mut [u8],
     watch: &mut Watch<'_>,
 ) -> Result<(), Stop> {
-    let mut fan = Fan::backward(space);
+    let mut fan = Fan::backward(space, watch)?;
     let mut batch = Vec::with_capacity(64);
     let mut all = (0..space.len() as u32).filter(|&index| targets[index as usize] != 0);
     loop {
@@ -139,7 +139,7 @@ fn into_many<W: Width>(
     found: &mut [u8],
     watch: &mut Watch<'_>,
 ) -> Result<(), Stop> {
-    let mut fan = Fan::forward(space);
+    let mut fan = Fan::forward(space, watch)?;
     let mut wins = vec![0u32; space.net.transitions.len()];
     for (round, first) in (0..space.len()).step_by(64).enumerate() {
         fan.load_range(width, first, space.len().min(first + 64));
@@ -206,7 +206,7 @@ pub fn endless(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> R
     }
     let transitions = space.net.transitions.len();
     with_width!(space.net.words, width => {
-        let mut fan = Fan::forward(space);
+        let mut fan = Fan::forward(space, watch)?;
         for first in (0..count).step_by(64) {
             let end = count.min(first + 64);
             fan.load_range(width, first, end);
@@ -222,7 +222,7 @@ pub fn endless(space: &Space, within: Option<&[u8]>, watch: &mut Watch<'_>) -> R
             watch.tick(64 + 2 * transitions)?;
         }
         begin(&mut inside, &stay, &mut agenda);
-        let mut fan = Fan::backward(space);
+        let mut fan = Fan::backward(space, watch)?;
         while agenda.take(&mut taken) {
             fan.load(width, &taken);
             fan.each(width, !0, 0..transitions, &mut |_, _, source| {

@@ -20,11 +20,15 @@ pub mod csr;
 #[forbid(unsafe_code)]
 pub mod edges;
 #[forbid(unsafe_code)]
+pub mod exact;
+#[forbid(unsafe_code)]
 pub mod explore;
 #[forbid(unsafe_code)]
 pub mod fan;
 #[forbid(unsafe_code)]
 pub mod fixpoints;
+#[forbid(unsafe_code)]
+pub mod known;
 #[forbid(unsafe_code)]
 pub mod marking;
 #[forbid(unsafe_code)]
@@ -37,6 +41,10 @@ pub mod region;
 pub(crate) mod samples;
 #[forbid(unsafe_code)]
 pub mod scc;
+#[forbid(unsafe_code)]
+pub mod seat;
+#[forbid(unsafe_code)]
+pub mod span;
 #[forbid(unsafe_code)]
 pub mod step;
 #[forbid(unsafe_code)]

@@ -125,18 +125,25 @@ pub fn mix(hash: u64) -> u64 {
 /// (Warren, "Hacker's Delight", 7-3).
 #[inline]
 pub fn transpose(rows: &mut [u64; 64]) {
-    let mut distance = 32;
-    let mut mask = 0x0000_0000_ffff_ffff_u64;
-    while distance != 0 {
-        let mut row = 0;
-        while row < 64 {
-            let moved = ((rows[row] >> distance) ^ rows[row | distance]) & mask;
-            rows[row] ^= moved << distance;
-            rows[row | distance] ^= moved;
-            row = ((row | distance) + 1) & !distance;
+    swap_blocks::<32>(rows, 0x0000_0000_ffff_ffff);
+    swap_blocks::<16>(rows, 0x0000_ffff_0000_ffff);
+    swap_blocks::<8>(rows, 0x00ff_00ff_00ff_00ff);
+    swap_blocks::<4>(rows, 0x0f0f_0f0f_0f0f_0f0f);
+    swap_blocks::<2>(rows, 0x3333_3333_3333_3333);
+    swap_blocks::<1>(rows, 0x5555_5555_5555_5555);
+}
+
+/// Swaps, in each block of two times `D` rows, the high columns of the upper half with the low ones of the lower. The
+/// shape of the loops is one that compilers make vector instructions of.
+#[inline(always)]
+fn swap_blocks<const D: usize>(rows: &mut [u64; 64], mask: u64) {
+    for block in rows.chunks_exact_mut(2 * D) {
+        let (upper, lower) = block.split_at_mut(D);
+        for (a, b) in upper.iter_mut().zip(lower) {
+            let moved = ((*a >> D) ^ *b) & mask;
+            *a ^= moved << D;
+            *b ^= moved;
         }
-        distance >>= 1;
-        mask ^= mask << distance;
     }
 }
 

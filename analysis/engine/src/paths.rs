@@ -17,6 +17,12 @@ pub type Sequence = Vec<Vec<u32>>;
 
 /// The fired set of some edge between two markings, the first in the order of edges.
 fn fired_between(space: &Space, from: u32, to: u32, memory: &Memory, watch: &mut Watch<'_>) -> Result<Vec<u32>, Stop> {
+    if !space.step {
+        let (words, before, after) = (space.net.words, space.marking(from as usize), space.marking(to as usize));
+        let leads = |t: u32| (0..words).all(|k| before[k] ^ space.net.flip(t as usize, words)[k] == after[k]);
+        let fired = space.enabled_by(&space.net.forward, before).into_iter().find(|&t| leads(t));
+        return Ok(fired.into_iter().collect());
+    }
     let mut edges = Edges::new(space);
     let mut found = None;
     edges.visit(&[from], memory, watch, &mut |_, fired, target| {
@@ -37,33 +43,35 @@ fn sequence(space: &Space, path: &[u32], memory: &Memory, watch: &mut Watch<'_>)
 /// A shortest firing sequence from M0.
 pub fn path_to(space: &Space, index: u32, watch: &mut Watch<'_>) -> Result<Sequence, Stop> {
     let memory = Memory::new(WITNESS_BYTES);
+    let indexed = space.step || space.index(watch).is_ok();
     let mut path = vec![index];
     let mut at = index;
     while at != 0 {
-        at = if space.step { space.parents[at as usize] } else { predecessor(space, at) };
+        at = if space.step { space.parents[at as usize] } else { predecessor(space, at, indexed) };
         path.push(at);
     }
     path.reverse();
     sequence(space, &path, &memory, watch)
 }
 
-/// The lowest predecessor: markings are numbered level by level, so it stands on the level before.
-fn predecessor(space: &Space, index: u32) -> u32 {
+/// The lowest predecessor: markings are numbered level by level, so it stands on the level before. Where there was no
+/// memory to index markings, that level is searched through; a whole path then reads each marking once.
+fn predecessor(space: &Space, index: u32, indexed: bool) -> u32 {
     let words = space.net.words;
     let marking = space.marking(index as usize);
-    let mut before = vec![0; words];
-    let mut best = NONE;
-    for t in space.enabled_by(&space.net.backward, marking) {
-        let flip = space.net.flip(t as usize, words);
-        for k in 0..words {
-            before[k] = marking[k] ^ flip[k];
-        }
-        if let Some(found) = space.find(&before) {
-            best = best.min(found);
-        }
-    }
-    assert!(best < index, "a marking other than M0 was found by a firing");
-    best
+    let flipped = |t: u32| -> Vec<u64> {
+        marking.iter().zip(space.net.flip(t as usize, words)).map(|(word, flip)| word ^ flip).collect()
+    };
+    let sources: Vec<Vec<u64>> = space.enabled_by(&space.net.backward, marking).into_iter().map(flipped).collect();
+    let best = if indexed {
+        sources.iter().filter_map(|source| space.find(source)).min()
+    } else {
+        let level = space.levels.partition_point(|&first| first <= index);
+        // What was found last, of a level that was not taken up, seems to stand on the level before its own.
+        let start = space.levels[level.saturating_sub(2)];
+        (start..index).find(|&before| sources.iter().any(|source| source == space.marking(before as usize)))
+    };
+    best.filter(|&best| best < index).expect("a marking other than M0 was found by a firing")
 }
 
 /// A shortest sequence from a marking to one of `targets` (one byte for each marking), and the index reached; every
@@ -75,6 +83,7 @@ pub fn path_between(
     within: Option<&[u8]>,
     watch: &mut Watch<'_>,
 ) -> Result<Option<(Sequence, u32)>, Stop> {
+    space.index(watch)?;
     let memory = space.memory.clone();
     if targets[from as usize] != 0 {
         return Ok(Some((Vec::new(), from)));
@@ -139,6 +148,7 @@ mod tests {
             let mut watch = Watch::new(None, &mut poll);
             let dead = space.deadlocks[0];
             assert_eq!(path_to(&space, dead, &mut watch), Ok(vec![vec![0], vec![3]]));
+            assert_eq!((predecessor(&space, dead, true), predecessor(&space, dead, false)), (1, 1));
             let two = space.find(&[0b100]).expect("reachable");
             let mut targets = vec![0; 4];
             targets[dead as usize] = 1;

@@ -68,6 +68,28 @@ impl Store {
         Ok(())
     }
 
+    /// Appends what a marking becomes by flipping some places.
+    #[inline(always)]
+    pub fn push_flipped<W: Width>(
+        &mut self,
+        width: W,
+        marking: &[u64],
+        flip: &[u64],
+        most: usize,
+        memory: &Memory,
+    ) -> Result<(), Stop> {
+        if self.len == self.claimed {
+            self.make_room(most, memory)?;
+        }
+        let words = width.words();
+        let to = &mut self.region.all_mut()[self.len * words..(self.len + 1) * words];
+        for ((to, from), flip) in to.iter_mut().zip(&marking[..words]).zip(&flip[..words]) {
+            *to = from ^ flip;
+        }
+        self.len += 1;
+        Ok(())
+    }
+
     #[cold]
     fn make_room(&mut self, most: usize, memory: &Memory) -> Result<(), Stop> {
         let marking_bytes = 8 * self.words;

@@ -1,0 +1,390 @@
+//! The set of markings by exact keys: 4 or 8 bytes a slot, no look at a marking to know that it is there.
+//!
+//! A key (`span.rs`) tells the reachable markings apart by so few bits that a table can hold it whole, by *quotienting*
+//! (Knuth, TAOCP 3, exercise 6.4-13; Cleary, "Compact hash tables using bidirectional linear probing", 1984): a bijection
+//! mixes the key, the high part of the product with the number of buckets says where it belongs, and only what is then
+//! missing, the *tag*, is stored there. A slot that compares equal is the marking: a look-up is one cache miss, not one
+//! for the table and one for the array of markings, and half as many instructions. What is found is dropped at once;
+//! only for the rest does anybody ask which marking it was.
+//!
+//! A bucket is eight slots, filled from the first on and compared by vector instructions; at four fifths full, nine keys
+//! of ten stand in the bucket where they belong. The others stand in a following one, and a slot says how far it has
+//! moved (its low bits; 0 is an empty slot), so that its key can still be told. There are 2^k or 3 * 2^k buckets, so
+//! the table grows by a third or by half, never by two, and is never less than half full. Buckets are in the order of
+//! the mixed keys; so growing reads one table and writes the other from end to end, and needs neither the markings nor
+//! their hashes.
+//!
+//! The index of a marking is not needed while exploring. Whoever asks for it afterwards has it put beside the slots,
+//! 4 bytes each (`Indexes`).
+//!
+//! Rejected: tags of 16 bits with a look at the array on a match (two misses an edge again); a slot for each key with
+//! plain linear probing (a third of the look-ups enter a loop, whose exit the processor guesses wrong); a second hash
+//! where a bucket is full (one more miss for one edge in ten; the next bucket is at hand).
+
+use std::hint::black_box;
+
+use crate::budget::{Memory, Stop};
+use crate::region::Region;
+use crate::seat::{LANES, MOVED_BITS, REACH, Shape, Slot};
+
+/// Where a key stands, or where it would.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The number of its slot.
+    Known(usize),
+    /// The number of the slot where it belongs.
+    Free(usize),
+    /// All buckets that would be tried for it are full.
+    Full,
+}
+
+/// Keys that are looked up together; as many as a byte counts.
+pub const ROOM: usize = 256;
+
+/// Keys that are looked up together.
+#[derive(Debug)]
+pub struct Asked<S> {
+    /// How many.
+    pub count: usize,
+    /// The bucket where each belongs, and what would stand there.
+    homes: [u32; ROOM],
+    wanted: [S; ROOM],
+    /// Those not found there.
+    pub open: [u8; ROOM],
+}
+
+impl<S: Slot> Asked<S> {
+    /// None yet.
+    pub fn new() -> Self {
+        Asked { count: 0, homes: [0; ROOM], wanted: [S::new(0); ROOM], open: [0; ROOM] }
+    }
+}
+
+impl<S: Slot> Default for Asked<S> {
+    fn default() -> Self {
+        Asked::new()
+    }
+}
+
+/// A set of keys.
+#[derive(Debug)]
+pub struct Exact<S> {
+    slots: Region<S>,
+    shape: Shape,
+    len: usize,
+}
+
+impl<S: Slot> Exact<S> {
+    /// The bytes that the least table for keys of so many bits takes: the fewer slots, the longer their tags.
+    pub fn least_bytes(bits: u32) -> usize {
+        Self::bytes(Self::least(bits))
+    }
+
+    fn least(bits: u32) -> Shape {
+        Shape::least(bits, 8 * size_of::<S>() as u32 - MOVED_BITS)
+    }
+
+    fn bytes(shape: Shape) -> usize {
+        (shape.buckets as usize + REACH) * LANES * size_of::<S>()
+    }
+
+    /// No keys of so many bits.
+    pub fn new(bits: u32, memory: &Memory) -> Result<Self, Stop> {
+        let shape = Self::least(bits);
+        Ok(Exact { slots: Self::room(shape, memory)?, shape, len: 0 })
+    }
+
+    fn room(shape: Shape, memory: &Memory) -> Result<Region<S>, Stop> {
+        let bytes = Self::bytes(shape);
+        memory.claim(bytes)?;
+        Region::zeroed(bytes / size_of::<S>()).ok_or_else(|| {
+            memory.release(bytes);
+            Stop::Memory
+        })
+    }
+
+    /// How many slots there are.
+    pub fn slots(&self) -> usize {
+        self.slots.all().len()
+    }
+
+    #[inline(always)]
+    fn buckets(&self) -> &[[S; LANES]] {
+        self.slots.all().as_chunks().0
+    }
+
+    /// Takes the key of each bit of `members` among those that are asked for, and notes its number; there must be room.
+    #[inline(always)]
+    pub fn ask(
+        &self,
+        asked: &mut Asked<S>,
+        members: u64,
+        key: impl Fn(usize) -> u64,
+        mut note: impl FnMut(usize, u32),
+    ) {
+        let (shape, mut count, mut rest) = (self.shape, asked.count, members);
+        while rest != 0 {
+            let (c, j) = (count % ROOM, rest.trailing_zeros());
+            rest &= rest - 1;
+            count += 1;
+            let (home, wanted) = shape.seat(shape.mix(key(j as usize)));
+            asked.homes[c] = home as u32;
+            asked.wanted[c] = wanted;
+            note(c, j);
+        }
+        asked.count = count;
+    }
+
+    /// Asks again, in another shape.
+    #[cold]
+    fn ask_again(&self, asked: &mut Asked<S>, before: Shape) {
+        for c in 0..asked.count {
+            let mixed = before.mixed(asked.homes[c] as usize, asked.wanted[c].get());
+            let (home, wanted) = self.shape.seat(mixed);
+            asked.homes[c] = home as u32;
+            asked.wanted[c] = wanted;
+        }
+    }
+
+    /// Reads a word of each bucket that is asked for, so that the cache misses of all of them overlap: there is so little
+    /// between two of these reads that the processor has them all under way.
+    #[inline(always)]
+    fn touch(&self, asked: &Asked<S>) {
+        let buckets = self.buckets();
+        let mut read = 0;
+        for c in 0..asked.count {
+            read ^= buckets[asked.homes[c % ROOM] as usize][0].get();
+        }
+        black_box(read);
+    }
+
+    /// Looks at the one bucket where each key belongs; how many keys were not found there (`open`).
+    #[inline(always)]
+    pub fn first_look(&self, asked: &mut Asked<S>) -> usize {
+        self.touch(asked);
+        let buckets = self.buckets();
+        let mut open = 0;
+        for c in 0..asked.count {
+            let (home, wanted) = (asked.homes[c % ROOM] as usize, asked.wanted[c % ROOM]);
+            asked.open[open % ROOM] = c as u8;
+            open += usize::from(S::matches(&buckets[home], wanted) == 0);
+        }
+        open
+    }
+
+    /// The slot of each of up to `ROOM` keys; the number of slots for a key that is not in the set.
+    #[inline(always)]
+    pub fn find(&self, keys: &[u64], slots: &mut [usize; ROOM]) {
+        let (shape, buckets, none) = (self.shape, self.buckets(), self.slots());
+        let (mut homes, mut wanted) = ([0; ROOM], [S::new(0); ROOM]);
+        let mut read = 0;
+        for ((home, wanted), &key) in homes.iter_mut().zip(&mut wanted).zip(keys) {
+            (*home, *wanted) = shape.seat(shape.mix(key));
+            read ^= buckets[*home][0].get();
+        }
+        black_box(read);
+        for c in 0..keys.len().min(ROOM) {
+            let found = S::matches(&buckets[homes[c]], wanted[c]);
+            slots[c] = homes[c] * LANES + found.trailing_zeros() as usize % LANES;
+            if found == 0 {
+                slots[c] = match self.place_of(homes[c], wanted[c]) {
+                    Place::Known(slot) => slot,
+                    Place::Free(_) | Place::Full => none,
+                };
+            }
+        }
+    }
+
+    /// Where a key that is asked for stands, or where it belongs.
+    fn place_of(&self, home: usize, wanted: S) -> Place {
+        for (moved, bucket) in self.buckets()[home..home + REACH].iter().enumerate() {
+            let found = S::matches(bucket, S::new(wanted.get() + moved as u64));
+            if found != 0 {
+                return Place::Known((home + moved) * LANES + found.trailing_zeros() as usize % LANES);
+            }
+            let free = S::matches(bucket, S::new(0));
+            if free != 0 {
+                return Place::Free((home + moved) * LANES + free.trailing_zeros() as usize % LANES);
+            }
+        }
+        Place::Full
+    }
+
+    /// The slot of a key, or the one where it belongs.
+    #[inline(always)]
+    pub fn place(&self, key: u64) -> Place {
+        let (home, wanted) = self.shape.seat(self.shape.mix(key));
+        self.place_of(home, wanted)
+    }
+
+    /// Puts the key asked for as number `c` into the set, if it is new, after `append`, which may refuse it. There must be
+    /// room for it.
+    #[inline(always)]
+    pub fn insert(
+        &mut self,
+        asked: &mut Asked<S>,
+        c: usize,
+        memory: &Memory,
+        append: impl FnOnce() -> Result<(), Stop>,
+    ) -> Result<(), Stop> {
+        loop {
+            let (home, wanted) = (asked.homes[c % ROOM] as usize, asked.wanted[c % ROOM]);
+            match self.place_of(home, wanted) {
+                Place::Known(_) => return Ok(()),
+                Place::Free(slot) => {
+                    append()?;
+                    self.slots.all_mut()[slot] = S::new(wanted.get() + (slot / LANES - home) as u64);
+                    self.len += 1;
+                    return Ok(());
+                }
+                Place::Full => {
+                    let before = self.shape;
+                    self.grow(memory)?;
+                    self.ask_again(asked, before);
+                }
+            }
+        }
+    }
+
+    /// Empties what was asked, and takes more buckets if as many new keys again would make the table more than four fifths
+    /// full.
+    #[inline(always)]
+    pub fn answered(&mut self, asked: &mut Asked<S>, memory: &Memory) -> Result<(), Stop> {
+        asked.count = 0;
+        while 5 * (self.len + ROOM) > 4 * LANES * self.shape.buckets as usize {
+            self.grow(memory)?;
+        }
+        Ok(())
+    }
+
+    /// Takes more buckets.
+    #[cold]
+    pub fn grow(&mut self, memory: &Memory) -> Result<(), Stop> {
+        let mut shape = self.shape;
+        loop {
+            shape = shape.larger();
+            let mut room = Self::room(shape, memory)?;
+            if self.refill(shape, room.all_mut().as_chunks_mut().0) {
+                memory.release(Self::bytes(self.shape));
+                (self.slots, self.shape) = (room, shape);
+                return Ok(());
+            }
+            memory.release(Self::bytes(shape));
+        }
+    }
+
+    /// Puts all keys into other buckets; false where some of them are full. That ends with as many buckets as keep any
+    /// eight keys apart, if not with memory.
+    fn refill(&self, shape: Shape, buckets: &mut [[S; LANES]]) -> bool {
+        for (at, bucket) in self.buckets().iter().enumerate() {
+            for slot in bucket.iter().map(|slot| slot.get()).take_while(|&slot| slot != 0) {
+                let home = at + 1 - (slot & REACH as u64) as usize;
+                let (home, wanted) = shape.seat::<S>(self.shape.mixed(home, slot));
+                let mut moved = 0;
+                let free = loop {
+                    let free = S::matches(&buckets[home + moved], S::new(0));
+                    if free != 0 {
+                        break free.trailing_zeros() as usize % LANES;
+                    }
+                    moved += 1;
+                    if moved == REACH {
+                        return false;
+                    }
+                };
+                buckets[home + moved][free] = S::new(wanted.get() + moved as u64);
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn insert<S: Slot>(table: &mut Exact<S>, key: u64, memory: &Memory) -> Result<bool, Stop> {
+        let mut asked = Asked::new();
+        table.ask(&mut asked, 1, |_| key, |_, _| ());
+        let open = table.first_look(&mut asked);
+        let mut new = false;
+        if open > 0 {
+            table.insert(&mut asked, 0, memory, || {
+                new = true;
+                Ok(())
+            })?;
+        }
+        table.answered(&mut asked, memory)?;
+        Ok(new)
+    }
+
+    fn keeps_apart<S: Slot>(bits: u32, keys: &[u64]) {
+        let memory = Memory::new(1 << 30);
+        let mut table = Exact::<S>::new(bits, &memory).expect("fits");
+        for &key in keys {
+            assert_eq!(insert(&mut table, key, &memory), Ok(true));
+            assert_eq!(insert(&mut table, key, &memory), Ok(false));
+        }
+        assert_eq!(table.len, keys.len());
+        let mut places: Vec<usize> = keys
+            .iter()
+            .map(|&key| match table.place(key) {
+                Place::Known(slot) => slot,
+                other => panic!("{key} of {bits} bits is {other:?}"),
+            })
+            .collect();
+        places.sort_unstable();
+        places.dedup();
+        assert_eq!(places.len(), keys.len());
+        let mut missed = 0;
+        for part in keys.chunks(ROOM - 1) {
+            let mut asked = Asked::new();
+            part.iter().for_each(|&key| table.ask(&mut asked, 1, |_| key, |_, _| ()));
+            missed += table.first_look(&mut asked);
+        }
+        assert!(missed * 3 < keys.len(), "{missed} of {} are not where they belong", keys.len());
+        assert_eq!(memory.used(), Exact::<S>::bytes(table.shape));
+    }
+
+    #[test]
+    fn every_key_is_found_again_and_no_other_after_any_growth() {
+        // All keys of sixteen bits: a tag too short would take two for one.
+        let all: Vec<u64> = (0..1 << 16).collect();
+        keeps_apart::<u32>(16, &all);
+        keeps_apart::<u64>(16, &all);
+        for bits in [17, 25, 36, 41, 60] {
+            // Neighbours, and keys that differ in their high bits alone.
+            let keys: Vec<u64> = (0..50_000).chain((1..2000).map(|i| i << (bits - 16 + 5))).collect();
+            let mut keys: Vec<u64> = keys.into_iter().filter(|&key| key >> bits == 0).collect();
+            keys.sort_unstable();
+            keys.dedup();
+            if bits <= 41 {
+                keeps_apart::<u32>(bits, &keys);
+            }
+            keeps_apart::<u64>(bits, &keys);
+        }
+    }
+
+    #[test]
+    fn keys_that_crowd_one_place_make_the_table_grow_until_they_fit() {
+        // All belong into one bucket of the first tables.
+        let memory = Memory::new(1 << 26);
+        let mut table = Exact::<u32>::new(20, &memory).expect("fits");
+        let shape = Shape::new(20, 2, 5);
+        let one = (0..1 << 20).find(|&key| shape.mix(key) >> 44 == 1).expect("the factor is odd");
+        let keys: Vec<u64> = (0..1000).map(|i: u64| i * one % (1 << 20)).collect();
+        assert!(keys.iter().all(|&key| shape.seat::<u32>(shape.mix(key)).0 == 0));
+        for &key in &keys {
+            assert_eq!(insert(&mut table, key, &memory), Ok(true));
+        }
+        assert!(keys.iter().all(|&key| matches!(table.place(key), Place::Known(_))));
+    }
+
+    #[test]
+    fn memory_that_is_not_there_is_a_return_value_and_loses_nothing() {
+        let memory = Memory::new(40_000);
+        let mut table = Exact::<u32>::new(20, &memory).expect("fits");
+        let count = (0..100_000).find(|&key| insert(&mut table, key, &memory) == Err(Stop::Memory)).expect("too many");
+        assert!(memory.used() <= 40_000 && count > 200);
+        assert!((0..=count).all(|key| matches!(table.place(key), Place::Known(_))));
+    }
+}

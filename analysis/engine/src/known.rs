@@ -1,0 +1,398 @@
+//! What tells the exploration that a marking is known: exact keys where they are short enough, else hashes.
+//!
+//! With keys (`span.rs`, `exact.rs`) a candidate is one word, and nothing else is computed of it until it has turned out
+//! not to stand where it belongs: the look is taken in the same pass that reads the firing transitions off the bit slices.
+//! Its cache miss overlaps with those of the next ones, because nothing waits for it but the count of the candidates
+//! that are left. Those, new ones and the tenth whose bucket was full, are gathered without a branch, looked up by a
+//! loop, and only of new ones the marking is made. Under hashes (`table.rs`) candidates are whole markings.
+//!
+//! Rejected: to remember the latest hits in a small table in the first cache (a hit there costs what one in the large
+//! table costs while that is in the processor's caches, and a miss both); to sort many candidates by their place in the
+//! table before they are looked up (each is written and read once more, which costs more than the misses that overlap).
+
+use std::sync::OnceLock;
+
+use crate::batch::Batch;
+use crate::budget::{Memory, Stop, Watch};
+use crate::exact::{Asked, Exact, Place, ROOM};
+use crate::explore::Space;
+use crate::marking::{Width, linear_hash};
+use crate::net::Net;
+use crate::region::Region;
+use crate::seat::Slot;
+use crate::span::Span;
+use crate::store::Store;
+use crate::table::{Candidates, NONE, Table};
+use crate::with_width;
+
+/// The least table for keys is not larger than this, and not than this part of what is allowed.
+const LEAST_BYTES: usize = 1 << 22;
+const LEAST_PART: usize = 64;
+
+/// What tells known markings.
+#[derive(Debug)]
+pub enum Set {
+    /// The table of hashes, beside this.
+    Hashed,
+    /// Exact keys in slots of 32 bits.
+    Narrow(Keyed<u32>),
+    /// Exact keys in slots of 64 bits.
+    Wide(Keyed<u64>),
+}
+
+/// A set of exact keys, and, once somebody asked for them, the indexes of its markings.
+#[derive(Debug)]
+pub struct Keyed<S> {
+    /// The keys.
+    pub span: Span,
+    exact: Exact<S>,
+    indexes: OnceLock<Region<u32>>,
+}
+
+impl Set {
+    /// The narrowest set for a net.
+    pub fn new(net: &Net, memory: &Memory) -> Self {
+        let most = LEAST_BYTES.min(memory.limit() / LEAST_PART);
+        let Some(span) = Span::new(net).filter(|span| span.flips.len() < 1 << 26) else { return Set::Hashed };
+        if Exact::<u32>::least_bytes(span.bits) <= most {
+            return Keyed::new(span, memory).map_or(Set::Hashed, Set::Narrow);
+        }
+        Keyed::new(span, memory).map_or(Set::Hashed, Set::Wide)
+    }
+
+    /// The indexes of up to `ROOM` markings by their keys; none where markings are hashed.
+    #[inline(always)]
+    pub fn find<'a>(&self, keys: &[u64], found: &'a mut [u32; ROOM]) -> Option<&'a [u32]> {
+        match self {
+            Set::Hashed => return None,
+            Set::Narrow(keyed) => keyed.find(keys, found),
+            Set::Wide(keyed) => keyed.find(keys, found),
+        }
+        Some(&found[..keys.len()])
+    }
+
+    /// The keys; none where markings are hashed.
+    #[inline(always)]
+    pub fn span(&self) -> Option<&Span> {
+        match self {
+            Set::Hashed => None,
+            Set::Narrow(keyed) => Some(&keyed.span),
+            Set::Wide(keyed) => Some(&keyed.span),
+        }
+    }
+}
+
+impl<S: Slot> Keyed<S> {
+    fn new(span: Span, memory: &Memory) -> Result<Self, Stop> {
+        let exact = Exact::new(span.bits, memory)?;
+        Ok(Keyed { span, exact, indexes: OnceLock::new() })
+    }
+
+    /// Puts the indexes of all markings beside their keys, if they are not there.
+    pub fn index<W: Width>(&self, width: W, store: &Store, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
+        if self.indexes.get().is_some() {
+            return Ok(());
+        }
+        let bytes = 4 * self.exact.slots();
+        memory.claim(bytes)?;
+        let Some(mut region) = Region::zeroed(self.exact.slots()) else {
+            memory.release(bytes);
+            return Err(Stop::Memory);
+        };
+        let indexes: &mut [u32] = region.all_mut();
+        let mut batch = Batch::new(width.words());
+        let mut slots = [0; ROOM];
+        for first in (0..store.len()).step_by(64) {
+            batch.markings.clear();
+            store.copy_range(first, store.len().min(first + 64), &mut batch.markings);
+            batch.cut_by(width, &self.span);
+            self.exact.find(&batch.hashes[..batch.count], &mut slots);
+            for (index, &slot) in (first..).zip(&slots[..batch.count]) {
+                indexes[slot] = index as u32;
+            }
+            if let Err(stop) = watch.tick(64) {
+                memory.release(bytes);
+                return Err(stop);
+            }
+        }
+        // Somebody may have done the same meanwhile.
+        if self.indexes.set(region).is_err() {
+            memory.release(bytes);
+        }
+        Ok(())
+    }
+
+    /// The index of a marking and its key. Without `index` before, which needs memory, the store is searched through.
+    fn find_one<W: Width>(&self, width: W, store: &Store, marking: &[u64], key: u64) -> Option<u32> {
+        let Place::Known(slot) = self.exact.place(key) else { return None };
+        match self.indexes.get() {
+            Some(indexes) => Some(indexes.all()[slot]),
+            None => (0..store.len()).find(|&index| store.get(width, index) == marking).map(|index| index as u32),
+        }
+    }
+
+    /// The index of the marking with each of up to `ROOM` keys, `NONE` where there is none; after `index`.
+    #[inline(always)]
+    pub fn find(&self, keys: &[u64], found: &mut [u32; ROOM]) {
+        let Some(indexes) = self.indexes.get() else { return found.fill(NONE) };
+        let (mut slots, indexes) = ([0; ROOM], indexes.all());
+        self.exact.find(keys, &mut slots);
+        for (found, &slot) in found.iter_mut().zip(&slots[..keys.len()]) {
+            *found = if slot < indexes.len() { indexes[slot] } else { NONE };
+        }
+    }
+}
+
+/// Candidates on their way from firing transitions into the set.
+pub trait Arrivals<W: Width> {
+    /// Puts M0, all that is in the batch, into the empty set.
+    fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_>) -> Result<(), Stop>;
+
+    /// Slices a batch, with what the candidates are told by.
+    fn cut(&self, width: W, batch: &mut Batch);
+
+    /// Takes the marking that a transition makes of each of `fire`.
+    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, into: Into<'_>) -> Result<(), Stop>;
+
+    /// Ends a batch, and with it a level or not.
+    fn end(&mut self, width: W, net: &Net, batch: &Batch, level: bool, into: Into<'_>) -> Result<(), Stop>;
+}
+
+/// Where new markings go, how many there may be, and of what memory.
+pub type Into<'a> = (&'a mut Table, usize, &'a Memory);
+
+/// Arrivals told by their hash.
+pub struct Hashed(Candidates);
+
+impl Hashed {
+    /// None yet.
+    pub fn new(words: usize) -> Self {
+        Hashed(Candidates::new(words))
+    }
+}
+
+impl<W: Width> Arrivals<W> for Hashed {
+    fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_>) -> Result<(), Stop> {
+        let (table, max, memory) = into;
+        table.insert(width, &batch.markings, linear_hash(width, &batch.markings), max, memory)?;
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn cut(&self, width: W, batch: &mut Batch) {
+        batch.cut(width);
+    }
+
+    #[inline(always)]
+    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, into: Into<'_>) -> Result<(), Stop> {
+        let (table, max, memory) = into;
+        if self.0.push(width, batch, fire, net.flip(t, width.words()), net.flip_hashes[t]) {
+            table.insert_batch(width, &mut self.0, max, memory)?;
+        }
+        Ok(())
+    }
+
+    /// What is left waits for the next batch; only a level must be whole before it is taken up.
+    #[inline(always)]
+    fn end(&mut self, width: W, _: &Net, _: &Batch, level: bool, into: Into<'_>) -> Result<(), Stop> {
+        let (table, max, memory) = into;
+        if level { table.insert_batch(width, &mut self.0, max, memory) } else { Ok(()) }
+    }
+}
+
+/// Arrivals told by their key.
+pub struct ByKey<'a, S> {
+    keyed: &'a mut Keyed<S>,
+    asked: Asked<S>,
+    /// The marking of the batch (low six bits) and the transition that made each.
+    made: [u32; ROOM],
+}
+
+impl<'a, S: Slot> ByKey<'a, S> {
+    /// None yet.
+    pub fn new(keyed: &'a mut Keyed<S>) -> Self {
+        ByKey { keyed, asked: Asked::new(), made: [0; ROOM] }
+    }
+
+    /// Looks up what came, and appends what is new.
+    #[inline(always)]
+    fn settle<W: Width>(&mut self, width: W, net: &Net, batch: &Batch, into: Into<'_>) -> Result<(), Stop> {
+        let (table, max, memory) = into;
+        let words = width.words();
+        let exact = &mut self.keyed.exact;
+        for k in 0..exact.first_look(&mut self.asked) {
+            let c = usize::from(self.asked.open[k % ROOM]);
+            let (j, t) = (self.made[c] as usize % 64, self.made[c] as usize / 64);
+            exact.insert(&mut self.asked, c, memory, || {
+                if table.store.len() >= max {
+                    return Err(Stop::Markings);
+                }
+                let from = &batch.markings[j * words..(j + 1) * words];
+                table.store.push_flipped(width, from, net.flip(t, words), max, memory)
+            })?;
+        }
+        exact.answered(&mut self.asked, memory)
+    }
+}
+
+impl<W: Width, S: Slot> Arrivals<W> for ByKey<'_, S> {
+    fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_>) -> Result<(), Stop> {
+        let (table, max, memory) = into;
+        let key = self.keyed.span.key(&batch.markings);
+        self.keyed.exact.ask(&mut self.asked, 1, |_| key, |_, _| ());
+        let append = || table.store.push(width, &batch.markings, max, memory);
+        self.keyed.exact.insert(&mut self.asked, 0, memory, append)?;
+        self.keyed.exact.answered(&mut self.asked, memory)
+    }
+
+    #[inline(always)]
+    fn cut(&self, width: W, batch: &mut Batch) {
+        batch.cut_by(width, &self.keyed.span);
+    }
+
+    #[inline(always)]
+    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, into: Into<'_>) -> Result<(), Stop> {
+        let flip = self.keyed.span.flips[t];
+        let made = (t as u32) << 6;
+        let note = |c: usize, j: u32| self.made[c] = made | j;
+        self.keyed.exact.ask(&mut self.asked, fire, |j| batch.hashes[j] ^ flip, note);
+        if self.asked.count >= ROOM - 64 { self.settle(width, net, batch, into) } else { Ok(()) }
+    }
+
+    #[inline(always)]
+    fn end(&mut self, width: W, net: &Net, batch: &Batch, _: bool, into: Into<'_>) -> Result<(), Stop> {
+        self.settle(width, net, batch, into)
+    }
+}
+
+impl Space {
+    /// Slices a batch, with the hashes that `find_told` asks for.
+    #[inline(always)]
+    pub fn cut<W: Width>(&self, width: W, batch: &mut Batch) {
+        match self.set.span() {
+            None => batch.cut(width),
+            Some(span) => batch.cut_by(width, span),
+        }
+    }
+
+    /// What a firing changes in these hashes.
+    #[inline(always)]
+    pub fn flip_hash(&self, t: usize) -> u64 {
+        self.set.span().map_or_else(|| self.net.flip_hashes[t], |span| span.flips[t])
+    }
+
+    /// Makes it quick to find the indexes of markings.
+    pub fn index(&self, watch: &mut Watch<'_>) -> Result<(), Stop> {
+        with_width!(self.net.words, width => match &self.set {
+            Set::Hashed => Ok(()),
+            Set::Narrow(keyed) => keyed.index(width, &self.table.store, &self.memory, watch),
+            Set::Wide(keyed) => keyed.index(width, &self.table.store, &self.memory, watch),
+        })
+    }
+
+    /// The index of a marking one firing before or after a known one, if it was found, by its hash.
+    #[inline(always)]
+    pub fn find_told<W: Width>(&self, width: W, marking: &[u64], hash: u64) -> Option<u32> {
+        match &self.set {
+            Set::Hashed => self.table.find(width, marking, hash),
+            Set::Narrow(keyed) => keyed.find_one(width, &self.table.store, marking, hash),
+            Set::Wide(keyed) => keyed.find_one(width, &self.table.store, marking, hash),
+        }
+    }
+
+    /// The index of any marking, if it was found.
+    pub fn find(&self, marking: &[u64]) -> Option<u32> {
+        with_width!(self.net.words, width => {
+            let told = self.set.span().map_or_else(|| linear_hash(width, marking), |span| span.key(marking));
+            let found = self.find_told(width, marking, told);
+            // A key tells only reachable markings apart.
+            found.filter(|&index| self.marking(index as usize) == marking)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+    use crate::explore::Limits;
+    use crate::net::Transition;
+    use crate::samples::{explore, machines, random_spaces};
+
+    /// Eleven machines, and a chain that makes the keys long: their kind is that of the chain's length.
+    fn chained(length: u32) -> Net {
+        let mut transitions = machines(11, 0).transitions;
+        transitions.extend((22..22 + length).map(|p| Transition::new(&[p], &[p + 1], &[0], &[], &[])));
+        let marked: Vec<u32> = (0..12).map(|i| 2 * i).collect();
+        Net::new(23 + length as usize, transitions, &marked).expect("well formed")
+    }
+
+    fn kind(set: &Set) -> u32 {
+        match set {
+            Set::Hashed => 0,
+            Set::Narrow(_) => 32,
+            Set::Wide(_) => 64,
+        }
+    }
+
+    #[test]
+    fn every_kind_of_set_numbers_markings_by_their_level() {
+        for (length, expected) in [(20, 32), (40, 64), (60, 0)] {
+            let limits = Limits { step: false, markings: 20_000, memory_bytes: 1 << 30, time: None };
+            let space = Space::explore(chained(length), limits, &mut unwatched).expect("fits");
+            assert_eq!((kind(&space.set), space.len()), (expected, 20_000));
+            // As the plain way finds them.
+            let mut plain: Vec<Vec<u64>> = vec![space.net.initial.clone()];
+            let mut levels = std::collections::HashMap::from([(plain[0].clone(), 0)]);
+            let mut next = 0;
+            while plain.len() < 60_000 && next < plain.len() {
+                for t in space.enabled_by(&space.net.forward, &plain[next]) {
+                    let flip = space.net.flip(t as usize, space.net.words);
+                    let after: Vec<u64> = plain[next].iter().zip(flip).map(|(a, b)| a ^ b).collect();
+                    let level = levels[&plain[next]] + 1;
+                    levels.entry(after.clone()).or_insert_with(|| {
+                        plain.push(after);
+                        level
+                    });
+                }
+                next += 1;
+            }
+            // The level that was not ended has no entry.
+            let level_of = |index: usize| space.levels.partition_point(|&first| first as usize <= index) - 1;
+            let mut last = 0;
+            for index in 0..space.len() {
+                let level = levels[space.marking(index)];
+                assert!(level >= last && (level == level_of(index) || level == space.levels.len()));
+                assert_eq!(space.find(space.marking(index)), Some(index as u32));
+                last = level;
+            }
+        }
+    }
+
+    #[test]
+    fn an_exploration_cut_short_finds_what_it_stored_and_nothing_else() {
+        for most in [1, 5, 300, 777] {
+            for memory_bytes in [40_000, 1 << 28] {
+                let limits = Limits { step: false, markings: most, memory_bytes, time: None };
+                let space = Space::explore(machines(11, 0), limits, &mut unwatched).expect("begins");
+                assert!(space.stop.is_some());
+                let stored: Vec<&[u64]> = (0..space.len()).map(|index| space.marking(index)).collect();
+                for marking in explore(machines(11, 0), false).table.store.all().chunks(1).take(2048) {
+                    let expected = stored.iter().position(|&stored| stored == marking);
+                    assert_eq!(space.find(marking), expected.map(|index| index as u32));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_marking_out_of_reach_is_not_found_even_where_its_key_is_that_of_another() {
+        let space = explore(machines(3, 0), false);
+        // Both places of a machine are full: one of them decides the key.
+        assert_eq!(space.find(&[0b01_01_11]), None);
+        assert_eq!(space.find(&[0b01_01_01]), Some(0));
+        for space in random_spaces(200, false) {
+            assert!((0..space.len()).all(|index| space.find(space.marking(index)) == Some(index as u32)));
+        }
+    }
+}

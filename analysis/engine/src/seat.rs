@@ -1,0 +1,152 @@
+//! Where a key belongs in a table of buckets, and what is left of it there: the arithmetic of `exact.rs`.
+//!
+//! A key of r bits is mixed by an odd factor modulo 2^r. With n buckets, the mixed key times n has the number of its bucket
+//! above bit r. Keys of one bucket differ below it by multiples of n, so of the low part those bits can be left off that
+//! the power of two below n spans: what remains, the tag, tells them apart. For n = 2^k or 3 * 2^k, the mixed key comes
+//! back from both by a division by 2 or 3.
+//!
+//! Rejected: powers of two alone (a table then doubles, and is three eighths full afterwards); any n (growth would divide
+//! by a variable, at ten times the price).
+
+use bytemuck::Pod;
+use wide::{CmpEq, i32x8};
+
+/// Slots of a bucket.
+pub const LANES: usize = 8;
+/// Low bits of a slot: how many buckets its key has moved, plus one.
+pub(crate) const MOVED_BITS: u32 = 6;
+/// Buckets that are tried for a key.
+pub(crate) const REACH: usize = (1 << MOVED_BITS) - 1;
+/// Odd, so that the product is a bijection (the golden ratio).
+const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// A slot: 32 or 64 bits.
+pub trait Slot: Pod + Eq {
+    /// The low bits of a word.
+    fn new(word: u64) -> Self;
+    /// The slot as a word.
+    fn get(self) -> u64;
+    /// A bit for each slot of a bucket that has a value.
+    fn matches(bucket: &[Self; LANES], value: Self) -> u32;
+}
+
+impl Slot for u32 {
+    #[inline(always)]
+    fn new(word: u64) -> Self {
+        word as u32
+    }
+
+    #[inline(always)]
+    fn get(self) -> u64 {
+        u64::from(self)
+    }
+
+    #[inline(always)]
+    fn matches(bucket: &[u32; LANES], value: u32) -> u32 {
+        // Of a loop over the eight, compilers make five times as many instructions.
+        i32x8::new(bytemuck::cast(*bucket)).cmp_eq(i32x8::splat(value as i32)).move_mask() as u32
+    }
+}
+
+impl Slot for u64 {
+    #[inline(always)]
+    fn new(word: u64) -> Self {
+        word
+    }
+
+    #[inline(always)]
+    fn get(self) -> u64 {
+        self
+    }
+
+    #[inline(always)]
+    fn matches(bucket: &[u64; LANES], value: u64) -> u32 {
+        let low: [u32; LANES] = bucket.map(|slot| slot as u32);
+        let high: [u32; LANES] = bucket.map(|slot| (slot >> 32) as u32);
+        u32::matches(&low, value as u32) & u32::matches(&high, (value >> 32) as u32)
+    }
+}
+
+/// Where keys belong in a table of so many buckets.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    /// Bits of a key.
+    pub(crate) bits: u32,
+    /// There are 2 or 3 times 2^log2 buckets.
+    times: u64,
+    log2: u32,
+    /// The same as a number, the factor of keys, and how far tags are shifted: at hand, since it is all asked for each edge.
+    pub(crate) buckets: u64,
+    factor: u64,
+    shift: u32,
+}
+
+impl Shape {
+    /// The least for slots whose tags have no more bits than that; never fewer than 64 buckets.
+    pub(crate) fn least(bits: u32, tag_bits: u32) -> Self {
+        Shape::new(bits, 2, (bits - 1).saturating_sub(tag_bits).max(5))
+    }
+
+    pub(crate) fn new(bits: u32, times: u64, log2: u32) -> Self {
+        Shape { bits, times, log2, buckets: times << log2, factor: FACTOR << (64 - bits), shift: 64 + log2 + 1 - bits }
+    }
+
+    /// The next larger.
+    pub(crate) fn larger(self) -> Self {
+        let (times, log2) = if self.times == 2 { (3, self.log2) } else { (2, self.log2 + 1) };
+        Shape::new(self.bits, times, log2)
+    }
+
+    /// The mixed key, in the high bits of a word.
+    #[inline(always)]
+    pub(crate) fn mix(self, key: u64) -> u64 {
+        key.wrapping_mul(self.factor)
+    }
+
+    /// The bucket of a mixed key, and its slot there. Keys of one bucket differ, in the low half of the product, by
+    /// multiples of the number of buckets, so what the power of two below that number spans can be left off.
+    #[inline(always)]
+    pub(crate) fn seat<S: Slot>(self, mixed: u64) -> (usize, S) {
+        let product = u128::from(mixed) * u128::from(self.buckets);
+        ((product >> 64) as usize, S::new((product as u64 >> self.shift) << MOVED_BITS | 1))
+    }
+
+    /// The mixed key of a slot that has not moved.
+    #[inline(always)]
+    pub(crate) fn mixed(self, home: usize, slot: u64) -> u64 {
+        let product = (home as u64) << (self.bits - self.log2) | slot >> MOVED_BITS << 1;
+        let key = if self.times == 2 { product / 2 } else { product.div_ceil(3) };
+        key << (64 - self.bits)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seat_and_mixed_key_say_the_same_at_every_shape() {
+        for bits in [16, 31, 44, 60] {
+            let mut shape = Shape::least(bits, 58);
+            while shape.log2 < bits.min(24) - 4 {
+                for i in 0..1000_u64 {
+                    let mixed = shape.mix(i.wrapping_mul(0x1234_5678_9abc_def1) % (1 << bits));
+                    let (home, slot) = shape.seat::<u64>(mixed);
+                    assert!((home as u64) < shape.buckets && slot >> (bits - shape.log2 - 1 + MOVED_BITS) == 0);
+                    assert_eq!(shape.mixed(home, slot), mixed);
+                }
+                shape = shape.larger();
+            }
+        }
+    }
+
+    #[test]
+    fn matches_names_each_lane_that_is_equal_and_no_other() {
+        let values = [7_u64, 1 << 40 | 7, 7, 0, 1 << 40, 7 << 32, 9, 7];
+        for (value, expected) in [(7, 0b1000_0101), (1 << 40 | 7, 0b10), (0, 0b1000), (8, 0)] {
+            assert_eq!(u64::matches(&values, value), expected);
+        }
+        assert_eq!(u32::matches(&values.map(|value| value as u32), 7), 0b1000_0111);
+        assert_eq!(u32::matches(&[u32::MAX; LANES], u32::MAX), 0b1111_1111);
+    }
+}
