@@ -200,7 +200,9 @@ class _Checker:
 
     def _space(self, evidence: Evidence, of: Markings | Diagram) -> Listed | Diagrams:
         for net, known, space in self._spaces:
-            if net is evidence.net and known is of:
+            # Of a continuation the net is made anew each time, with the same transitions.
+            same = net.transitions is evidence.net.transitions and net.initial_marking == evidence.net.initial_marking
+            if same and known is of:
                 return space
         if isinstance(of, Diagram):
             if evidence.discipline.value != "interleaving":
@@ -222,16 +224,17 @@ class _Checker:
         if isinstance(space, Diagrams):
             space.deadline = self._deadline
         if claim.kind is ClaimKind.NEVER and not labels:
-            if isinstance(space, Diagrams) and isinstance(of, Diagram):
+            if isinstance(space, Diagrams) and isinstance(of, Diagram) and not space.is_cube(claim.state_goal):
                 return self._excluded(evidence, of, space)
-            if isinstance(space, Listed) and any(space.where(claim.state_goal)):
+            found = space.where(claim.state_goal)
+            if any(found) if isinstance(found, list) else found:
                 refuse(f"the goal ({format_formula(claim.state_goal)}) holds in a marking of the set")
             return Checked(shown=True, method=space.method)
         _require_initially(space, claim, labels)
         return Checked(shown=True, method=f"{space.method}{', and the labels looked through' if labels else ''}")
 
     def _excluded(self, evidence: Evidence, of: Diagram, space: Diagrams) -> Checked:
-        """That the goal holds in no marking of a diagram is a question to the solver, as of an invariant."""
+        """That a goal of many parts holds in no marking of a diagram is a question to the solver."""
         terms, net = Terms(), evidence.net
         holds_at = [terms.variable(place.name) for place in net.places]
         among = diagram_term(terms, net, of, holds_at.__getitem__)

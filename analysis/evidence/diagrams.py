@@ -197,6 +197,10 @@ class Diagrams(Nodes):
             left = self.less(left, self._with(left, self._cube(t) or {}))
         return left
 
+    def is_cube(self, formula: Formula) -> bool:
+        """Whether a state formula is a conjunction of literals, which one look at the diagram finds."""
+        return isinstance(formula, Firable) or _literals(self.net, formula) is not None
+
     # What a labelling asks.
 
     def where(self, formula: Formula) -> int:

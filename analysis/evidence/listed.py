@@ -32,6 +32,7 @@ class Listed:
     ) -> None:
         self.net, self.discipline, self.markings = net, discipline, markings
         self.player = Player(net)
+        self._changed: dict[int, Marking] = {}
         places = {marking: i for i, marking in enumerate(markings)}
         if net.initial_marking not in places:
             refuse("the initial marking is not in the set")
@@ -57,7 +58,17 @@ class Listed:
         if self.discipline is Discipline.STEP:
             return self.player.successors(marking, step=True)
         fires = (t for t, where in self._firable if where[i])
-        return (((t,), self.player.fire(marking, (t,))) for t in fires)
+        return (((t,), self._fired(marking, t)) for t in fires)
+
+    def _fired(self, marking: Marking, t: int) -> Marking:
+        """The marking after a firing that Eq. (1) allows.
+
+        Where it does, inputs are full and outputs empty, so the same places change each time: those that the reference
+        player changes when it fires the transition for the first time.
+        """
+        if t not in self._changed:
+            self._changed[t] = self.player.fire(marking, (t,)) ^ marking
+        return marking ^ self._changed[t]
 
     @cached_property
     def _columns(self) -> tuple[Bitwise[int], list[int]]:

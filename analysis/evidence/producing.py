@@ -34,6 +34,7 @@ from firable.analysis.evidence.producing_claims import Certifier, LackingError
 from firable.analysis.evidence.runs import holds
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
+from firable.analysis.verdicts.behaviour import DEADLOCK_FREE
 from firable.nets.formula import Constant, Deadlock, Firable, Formula, Holds, Not, Start
 from firable.nets.net import Marking, Net, Property, TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
@@ -58,6 +59,8 @@ def evidence_of_report(report: CheckReport, queries: Sequence[Query] = (), limit
     space = report.space if report.space.complete else None
     certifier = Certifier(report.net, report.discipline, limits or Limits(), space, findings)
     one = _Verdicts(certifier, {query.name: query for query in queries}, report.findings)
+    deadlocked = [v for v in report.verdicts if v.name == DEADLOCK_FREE.name and v.status is Status.VIOLATED]
+    certifier.deadlock = next((verdict.witness for verdict in deadlocked), None)
     decided = [verdict for verdict in report.verdicts if verdict.status is not Status.UNKNOWN]
     return Document(report.net, report.discipline, tuple(map(one.record, decided)))
 
@@ -150,7 +153,7 @@ class _Verdicts:
         """A deadlock is doomed, and every doomed marking leads to one."""
         if verdict.status is Status.PROVED:
             return self._one(Claim(ClaimKind.NEVER, Deadlock()))
-        return self._one(Claim(ClaimKind.REACHABLE, Deadlock()))
+        return self._one(Claim(ClaimKind.REACHABLE, Deadlock()), self.certifier.deadlock)
 
     def _home_claim(self, home: Marking) -> Claim:
         return Claim(ClaimKind.ALWAYS_POSSIBLE, tidy(is_marking(self.net, home)))
@@ -159,7 +162,7 @@ class _Verdicts:
         home = self.certifier.homes()
         if home is not None:
             return self._one(self._home_claim(home))
-        return iter([(Claim(ClaimKind.HOME), self.certifier.theorem())])
+        return iter([(Claim(ClaimKind.HOME), self.certifier.theorem(Claim(ClaimKind.HOME)))])
 
     def _or_theorem(self, claim: Claim, witness: Witness | None) -> Iterator[tuple[Claim, Certificate]]:
         try:
@@ -168,7 +171,7 @@ class _Verdicts:
             if claim.kind is not ClaimKind.ALWAYS_POSSIBLE:
                 raise
             try:
-                yield claim, self.certifier.theorem()
+                yield claim, self.certifier.theorem(claim)
             except LackingError:
                 raise error from None
 
@@ -195,7 +198,7 @@ class _Verdicts:
         return found
 
     def _by_theorem(self) -> Shown:
-        return [(Claim(ClaimKind.LIVE), self.certifier.theorem())]
+        return [(Claim(ClaimKind.LIVE), self.certifier.theorem(Claim(ClaimKind.LIVE)))]
 
     def _by_home(self, names: tuple[str, ...]) -> Shown:
         home = self.certifier.homes()

@@ -33,6 +33,7 @@ from firable.analysis.evidence.meaning import contact, tidy
 from firable.analysis.evidence.producing_labels import TooLargeError, drawn, labelling, listed
 from firable.analysis.evidence.producing_ranks import progress
 from firable.analysis.evidence.producing_runs import NotFoundError, parting, runs_by_search, runs_on_graph
+from firable.analysis.evidence.theorems import check_premises
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.induction.pdr import decide_by_pdr
@@ -44,6 +45,7 @@ from firable.analysis.structure.contact import decide_contact_by_invariants
 from firable.analysis.structure.net_class import asymmetric_choice, extended_free_choice
 from firable.analysis.structure.ordinary import ordinary
 from firable.analysis.structure.state_equation import decide_by_state_equation
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Witness
@@ -74,6 +76,8 @@ class Certifier:
         self.net, self.discipline, self.limits, self._given = net, discipline, limits, space
         self._findings: Mapping[Formula, Finding] = {tidy(goal): found for goal, found in findings}
         self._contact: Never | None = None
+        self._ends: list[tuple[Continuation, Callable[[Formula], bool]]] = []
+        self.deadlock: Witness | None = None
 
     @cached_property
     def graph(self) -> ReachabilityGraph | None:
@@ -150,7 +154,7 @@ class Certifier:
                     raise LackingError(f"ranks for a response are written for up to {MARKINGS_MAX:,} markings")
                 return progress(self.graph, self.markings, claim)
             case ClaimKind.LIVE | ClaimKind.HOME:
-                return self.theorem()
+                return self.theorem(claim)
             case ClaimKind.FIRES:
                 raise LackingError("runs are looked for together")
         return self._labelled(claim)
@@ -211,6 +215,11 @@ class Certifier:
         return None if space is None else space.witness(targets(space))
 
     def _lost(self, goal: Formula, witness: Witness | None) -> Continuation | None:
+        spelled = tidy(without_start(self.net, goal))
+        for known, misses in self._ends:
+            if misses(spelled):
+                return known
+
         def lost(space: StateSpace[Any]) -> Any:
             return space.algebra.negation(space.backward(space.satisfying(goal)))
 
@@ -219,29 +228,46 @@ class Certifier:
             witness is None or not space.contains(lost(space), self.net.marking(witness.marking))
         ):
             witness = self._way(lost)
-        if witness is None:
-            return None
-        marking = self.net.marking(witness.marking)
-        then = self._never_from(marking, goal)
-        return None if then is None else Continuation(witness.firings, then)
+        for way in (witness, self.deadlock):
+            if way is not None and (found := self._never_after(way, goal, spelled)) is not None:
+                return found
+        return None
 
-    def _never_from(self, marking: Marking, goal: Formula) -> Never | None:
-        """The same as `_never`, of the net that starts in another marking."""
-        spelled, net = tidy(without_start(self.net, goal)), self.net
+    def _never_after(self, way: Witness, goal: Formula, spelled: Formula) -> Continuation | None:
+        """What shows that after this run the goal is never reached; kept, since it shows the same of other goals."""
+        marking, net = self.net.marking(way.marking), self.net
         places = tuple(replace(place, marked=bool(marking >> p & 1)) for p, place in enumerate(net.places))
         net = replace(net, places=places, properties=())
         if self.symbolic is not None:
-            after = self.symbolic.engine.forward(self.symbolic.engine.single(list(_indexes(marking))))
-            if not after & self.symbolic.satisfying(goal):
-                return Labelling(_alone(drawn(self.symbolic, [after])))
-        budget = Budget(MARKINGS_MAX, self.limits.memory_bytes)
-        graph = explore(net, self.discipline, budget, deadline=self._part(0.3))
+            symbolic = self.symbolic
+            after = symbolic.engine.forward(symbolic.engine.single(list(_indexes(marking))))
+            if after & symbolic.satisfying(goal):
+                return None
+            found = Continuation(way.firings, Labelling(_alone(drawn(symbolic, [after]))))
+            self._ends.append((found, lambda other: not after & symbolic.satisfying(other)))
+            return found
+        graph = explore(net, self.discipline, Budget(MARKINGS_MAX, self.limits.memory_bytes), deadline=self._part(0.3))
         if graph.complete:
-            return None if graph.satisfying(spelled).any() else Labelling(listed(graph))
-        return self._induced(net, spelled)
+            if graph.satisfying(spelled).any():
+                return None
+            found = Continuation(way.firings, Labelling(listed(graph)))
+            self._ends.append((found, lambda other: not graph.satisfying(other).any()))
+            return found
+        invariant = self._induced(net, spelled)
+        return None if invariant is None else Continuation(way.firings, invariant)
 
-    def theorem(self) -> Theorem:
-        """A theorem that says that the net is live; raises `LackingError` where none does."""
+    def theorem(self, claim: Claim) -> Theorem:
+        """A theorem that says the claim; raises `LackingError` where none does."""
+        found = self._theorem
+        try:
+            check_premises(self.net, self.discipline, claim, found)
+        except InputError as error:
+            raise LackingError(error.diagnostics[0].message) from None
+        return found
+
+    @cached_property
+    def _theorem(self) -> Theorem:
+        """The theorem that is about the net."""
         net, of = self.net, ordinary(self.net)
         bare = any(t.inhibitive for t in net.transitions) or len(of.transitions) < len(net.transitions)
         if self.discipline is Discipline.STEP or bare or not net.transitions:

@@ -142,18 +142,16 @@ class _Labels:
             for t in space.net.transitions
         ]
         order = sorted(range(len(tops)), key=tops.__getitem__)
-        found, turns, idle = end, list[str](), 0
-        while idle < len(order):
+        found, turns, more = end, list[str](), True
+        while more and found != space.reach:
+            more = False
             for t in order:
-                more = found | (space.engine.before(found, [t]) & through)
-                idle = idle + 1 if more == found else 0
-                if more != found:
+                larger = found | (space.engine.before(found, [t]) & through)
+                if larger != found:
+                    found, more = larger, True
                     turns.append(space.net.transitions[t].name)
-                    found = more
-                if idle >= len(order) or (found == space.reach):
-                    break
-            if found == space.reach:
-                break
+                    if found == space.reach:
+                        break
             order.reverse()  # there and back: what one direction leaves for many turns is the other's next one
             if len(turns) > TURNS_MAX:
                 raise TooLargeError(f"going back takes more than {TURNS_MAX:,} turns")

@@ -97,7 +97,7 @@ def _of(net: Net, claim: Claim, certificate: Certificate) -> Evidence:
 
 
 def _theorem(net: Net, claim: Claim) -> Evidence:
-    return _of(net, claim, Certifier(net, Discipline.INTERLEAVING, Limits()).theorem())
+    return _of(net, claim, Certifier(net, Discipline.INTERLEAVING, Limits()).theorem(claim))
 
 
 def _invented(net: Net, claim: Claim, firings: str, cycle: str = "") -> Evidence:
