@@ -14,6 +14,7 @@ a step that cannot be serialised, because the net then means two things, one for
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final, Generic
@@ -38,6 +39,7 @@ from firable.semantics.trace import Discipline
 
 Pair = tuple[str, str]
 
+_RACES_MAX: Final = 1_000_000
 _ONLY_THE_FIRST: Final = f"there are more: only the first {PAIRS_MAX:,} pairs are listed"
 
 
@@ -120,15 +122,47 @@ class ConflictAnalysis(Generic[S]):
 
 
 def races_may_cycle(net: Net) -> bool:
-    """Whether the gate races among transitions that may fire together form a cycle: if not, every step has an order."""
+    """Whether the gate races among transitions that may fire together form a cycle: if not, every step has an order.
+
+    Where more pairs than are listed race each other in a cycle of places, it is taken to be one. Cost: linear in the
+    arcs, and in the pairs that are looked at.
+    """
+    around = _closing_in_a_cycle(net)
     relation = conflicts(net)
     after: dict[int, set[int]] = {}
-    for t, u in gate_races(net):
-        if u not in relation.rivals[t] and jointly_openable(net, (t, u)):
+    last, rivals = -1, frozenset[int]()
+    for looked, (t, u) in enumerate(gate_races(net, around)):
+        if looked == _RACES_MAX:
+            return True
+        if t != last:
+            last, rivals = t, relation.rivals[t]
+        if u not in rivals and jointly_openable(net, (t, u)):
             after.setdefault(t, set()).add(u)
-    # Those that close no gate of a remaining one are taken away until none is left, or a cycle is.
+    return bool(_in_or_before_a_cycle(after))
+
+
+def _closing_in_a_cycle(net: Net) -> list[int]:
+    """The transitions that close gates in a cycle of transitions and gates, or lead to one: no pair is looked at.
+
+    A gate is a place and the value at which it is open; who takes the place from it closes it for all who read it.
+    """
+    first_gate, place = len(net.transitions), net.place_index
+    after: dict[int, set[int]] = {}
+    for t, of in enumerate(net.transitions):
+        closed = [(name, 1) for name in of.inputs] + [(name, 0) for name in of.outputs]
+        after[t] = {first_gate + 2 * place[name] + value for name, value in closed}
+        for name, value in [(name, 1) for name in of.permissive] + [(name, 0) for name in of.inhibitive]:
+            after.setdefault(first_gate + 2 * place[name] + value, set()).add(t)
+    return sorted(node for node in _in_or_before_a_cycle(after) if node < first_gate)
+
+
+def _in_or_before_a_cycle(after: Mapping[int, Collection[int]]) -> set[int]:
+    """The nodes of a graph from which a path leads on for ever.
+
+    Those that nothing comes after are taken away until none is left, or a cycle is.
+    """
     before: dict[int, list[int]] = {}
-    left = {t: len(closed) for t, closed in after.items()}
+    left = {t: len(closed) for t, closed in after.items() if closed}
     for t, closed in after.items():
         for u in closed:
             before.setdefault(u, []).append(t)
@@ -139,7 +173,7 @@ def races_may_cycle(net: Net) -> bool:
             if not left[t]:
                 del left[t]
                 ends.append(t)
-    return bool(left)
+    return set(left)
 
 
 @dataclass(frozen=True)
@@ -156,16 +190,23 @@ class Steps:
             raise ValueError("only the step graph has steps")
 
     @cached_property
+    def may_cycle(self) -> bool:
+        """Whether there may be steps without an order."""
+        return races_may_cycle(self.graph.net)
+
+    @cached_property
     def unordered(self) -> dict[tuple[str, ...], int]:
         """The steps found that no order can replay, with the lowest marking at which each may fire.
 
         Of a part of the graph there may be more.
         """
         found: dict[tuple[str, ...], int] = {}
-        if not races_may_cycle(self.graph.net):
+        if not self.may_cycle:
             return found
         player = self.graph.witnesses.player
         for index in range(self.graph.n_markings):
+            if self.graph.deadline.over:
+                raise BudgetExceeded("the time is over")
             for fired, _ in self.graph.successors(index):
                 if len(fired) > 1 and not player.serialisable(fired):
                     found.setdefault(self.graph.witnesses.names(fired), index)
@@ -174,7 +215,7 @@ class Steps:
     @cached_property
     def nonserialisable(self) -> tuple[tuple[str, ...], ...]:
         """The steps that no order can replay; raises `IncompleteGraph` where more may come."""
-        if races_may_cycle(self.graph.net):
+        if self.may_cycle:
             self.graph.require_complete()
         return tuple(self.unordered)
 
@@ -247,7 +288,7 @@ def steps_serialisable(steps: Steps) -> Verdict:
             step, index = min(found.items(), key=lambda item: item[1])
             witness = steps.graph.witness_at(index, f"here the step of {listed(step)} has no order")
             return no(tuple(" + ".join(step) for step in found), witness)
-        if races_may_cycle(steps.graph.net):
+        if steps.may_cycle:
             steps.graph.require_complete()
         return yes()
 
