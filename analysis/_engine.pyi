@@ -32,6 +32,8 @@ def explore(
     max_markings: int,
     max_memory_bytes: int,
     max_seconds: float | None,
+    threads: int = 1,
+    second_free: Callable[[], bool] | None = None,
     cancelled: Callable[[], bool] | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Graph:
@@ -47,7 +49,11 @@ def explore(
     that the engine holds, copies while a table grows included; time is looked at every few thousand edges. `progress`
     is told the number of markings and edges found so far, some twenty times a second, in the calling thread.
 
-    Raises `ValueError` for a place out of range or a negative time, `BudgetExceeded` where not even the net fits.
+    Under interleaving 2 `threads` share the larger levels; where `second_free` is given, those that begin while it last
+    said so. The numbering is then another than that of one thread, and as much a function of the arguments.
+
+    Raises `ValueError` for a place out of range, a negative time or more threads, `BudgetExceeded` where not even the
+    net fits.
 
     >>> graph = explore(2, [([0], [1], [], [], []), ([1], [0], [], [], [])], [0],
     ...                 max_markings=100, max_memory_bytes=1_000_000, max_seconds=None)

@@ -99,7 +99,7 @@ class _Check:
 
     def explicitly(self) -> CheckReport:
         """The report of the explicit engine alone, within the whole budget."""
-        graph = self._explore(self.budget)
+        graph = self._explore(self.budget, threads=2)
         return _told(self._report(graph), [f"explored: {_size(graph)}"])
 
     def automatically(self) -> CheckReport:
@@ -150,8 +150,11 @@ class _Check:
             self.interrupted.set()
             return _told(report_on(space, self.queries), ["interrupted"])
 
-    def _explore(self, budget: Budget) -> ReachabilityGraph:
-        return explore(self.net, self.discipline, budget, deadline=self.deadline, progress=self.progress)
+    def _explore(self, budget: Budget, threads: int = 1) -> ReachabilityGraph:
+        """Some markings, or all; by as many threads whatever the machine, since they say how markings are numbered."""
+        return explore(
+            self.net, self.discipline, budget, deadline=self.deadline, progress=self.progress, threads=threads
+        )
 
     def _whole(self, settling: Settling, course: list[str]) -> StateSpace[Any] | None:
         """All markings, by whichever technique is first; None where none of them could hold them all.
@@ -159,11 +162,19 @@ class _Check:
         The settling is begun beside it, and given up where all markings are there.
         """
         limits = Limits(_share(self.deadline, _SPACES_SHARE), self.budget.memory_bytes)
-        contestants = [Contestant("explicit engine", self._held_explicitly)]
-        contestants += [Contestant(of.words, partial(_held, of, self.net)) for of in SPACES.values()]
         enough, space = Event(), None
+        others = [Event() for _ in SPACES]
         with ThreadPoolExecutor(1) as beside:
             begun = beside.submit(self._begin, settling, replace(limits.deadline, cancelled=enough))
+
+            def is_alone() -> bool:
+                return begun.done() and all(ended.is_set() for ended in others)
+
+            contestants = [Contestant("explicit engine", partial(self._held_explicitly, is_alone))]
+            contestants += [
+                Contestant(of.words, partial(_held, of, self.net, ended))
+                for of, ended in zip(SPACES.values(), others, strict=True)
+            ]
             try:
                 outcome = race([[one] for one in contestants], limits, slices_seconds=None)
                 course += outcome.told
@@ -182,9 +193,18 @@ class _Check:
         begun.result()
         return space
 
-    def _held_explicitly(self, limits: Limits) -> StateSpace[Any]:
+    def _held_explicitly(self, is_alone: Callable[[], bool], limits: Limits) -> StateSpace[Any]:
+        """The graph, by a second thread too once nothing else wants a processor."""
         budget = replace(self.budget, memory_bytes=limits.memory_bytes, seconds=None)
-        graph = explore(self.net, self.discipline, budget, deadline=limits.deadline, progress=self.progress)
+        graph = explore(
+            self.net,
+            self.discipline,
+            budget,
+            deadline=limits.deadline,
+            progress=self.progress,
+            threads=2,
+            second_free=is_alone,
+        )
         graph.require_complete()
         return graph
 
@@ -230,10 +250,15 @@ def _asked_of(question: Question) -> Verdict:
     return question.settle(unknown("not asked yet", ""), "", Discipline.INTERLEAVING, Cost())
 
 
-def _held(of: Technique[Callable[[Net, Limits], StateSpace[Any]]], net: Net, limits: Limits) -> StateSpace[Any]:
-    space = of.load()(net, limits)
-    space.require_complete()
-    return space
+def _held(
+    of: Technique[Callable[[Net, Limits], StateSpace[Any]]], net: Net, ended: Event, limits: Limits
+) -> StateSpace[Any]:
+    try:
+        space = of.load()(net, limits)
+        space.require_complete()
+        return space
+    finally:
+        ended.set()
 
 
 def _moment(deadline: Deadline, share: float) -> Deadline:

@@ -316,11 +316,15 @@ def explore(
     *,
     deadline: Deadline = NEVER,
     progress: Callable[[int, int], object] | None = None,
+    threads: int = 1,
+    second_free: Callable[[], bool] | None = None,
 ) -> ReachabilityGraph:
     """The reachability graph of a net, external gates free, or as much of it as the budget allows.
 
     The `deadline` ends the exploration and, later, the questions to the graph; the seconds of the budget end the
-    exploration alone. `progress` is told the markings and edges found so far, some twenty times a second.
+    exploration alone. `progress` is told the markings and edges found so far, some twenty times a second. Two `threads`
+    share the large levels of interleaving, those that begin while `second_free` says that a processor is free for the
+    second; they number the markings of a level in another order than one does, the same every time.
 
     Raises `InputError` F3004 where the budget of memory does not even hold the net.
 
@@ -332,7 +336,7 @@ def explore(
     """
     discipline, budget = Discipline(discipline), budget or Budget()
     try:
-        graph = _explored(net, discipline, budget, deadline, progress)
+        graph = _explored(net, discipline, budget, deadline, progress, threads, second_free)
     except BudgetExceeded:
         message = f"the budget of {budget.memory_bytes:,} bytes does not hold the net itself, let alone its markings"
         raise InputError([Diagnostic("F3004", message, "give it a larger budget of memory")]) from None
@@ -345,6 +349,8 @@ def _explored(
     budget: Budget,
     deadline: Deadline,
     progress: Callable[[int, int], object] | None,
+    threads: int,
+    second_free: Callable[[], bool] | None,
 ) -> _engine.Graph:
     limits = engine_limits(deadline)
     limits["max_seconds"] = min((t for t in (limits["max_seconds"], budget.seconds) if t is not None), default=None)
@@ -353,6 +359,8 @@ def _explored(
         step=discipline is Discipline.STEP,
         max_markings=budget.markings,
         max_memory_bytes=budget.memory_bytes,
+        threads=threads if discipline is Discipline.INTERLEAVING else 1,
+        second_free=second_free,
         progress=progress,
         **limits,
     )

@@ -1,10 +1,12 @@
 //! The engine's hot loops on nets of a fixed size: what `benchmarks/instructions.py` counts instructions of.
 //!
 //! `hot_loops NET WORK [ROUNDS]`: a net by its name and size (`philosophers 10`, `interlocked 9 60`, the second number
-//! being places that never change), and what is done after exploring it: `explore` (nothing), `bottoms`, `edges`,
-//! `backward`, `endless`. Prints markings, edges, and the CPU seconds of the exploration and of the work, best of the
+//! being places that never change), and what is done after exploring it: `explore` (nothing), `two` (nothing, after two
+//! threads have explored it), `bottoms`, `edges`, `backward`, `endless`. Prints markings, edges, and the CPU seconds of the exploration and of the work, best of the
 //! rounds.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use firable_engine::bottoms::Bottoms;
@@ -65,7 +67,8 @@ fn main() {
         };
         let limits = Limits { step: false, markings: 1 << 31, memory_bytes: 3 << 30, time: None };
         let start = cpu_seconds();
-        let space = Space::explore(net, limits, &mut unwatched).expect("the net fits");
+        let two = (work == "two").then(|| Arc::new(AtomicBool::new(true)));
+        let space = Space::explore_by(two, net, limits, &mut unwatched).expect("the net fits");
         let explored = cpu_seconds();
         assert!(space.stop.is_none());
         let mut poll = unwatched;
@@ -73,7 +76,7 @@ fn main() {
         let mut initial = vec![0; space.len()];
         initial[0] = 1;
         match work.as_str() {
-            "explore" => {}
+            "explore" | "two" => {}
             "bottoms" => drop(Bottoms::new(&space, &mut watch).expect("fits")),
             "edges" => drop(Csr::new(&space, None, &space.memory.clone(), &mut watch).expect("fits")),
             "backward" => drop(backward(&space, &initial, None, &mut watch).expect("fits")),

@@ -21,6 +21,8 @@
 //! plain linear probing (a third of the look-ups enter a loop, whose exit the processor guesses wrong); a second hash
 //! where a bucket is full (one more miss for one edge in ten; the next bucket is at hand).
 
+pub(crate) mod halves;
+
 use std::hint::black_box;
 
 use crate::budget::{Memory, Stop};
@@ -64,6 +66,27 @@ impl<S: Slot> Default for Asked<S> {
     fn default() -> Self {
         Asked::new()
     }
+}
+
+/// Reads a word of each bucket that is asked for, so that the cache misses of all of them overlap: there is so little
+/// between two of these reads that the processor has them all under way.
+#[inline(always)]
+fn touch<S: Slot>(buckets: &[[S; LANES]], asked: &Asked<S>) {
+    let read = |read: u64, &home: &u32| read ^ buckets[home as usize][0].get();
+    black_box(asked.homes[..asked.count.min(ROOM)].iter().fold(0, read));
+}
+
+/// Looks at the one bucket where each key belongs; how many keys were not found there (`open`).
+#[inline(always)]
+fn look<S: Slot>(buckets: &[[S; LANES]], asked: &mut Asked<S>) -> usize {
+    touch(buckets, asked);
+    let mut open = 0_u8;
+    let all = asked.homes.iter().zip(&asked.wanted).take(asked.count);
+    for (c, (&home, &wanted)) in all.enumerate() {
+        asked.open[usize::from(open)] = c as u8;
+        open += u8::from(S::matches(&buckets[home as usize], wanted) == 0);
+    }
+    usize::from(open)
 }
 
 /// A set of keys.
@@ -146,30 +169,10 @@ impl<S: Slot> Exact<S> {
         }
     }
 
-    /// Reads a word of each bucket that is asked for, so that the cache misses of all of them overlap: there is so little
-    /// between two of these reads that the processor has them all under way.
-    #[inline(always)]
-    fn touch(&self, asked: &Asked<S>) {
-        let buckets = self.buckets();
-        let mut read = 0;
-        for c in 0..asked.count {
-            read ^= buckets[asked.homes[c % ROOM] as usize][0].get();
-        }
-        black_box(read);
-    }
-
     /// Looks at the one bucket where each key belongs; how many keys were not found there (`open`).
     #[inline(always)]
     pub fn first_look(&self, asked: &mut Asked<S>) -> usize {
-        self.touch(asked);
-        let buckets = self.buckets();
-        let mut open = 0;
-        for c in 0..asked.count {
-            let (home, wanted) = (asked.homes[c % ROOM] as usize, asked.wanted[c % ROOM]);
-            asked.open[open % ROOM] = c as u8;
-            open += usize::from(S::matches(&buckets[home], wanted) == 0);
-        }
-        open
+        look(self.buckets(), asked)
     }
 
     /// The slot of each of up to `ROOM` keys; the number of slots for a key that is not in the set.

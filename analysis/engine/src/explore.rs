@@ -13,6 +13,7 @@
 
 use std::rc::Rc;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use crate::batch::Batch;
@@ -20,6 +21,7 @@ use crate::budget::{Found, Memory, Stop, Watch};
 use crate::known::{Arrivals, ByKey, Hashed, Set};
 use crate::marking::{Dynamic, Width, holds, linear_hash};
 use crate::net::{Net, Rules};
+use crate::pair::{LEVEL_LEAST, Pair, Shared};
 use crate::step::{Components, Factor, Steps};
 use crate::table::{NONE, Table};
 use crate::with_width;
@@ -75,6 +77,26 @@ pub struct Space {
 impl Space {
     /// Explores from M0 until all is found or a budget is used up.
     pub fn explore(net: Net, limits: Limits, poll: &mut dyn FnMut(Found) -> Result<(), Stop>) -> Result<Self, Stop> {
+        Space::explore_by(None, net, limits, poll)
+    }
+
+    /// The same, where a level is worth it and the flag set by two threads; steps are explored by one.
+    pub fn explore_by(
+        two: Option<Arc<AtomicBool>>,
+        net: Net,
+        limits: Limits,
+        poll: &mut dyn FnMut(Found) -> Result<(), Stop>,
+    ) -> Result<Self, Stop> {
+        let pair = two.map(|free| Pair::new(&net, LEVEL_LEAST, free));
+        Space::explore_with(pair, net, limits, poll)
+    }
+
+    pub(crate) fn explore_with(
+        pair: Option<Pair>,
+        net: Net,
+        limits: Limits,
+        poll: &mut dyn FnMut(Found) -> Result<(), Stop>,
+    ) -> Result<Self, Stop> {
         let start = Instant::now();
         let memory = Memory::new(limits.memory_bytes);
         let count = net.transitions.len();
@@ -102,7 +124,7 @@ impl Space {
         };
         let mut watch = Watch::new(limits.time.and_then(|time| start.checked_add(time)), poll);
         let max = limits.markings.clamp(1, NONE as usize);
-        let end = with_width!(space.net.words, width => space.run(width, max, &mut watch));
+        let end = with_width!(space.net.words, width => space.run(width, pair, max, &mut watch));
         space.stop = end.err();
         space.seconds = start.elapsed().as_secs_f64();
         Ok(space)
@@ -118,7 +140,13 @@ impl Space {
         self.len() == 0
     }
 
-    fn run<W: Width>(&mut self, width: W, max: usize, watch: &mut Watch<'_>) -> Result<(), Stop> {
+    fn run<W: Width>(
+        &mut self,
+        width: W,
+        mut pair: Option<Pair>,
+        max: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
         self.memory.push(&mut self.levels, 0)?;
         let net = Arc::clone(&self.net);
         if self.step {
@@ -130,13 +158,14 @@ impl Space {
         } else {
             // Apart from the rest while it grows.
             let mut set = std::mem::replace(&mut self.set, Set::Hashed);
+            let pair = &mut pair;
             let result = match &mut set {
-                Set::Hashed => self.run_interleaving(width, &net, &mut Hashed::new(net.words), max, watch),
-                Set::Narrow(keyed) => self.run_interleaving(width, &net, &mut ByKey::new(keyed), max, watch),
-                Set::Wide(keyed) => self.run_interleaving(width, &net, &mut ByKey::new(keyed), max, watch),
+                Set::Hashed => self.run_interleaving(width, &net, &mut Hashed::new(net.words), pair, max, watch),
+                Set::Narrow(keyed) => self.run_interleaving(width, &net, &mut ByKey::new(keyed), pair, max, watch),
+                Set::Wide(keyed) => self.run_interleaving(width, &net, &mut ByKey::new(keyed), pair, max, watch),
             };
             self.set = set;
-            result
+            pair.take().map_or(Ok(()), |pair| pair.finish(self)).and(result)
         }
     }
 
@@ -156,7 +185,8 @@ impl Space {
         &mut self,
         width: W,
         net: &Net,
-        arrivals: &mut impl Arrivals<W>,
+        arrivals: &mut impl Shared<W>,
+        pair: &mut Option<Pair>,
         max: usize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
@@ -165,10 +195,34 @@ impl Space {
         arrivals.first(width, &mut batch, (&mut self.table, max, &self.memory))?;
         let (mut next, mut end) = (0, 1);
         while self.level_end(next, &mut end)? {
+            let open = match pair.as_mut().filter(|pair| pair.takes(end - next)) {
+                Some(pair) => pair.expand(width, self, arrivals, next, max, watch)?,
+                None => vec![(next, end)],
+            };
+            for range in open {
+                self.expand(width, net, range, (&mut batch, arrivals), max, watch)?;
+            }
+            next = end;
+        }
+        Ok(())
+    }
+
+    /// Expands the markings of a range, which lies within a level.
+    fn expand<W: Width>(
+        &mut self,
+        width: W,
+        net: &Net,
+        (first, end): (usize, usize),
+        (batch, arrivals): (&mut Batch, &mut impl Arrivals<W>),
+        max: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
+        let mut next = first;
+        while next < end {
             let stop = end.min(next + 64);
             batch.markings.clear();
             self.table.store.copy_range(next, stop, &mut batch.markings);
-            arrivals.cut(width, &mut batch);
+            arrivals.cut(width, batch);
             let mut alive = 0;
             let before = self.edges;
             for t in 0..net.transitions.len() {
@@ -187,10 +241,10 @@ impl Space {
                 let edges = u64::from(fire.count_ones());
                 self.fired[t] += edges;
                 self.edges += edges;
-                arrivals.push(width, net, &batch, t, fire, (&mut self.table, max, &self.memory))?;
+                arrivals.push(width, net, batch, t, fire, (&mut self.table, max, &self.memory))?;
             }
             self.note_deadlocks(next, batch.valid & !alive)?;
-            arrivals.end(width, net, &batch, stop == end, (&mut self.table, max, &self.memory))?;
+            arrivals.end(width, net, batch, stop == end, (&mut self.table, max, &self.memory))?;
             watch.found = Found { markings: self.table.store.len() as u64, edges: self.edges };
             watch.tick((stop - next) + (self.edges - before) as usize + net.transitions.len())?;
             next = stop;

@@ -21,6 +21,7 @@ use crate::net::Net;
 use crate::region::Region;
 use crate::seat::Slot;
 use crate::span::Span;
+use crate::spread::Spread;
 use crate::store::Store;
 use crate::table::{Candidates, NONE, Table};
 use crate::with_width;
@@ -45,6 +46,7 @@ pub enum Set {
 pub struct Keyed<S> {
     /// The keys.
     pub span: Span,
+    spread: Spread,
     exact: Exact<S>,
     indexes: OnceLock<Region<u32>>,
 }
@@ -55,9 +57,9 @@ impl Set {
         let most = LEAST_BYTES.min(memory.limit() / LEAST_PART);
         let Some(span) = Span::new(net).filter(|span| span.flips.len() < 1 << 26) else { return Set::Hashed };
         if Exact::<u32>::least_bytes(span.bits) <= most {
-            return Keyed::new(span, memory).map_or(Set::Hashed, Set::Narrow);
+            return Keyed::new(net, span, memory).map_or(Set::Hashed, Set::Narrow);
         }
-        Keyed::new(span, memory).map_or(Set::Hashed, Set::Wide)
+        Keyed::new(net, span, memory).map_or(Set::Hashed, Set::Wide)
     }
 
     /// The indexes of up to `ROOM` markings by their keys; none where markings are hashed.
@@ -83,9 +85,16 @@ impl Set {
 }
 
 impl<S: Slot> Keyed<S> {
-    fn new(span: Span, memory: &Memory) -> Result<Self, Stop> {
+    fn new(net: &Net, span: Span, memory: &Memory) -> Result<Self, Stop> {
+        let spread = Spread::new(net, &span);
+        memory.claim(spread.bytes())?;
         let exact = Exact::new(span.bits, memory)?;
-        Ok(Keyed { span, exact, indexes: OnceLock::new() })
+        Ok(Keyed { span, spread, exact, indexes: OnceLock::new() })
+    }
+
+    /// The keys, the way back from them, and the set itself.
+    pub(crate) fn parts(&mut self) -> (&Span, &Spread, &mut Exact<S>) {
+        (&self.span, &self.spread, &mut self.exact)
     }
 
     /// Puts the indexes of all markings beside their keys, if they are not there.
@@ -202,8 +211,8 @@ impl<W: Width> Arrivals<W> for Hashed {
 
 /// Arrivals told by their key.
 pub struct ByKey<'a, S> {
-    keyed: &'a mut Keyed<S>,
-    asked: Asked<S>,
+    pub(crate) keyed: &'a mut Keyed<S>,
+    pub(crate) asked: Asked<S>,
     /// The marking of the batch (low six bits) and the transition that made each.
     made: [u32; ROOM],
 }

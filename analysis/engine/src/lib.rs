@@ -34,6 +34,8 @@ pub mod marking;
 #[forbid(unsafe_code)]
 pub mod net;
 #[forbid(unsafe_code)]
+mod pair;
+#[forbid(unsafe_code)]
 pub mod paths;
 #[forbid(unsafe_code)]
 pub mod region;
@@ -45,6 +47,8 @@ pub mod scc;
 pub mod seat;
 #[forbid(unsafe_code)]
 pub mod span;
+#[forbid(unsafe_code)]
+mod spread;
 #[forbid(unsafe_code)]
 pub mod step;
 #[forbid(unsafe_code)]

@@ -12,7 +12,7 @@
 //! structure generic over an array type, compiled the whole engine six times and had no place for 10,000 places.
 
 /// The number of machine words of a marking, known at compile time where it can be.
-pub trait Width: Copy {
+pub trait Width: Copy + Send + Sync {
     /// How many words one marking takes.
     fn words(self) -> usize;
 }

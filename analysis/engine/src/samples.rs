@@ -21,8 +21,13 @@ pub(crate) fn explore(net: Net, step: bool) -> Space {
     Space::explore(net, limits, &mut unwatched).expect("fits")
 }
 
-/// Graphs of small random nets: tokens that move, merge and split under gates.
+/// Graphs of small random nets.
 pub(crate) fn random_spaces(count: u64, step: bool) -> impl Iterator<Item = Space> {
+    random_nets(count).map(move |net| explore(net, step))
+}
+
+/// Small random nets: tokens that move, merge and split under gates.
+pub(crate) fn random_nets(count: u64) -> impl Iterator<Item = Net> {
     let mut seed = 5_u64;
     let mut below = move |n: u64| {
         seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -56,6 +61,6 @@ pub(crate) fn random_spaces(count: u64, step: bool) -> impl Iterator<Item = Spac
             }
         }
         let initial: Vec<u32> = (0..places).filter(|_| below(2) == 0).map(|p| p * spread).collect();
-        explore(Net::new((places * spread) as usize, transitions, &initial).expect("well formed"), step)
+        Net::new((places * spread) as usize, transitions, &initial).expect("well formed")
     })
 }

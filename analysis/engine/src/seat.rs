@@ -18,10 +18,10 @@ pub(crate) const MOVED_BITS: u32 = 6;
 /// Buckets that are tried for a key.
 pub(crate) const REACH: usize = (1 << MOVED_BITS) - 1;
 /// Odd, so that the product is a bijection (the golden ratio).
-const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
+pub(crate) const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// A slot: 32 or 64 bits.
-pub trait Slot: Pod + Eq {
+pub trait Slot: Pod + Eq + Send + Sync {
     /// The low bits of a word.
     fn new(word: u64) -> Self;
     /// The slot as a word.

@@ -90,6 +90,22 @@ impl Store {
         Ok(())
     }
 
+    /// Appends markings that stand end to end.
+    pub fn append(&mut self, markings: &[u64], most: usize, memory: &Memory) -> Result<(), Stop> {
+        let count = markings.len() / self.words;
+        while self.claimed - self.len < count {
+            self.make_room(most, memory)?;
+        }
+        self.region.all_mut()[self.len * self.words..][..markings.len()].copy_from_slice(markings);
+        self.len += count;
+        Ok(())
+    }
+
+    /// Forgets all markings, and keeps the memory.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
     #[cold]
     fn make_room(&mut self, most: usize, memory: &Memory) -> Result<(), Stop> {
         let marking_bytes = 8 * self.words;

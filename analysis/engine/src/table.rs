@@ -92,24 +92,77 @@ pub struct Table {
     log2: u32,
 }
 
-/// Where hashes go in a table of 2^log2 slots.
-#[derive(Clone, Copy)]
-struct Shape {
+/// Where hashes go in a table of 2^log2 slots, and what a slot says.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
     shift: u32,
     log2: u32,
     index: u32,
 }
 
 impl Shape {
+    fn new(log2: u32) -> Self {
+        Shape { shift: 64 - log2, log2, index: ((1_u64 << log2) - 1) as u32 }
+    }
+
+    /// The first slot of a mixed hash.
     #[inline(always)]
-    fn home(self, mixed: u64) -> usize {
+    pub(crate) fn home(self, mixed: u64) -> usize {
         (mixed >> self.shift) as usize
+    }
+
+    /// What stands in the slot of an index.
+    #[inline(always)]
+    pub(crate) fn slot(self, mixed: u64, index: usize) -> u32 {
+        (self.tag(mixed) & !self.index) | (index as u32 + 1)
+    }
+
+    /// The same slot with another index.
+    #[inline(always)]
+    pub(crate) fn renumbered(self, slot: u32, index: usize) -> u32 {
+        (slot & !self.index) | (index as u32 + 1)
+    }
+
+    /// Whether a slot is taken and has the tag of a hash.
+    #[inline(always)]
+    pub(crate) fn fits(self, slot: u32, mixed: u64) -> bool {
+        ((slot ^ self.tag(mixed)) & !self.index == 0) & (slot != 0)
+    }
+
+    /// The index that a taken slot says.
+    #[inline(always)]
+    pub(crate) fn index_in(self, slot: u32) -> usize {
+        ((slot & self.index) - 1) as usize
+    }
+
+    /// Whether an index fits below the tag.
+    #[inline(always)]
+    pub(crate) fn numbers(self, index: usize) -> bool {
+        index < self.index as usize
     }
 
     /// The tag of a hash, in the place where a slot keeps it.
     #[inline(always)]
     fn tag(self, mixed: u64) -> u32 {
         (mixed << self.log2) as u32
+    }
+}
+
+/// Slots that are to be a table's.
+pub(crate) struct Slots {
+    all: Region<u32>,
+    log2: u32,
+}
+
+impl Slots {
+    /// What they say.
+    pub(crate) fn shape(&self) -> Shape {
+        Shape::new(self.log2)
+    }
+
+    /// All of them.
+    pub(crate) fn all_mut(&mut self) -> &mut [u32] {
+        self.all.all_mut()
     }
 }
 
@@ -124,7 +177,7 @@ impl Table {
 
     #[inline(always)]
     fn shape(&self) -> Shape {
-        Shape { shift: 64 - self.log2, log2: self.log2, index: ((1_u64 << self.log2) - 1) as u32 }
+        Shape::new(self.log2)
     }
 
     /// The index of a marking, or the slot where it belongs.
@@ -169,8 +222,9 @@ impl Table {
         self.insert_mixed(width, marking, mix(hash), max, memory)
     }
 
+    /// The same with the mixed hash.
     #[inline(always)]
-    fn insert_mixed<W: Width>(
+    pub(crate) fn insert_mixed<W: Width>(
         &mut self,
         width: W,
         marking: &[u64],
@@ -270,29 +324,62 @@ impl Table {
     /// Doubles the slots and files every marking again.
     #[cold]
     fn grow<W: Width>(&mut self, width: W, memory: &Memory) -> Result<(), Stop> {
+        let wider = self.wider(memory)?;
+        self.replace(wider, memory);
+        self.refile(width);
+        Ok(())
+    }
+
+    /// Twice as many slots, all of them empty, and claimed.
+    pub(crate) fn wider(&self, memory: &Memory) -> Result<Slots, Stop> {
         if self.log2 == 32 {
             return Err(Stop::Markings);
         }
-        let old = 1_usize << self.log2;
-        memory.claim(8 * old)?;
-        let Some(mut region) = Region::zeroed(2 * old) else {
-            memory.release(8 * old);
+        let bytes = 8 << self.log2;
+        memory.claim(bytes)?;
+        let Some(all) = Region::zeroed(2 << self.log2) else {
+            memory.release(bytes);
             return Err(Stop::Memory);
         };
-        self.log2 += 1;
-        let (shape, slots) = (self.shape(), region.all_mut());
-        let mask = slots.len() - 1;
+        Ok(Slots { all, log2: self.log2 + 1 })
+    }
+
+    /// Takes other slots in the place of its own, which are released.
+    pub(crate) fn replace(&mut self, slots: Slots, memory: &Memory) {
+        memory.release(4 << self.log2);
+        self.slots = slots.all;
+        self.log2 = slots.log2;
+    }
+
+    /// Files every marking into empty slots.
+    fn refile<W: Width>(&mut self, width: W) {
         for index in 0..self.store.len() {
-            let mixed = mix(linear_hash(width, self.store.get(width, index)));
-            let mut at = shape.home(mixed);
-            while slots[at] != 0 {
-                at = (at + 1) & mask;
-            }
-            slots[at] = (shape.tag(mixed) & !shape.index) | (index as u32 + 1);
+            self.file(mix(linear_hash(width, self.store.get(width, index))), index);
         }
-        self.slots = region;
-        memory.release(4 * old);
-        Ok(())
+    }
+
+    /// Files again the markings of the array, and nothing else.
+    pub(crate) fn forget_others<W: Width>(&mut self, width: W) {
+        self.slots.all_mut().fill(0);
+        self.refile(width);
+    }
+
+    /// Files an index under a mixed hash that no slot has.
+    #[inline(always)]
+    pub(crate) fn file(&mut self, mixed: u64, index: usize) {
+        let shape = self.shape();
+        let slots = self.slots.all_mut();
+        let mut at = shape.home(mixed);
+        while slots[at] != 0 {
+            at = (at + 1) & (slots.len() - 1);
+        }
+        slots[at] = shape.slot(mixed, index);
+    }
+
+    /// The array, the slots and what these say, to be worked on together.
+    pub(crate) fn parts(&mut self) -> (&Store, &mut [u32], Shape) {
+        let shape = self.shape();
+        (&self.store, self.slots.all_mut(), shape)
     }
 }
 

@@ -11,6 +11,8 @@ pub(crate) mod explore;
 pub(crate) mod graph;
 pub(crate) mod stubborn;
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use pyo3::create_exception;
@@ -50,6 +52,8 @@ pub(crate) struct Patience {
     deadline: Option<Instant>,
     cancelled: Option<Py<PyAny>>,
     progress: Option<Py<PyAny>>,
+    /// Whether a second processor is free, and what is kept of the answer.
+    free: Option<(Py<PyAny>, Arc<AtomicBool>)>,
 }
 
 impl Patience {
@@ -62,7 +66,7 @@ impl Patience {
             None => None,
         };
         let deadline = time.and_then(|time| Instant::now().checked_add(time));
-        Ok(Patience { time, deadline, cancelled, progress: None })
+        Ok(Patience { time, deadline, cancelled, progress: None, free: None })
     }
 
     /// The same, and a callable that is told how many markings and edges were found.
@@ -70,10 +74,18 @@ impl Patience {
         Patience { progress, ..self }
     }
 
+    /// The same, and a callable that is asked whether a second processor is free; the answer is kept.
+    pub(crate) fn noting(self, free: Option<Py<PyAny>>, kept: &Arc<AtomicBool>) -> Self {
+        Patience { free: free.map(|free| (free, Arc::clone(kept))), ..self }
+    }
+
     fn ask(&self, py: Python<'_>, found: Found) -> PyResult<bool> {
         py.check_signals()?;
         if let Some(progress) = &self.progress {
             progress.call1(py, (found.markings, found.edges))?;
+        }
+        if let Some((free, kept)) = &self.free {
+            kept.store(free.bind(py).call0()?.is_truthy()?, Ordering::Relaxed);
         }
         match &self.cancelled {
             Some(cancelled) => cancelled.bind(py).call0()?.is_truthy(),

@@ -1,0 +1,110 @@
+//! What the two threads of a pair share out: a set of markings in two halves, by the highest bit of the mixed key or hash.
+//!
+//! A candidate goes from thread to thread as a *record* of a few words, which says where it belongs and what it is. Which
+//! words these are is the set's affair: a key alone (`keyed.rs`), or a hash with a marking (`hashed.rs`).
+
+use crate::batch::Batch;
+use crate::budget::{Memory, Stop};
+use crate::explore::Space;
+use crate::known::Arrivals;
+use crate::marking::Width;
+use crate::net::Net;
+use crate::store::Store;
+use crate::table::Table;
+
+/// Markings that are dealt out together, and numbered together.
+pub(crate) const BLOCK: usize = 64;
+/// Records that found no place and are kept before one thread takes over.
+const LEFT_MAX: usize = 1 << 12;
+
+/// Why a thread ends before the level is done; the last is the most urgent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum End {
+    /// Its half is full.
+    Full,
+    /// Its share of a budget is used up.
+    Short,
+    /// Time is over, or nobody needs the answer.
+    Stopped(Stop),
+}
+
+/// What one thread finds in a level.
+pub(crate) struct Finds {
+    /// Which thread, 0 or 1.
+    pub(crate) id: usize,
+    /// What it may hold.
+    pub(crate) memory: Memory,
+    /// The markings.
+    pub(crate) fresh: Store,
+    /// How many there may be.
+    pub(crate) most: usize,
+    /// Records that found no place.
+    pub(crate) left: Vec<u64>,
+    /// Why it must end.
+    pub(crate) end: Option<End>,
+}
+
+impl Finds {
+    /// Nothing yet.
+    pub(crate) fn new(id: usize, words: usize) -> Self {
+        Finds { id, memory: Memory::new(0), fresh: Store::new(words), most: 0, left: Vec::new(), end: None }
+    }
+
+    /// Ends for a reason, if not for one more urgent.
+    #[cold]
+    pub(crate) fn end(&mut self, end: End) {
+        self.end = self.end.max(Some(end));
+    }
+
+    /// Keeps a record that finds no place in the half.
+    #[cold]
+    pub(crate) fn leave(&mut self, record: &[u64]) {
+        self.left.extend_from_slice(record);
+        if self.left.len() >= LEFT_MAX * record.len() {
+            self.end(End::Short);
+        }
+    }
+}
+
+/// A half of a set, in the hands of its thread.
+pub(crate) trait Half<W: Width>: Send {
+    /// The words of a record.
+    fn stride(&self, width: W) -> usize;
+
+    /// Slices a batch, with what its records need.
+    fn cut(&self, width: W, batch: &mut Batch);
+
+    /// Takes the markings that a transition makes of each of `fire`. Those of this half wait in it, the records of the
+    /// others stand in `theirs` up to `len`: written to both places and counted in one, because which, no processor guesses.
+    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, theirs: (&mut [u64], &mut usize));
+
+    /// Puts into the half what waits in it, if it is much or if `all` is to be there; new markings go to the finds.
+    fn settle(&mut self, width: W, all: bool, finds: &mut Finds);
+
+    /// The same with records that came from the other half.
+    fn insert(&mut self, width: W, records: &[u64], finds: &mut Finds);
+}
+
+/// A set that can be halved.
+pub(crate) trait Shared<W: Width>: Arrivals<W> {
+    /// A half.
+    type Half<'a>: Half<W>
+    where
+        Self: 'a;
+
+    /// The array of markings, and the two halves.
+    fn halves<'a>(&'a mut self, table: &'a mut Table) -> (&'a Store, [Self::Half<'a>; 2]);
+
+    /// Corrects the indexes that the set says of the markings found, before they are laid into the array: in turn `BLOCK`
+    /// of each thread, as many turns as there are `even` blocks of both, then what one and the other have more.
+    fn renumber(&mut self, width: W, space: &mut Space, finds: [&Finds; 2], even: usize) -> Result<(), Stop>;
+
+    /// Makes room for more; false where there is no memory for that. After an error the set cannot be used any more.
+    fn grow(&mut self, width: W, space: &mut Space) -> Result<bool, Stop>;
+
+    /// Puts the markings of some records into the whole set.
+    fn insert_left(&mut self, width: W, space: &mut Space, records: &[u64], max: usize) -> Result<(), Stop>;
+
+    /// Forgets what is not in the array.
+    fn forget_others(&mut self, width: W, space: &mut Space);
+}
