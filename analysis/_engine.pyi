@@ -229,6 +229,83 @@ class Components:
     def trivial(self) -> bytes:
         """One byte for each component: 1 where it has no edge inside, so no run can stay in it."""
 
+def explore_compactly(
+    n_places: int,
+    transitions: list[tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]],
+    initial: list[int],
+    goals: list[list[tuple[int, list[int]]]],
+    *,
+    until_met: bool = False,
+    max_memory_bytes: int,
+    max_seconds: float | None,
+    cancelled: Callable[[], bool] | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Compact:
+    """Search all markings under interleaving, breadth first, in 5 to 8 bytes each, and keep no graph.
+
+    The first arguments are those of `explore`; a goal is a formula as `Stubborn.reach` takes it. With `until_met` the
+    search ends when each goal was met. Running out of memory or time leaves an incomplete search.
+
+    Raises `ValueError` for a place out of range or a negative time, `BudgetExceeded` where it takes the tokens on more
+    than 60 places to tell reachable markings apart.
+
+    >>> found = explore_compactly(2, [([0], [1], [], [], [])], [0], [[(1, [1])]], max_memory_bytes=100_000,
+    ...                           max_seconds=None)
+    >>> found.n_markings, found.n_edges, found.complete, found.way_to_goal(0), found.way_to_deadlock()
+    (2, 1, True, [0], [0])
+    """
+
+@final
+class Compact:
+    """What a search found that keeps no graph.
+
+    A way is a shortest firing sequence from M0, None where nothing is there to be reached; it is found by searching
+    again, and raises `BudgetExceeded` where memory or time end.
+    """
+
+    @property
+    def complete(self) -> bool:
+        """Whether every reachable marking was found and tested."""
+    @property
+    def reason(self) -> str | None:
+        """Why not: "memory", "time", "interrupted" or "cancelled"; None where complete, or where all goals were met."""
+    @property
+    def n_markings(self) -> int:
+        """How many markings were found."""
+    @property
+    def n_edges(self) -> int:
+        """How many edges were followed."""
+    @property
+    def n_levels(self) -> int:
+        """How many levels the search began."""
+    @property
+    def n_deadlocks(self) -> int:
+        """How many of the markings tested are deadlocks."""
+    @property
+    def memory_bytes(self) -> int:
+        """Bytes that the search held when it ended."""
+    @property
+    def seconds(self) -> float:
+        """How long the search took."""
+    def fired(self) -> list[int]:
+        """For each transition, the edges on which it fires."""
+    def contacts(self) -> list[int]:
+        """For each transition, the number of markings in contact, as `Graph.contacts` has it."""
+    def goals(self) -> list[bool]:
+        """For each goal, whether a marking was found in which it holds."""
+    def way_to_contact(
+        self, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None
+    ) -> list[int] | None:
+        """A way to a nearest marking in contact."""
+    def way_to_deadlock(
+        self, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None
+    ) -> list[int] | None:
+        """A way to a nearest deadlock."""
+    def way_to_goal(
+        self, goal: int, *, max_seconds: float | None = None, cancelled: Callable[[], bool] | None = None
+    ) -> list[int] | None:
+        """A way to a nearest marking in which a goal holds; `IndexError` for a goal that was not asked for."""
+
 def explore_symbolically(
     n_places: int,
     transitions: list[tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]],

@@ -8,6 +8,7 @@
    both, quick techniques begin with the third stage, because how large the space is cannot be seen beforehand.
 3. *Settle the verdicts one by one* (`firable.analysis.settling`), where no technique could hold all markings: by
    techniques that know some at once, by a race of techniques for those that come down to goals, and by what follows.
+   Where it was room that the explicit engine wanted for, a compact search tries to see all markings without a graph.
 
 Under synchronous steps only the explicit engine knows the rule; there `auto` is `explicit`.
 
@@ -45,6 +46,8 @@ FIRST_MARKINGS: Final = 200_000
 """How many markings `auto` explores before it lets techniques race."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
 _KNOWING_SECONDS_MAX: Final = 30.0  # for what is known at once
+_COUNTING_SHARE: Final = 0.5  # of the time that is left, for all markings without a graph
+_COUNTING_SECONDS_MAX: Final = 120.0
 _LEARNT_FIRST: Final = frozenset(question.name for question in QUESTIONS)
 _FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION),)
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
@@ -109,8 +112,11 @@ class _Check:
             return _told(self._report(first), [f"explored: {_size(first)}"])
         course = [f"the first {first.n_markings:,} markings are not all"]
         settling = self._settling()
-        space = self._whole(settling, course)
-        return self._settled(self._report(space or first), settling, FIRST_KNOWERS, GOAL_LANES, course)
+        ends: list[str | None] = []
+        space = self._whole(settling, course, ends)
+        # What had no room with indexes may have it without.
+        late = {Method.COMPACT: _COUNTING_SHARE} if {"memory", "markings"} & set(ends) else {}
+        return self._settled(self._report(space or first), settling, FIRST_KNOWERS | late, GOAL_LANES, course)
 
     def _begin(self, settling: Settling, deadline: Deadline) -> None:
         """Settle, beside the search for all markings, what others follow from, by quick techniques."""
@@ -156,10 +162,11 @@ class _Check:
             self.net, self.discipline, budget, deadline=self.deadline, progress=self.progress, threads=threads
         )
 
-    def _whole(self, settling: Settling, course: list[str]) -> StateSpace[Any] | None:
+    def _whole(self, settling: Settling, course: list[str], ends: list[str | None]) -> StateSpace[Any] | None:
         """All markings, by whichever technique is first; None where none of them could hold them all.
 
-        The settling is begun beside it, and given up where all markings are there.
+        `ends` is told why the explicit engine ended. The settling is begun beside it, and given up where all markings
+        are there.
         """
         limits = Limits(_share(self.deadline, _SPACES_SHARE), self.budget.memory_bytes)
         enough, space = Event(), None
@@ -170,7 +177,7 @@ class _Check:
             def is_alone() -> bool:
                 return begun.done() and all(ended.is_set() for ended in others)
 
-            contestants = [Contestant("explicit engine", partial(self._held_explicitly, is_alone))]
+            contestants = [Contestant("explicit engine", partial(self._held_explicitly, is_alone, ends))]
             contestants += [
                 Contestant(of.words, partial(_held, of, self.net, ended))
                 for of, ended in zip(SPACES.values(), others, strict=True)
@@ -193,7 +200,7 @@ class _Check:
         begun.result()
         return space
 
-    def _held_explicitly(self, is_alone: Callable[[], bool], limits: Limits) -> StateSpace[Any]:
+    def _held_explicitly(self, is_alone: Callable[[], bool], ends: list[str | None], limits: Limits) -> StateSpace[Any]:
         """The graph, by a second thread too once nothing else wants a processor."""
         budget = replace(self.budget, memory_bytes=limits.memory_bytes, seconds=None)
         graph = explore(
@@ -205,6 +212,7 @@ class _Check:
             threads=2,
             second_free=is_alone,
         )
+        ends.append(graph.engine.reason)
         graph.require_complete()
         return graph
 
@@ -223,7 +231,7 @@ class _Check:
 
         settling.conclude(report.verdicts)
         for of, share in knowers.items():
-            settling.learn(of, {verdict.name for verdict in open_()}, _moment(self.deadline, share))
+            settling.learn(of, {verdict.name for verdict in open_()}, _moment(self.deadline, share, of))
             settling.conclude(report.verdicts)
         fired = self._fired(report.space) if open_() else set()
         waiting = open_()
@@ -261,9 +269,10 @@ def _held(
         ended.set()
 
 
-def _moment(deadline: Deadline, share: float) -> Deadline:
-    """When a technique that knows things at once must have said them."""
-    return _share(deadline, share).within(_KNOWING_SECONDS_MAX)
+def _moment(deadline: Deadline, share: float, of: Method | None = None) -> Deadline:
+    """When a technique that knows things at once must have said them; one that looks at all markings has longer."""
+    longest = _COUNTING_SECONDS_MAX if of is Method.COMPACT else _KNOWING_SECONDS_MAX
+    return _share(deadline, share).within(longest)
 
 
 def _share(deadline: Deadline, share: float) -> Deadline:

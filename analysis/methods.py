@@ -38,6 +38,7 @@ class Method(StrEnum):
     K_INDUCTION = "k-induction"
     PDR = "pdr"
     STUBBORN_SETS = "stubborn-sets"
+    COMPACT = "compact"
     WALK = "walk"
 
 
@@ -68,6 +69,7 @@ KNOWERS: Final[dict[Method, Technique[Knower]]] = {
         "walks on the reduced net, at large", "firable.analysis.reduction.deciding:known_by_reduction"
     ),
     Method.STUBBORN_SETS: Technique("stubborn sets, at large", "firable.analysis.stubborn:known_firings"),
+    Method.COMPACT: Technique("compact search of all markings", "firable.analysis.compact:known_by_counting"),
 }
 
 FIRST_KNOWERS: Final = {Method.REDUCTION: 0.5, Method.STRUCTURE: 0.3}
@@ -88,10 +90,11 @@ GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
     Method.PDR: Technique("property-directed reachability", "firable.analysis.induction.pdr:decide_by_pdr"),
     Method.STUBBORN_SETS: Technique("stubborn sets", "firable.analysis.stubborn:decide_by_stubborn_sets"),
     Method.WALK: Technique("random walk", "firable.analysis.walk:decide_by_walk"),
+    Method.COMPACT: Technique("compact search", "firable.analysis.compact:decide_by_compact_search"),
 }
 
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (
     (Method.REDUCTION, Method.WALK, Method.STUBBORN_SETS, Method.BOUNDED),
-    (Method.STATE_EQUATION, Method.K_INDUCTION, Method.PDR),
+    (Method.STATE_EQUATION, Method.K_INDUCTION, Method.PDR, Method.COMPACT),
 )
 """How `auto` races them: what finds violations beside what proves; each lane in turns that grow."""

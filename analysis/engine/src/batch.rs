@@ -45,6 +45,13 @@ impl Batch {
         span.keys(&self.slices, &mut self.hashes);
     }
 
+    /// The same, of markings whose keys are known.
+    #[inline(always)]
+    pub fn cut_known<W: Width>(&mut self, width: W, keys: &[u64]) {
+        self.slice(width);
+        self.hashes[..keys.len()].copy_from_slice(keys);
+    }
+
     #[inline(always)]
     fn slice<W: Width>(&mut self, width: W) {
         self.count = self.markings.len() / width.words();

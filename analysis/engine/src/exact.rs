@@ -22,6 +22,7 @@
 //! where a bucket is full (one more miss for one edge in ten; the next bucket is at hand).
 
 pub(crate) mod halves;
+mod in_place;
 
 use std::hint::black_box;
 

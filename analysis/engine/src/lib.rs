@@ -16,6 +16,8 @@ pub mod bottoms;
 #[forbid(unsafe_code)]
 pub mod budget;
 #[forbid(unsafe_code)]
+pub mod compact;
+#[forbid(unsafe_code)]
 pub mod csr;
 #[forbid(unsafe_code)]
 pub mod edges;
@@ -71,6 +73,8 @@ mod python;
 mod extension {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::python::compact::{Compact, explore_compactly};
     #[pymodule_export]
     use crate::python::components::Components;
     #[pymodule_export]

@@ -5,6 +5,7 @@
 //! ends; and to tell `progress` how far it is. An exploration that is stopped hands out what it knows; any other work
 //! raises, `KeyboardInterrupt` or what a handler raised where a signal came, else `BudgetExceeded`.
 
+pub(crate) mod compact;
 pub(crate) mod components;
 pub(crate) mod diagram;
 pub(crate) mod explore;

@@ -54,6 +54,11 @@ impl Formula {
         self.nodes.len()
     }
 
+    /// The nodes, operands first.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let operands = |node: &Node| match node {
