@@ -10,9 +10,11 @@ The nets are the families of the catalogue. Some are made wider by places that n
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
+from functools import partial
+from typing import Final, TypeVar
 
 from measuring import Table, against, example, spread, timed
 
@@ -21,10 +23,13 @@ from firable.analysis.compiled import rows
 from firable.nets.catalogue import FAMILIES, family_net
 from firable.nets.net import Net, Place
 
+T = TypeVar("T")
+
 MEMORY_BYTES_MAX: Final = 8 << 30
 LIMIT_GOALS: Final = {1: 1.0, 2: 1.0, 4: 2.0, 8: 2.0}
 HASHBROWN_GOAL, STD_GOAL, BYTES_GOAL = 2.0, 4.0, 16.0
 EDGE_STORE_GOAL_NS, COMPONENT_GOAL = 15.0, 1.3
+TWO_THREADS_GOAL, COMPACT_BYTES_GOAL, COMPACT_TIME_GOAL = 1.7, 8.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,7 @@ def text_of(net: Net) -> str:
     return "\n".join(lines)
 
 
-def explorer(net: Net, *, step: bool = False) -> Callable[[], _engine.Graph]:
+def explorer(net: Net, *, step: bool = False, threads: int = 1) -> Callable[[], _engine.Graph]:
     """What explores a net, with all that goes before it done; the graph must be complete."""
     compiled = rows(net)
 
@@ -75,6 +80,7 @@ def explorer(net: Net, *, step: bool = False) -> Callable[[], _engine.Graph]:
             max_markings=1 << 30,
             max_memory_bytes=MEMORY_BYTES_MAX,
             max_seconds=None,
+            threads=threads,
         )
         if not graph.complete:
             raise SystemExit(f"{net.name}: incomplete for want of {graph.reason}")
@@ -164,6 +170,76 @@ def synchronous(repeat: int) -> Table:
     )
 
 
+def clocked(work: Callable[[], T]) -> tuple[T, float, float]:
+    """What the work gives, the seconds by the clock, and the processor seconds of all its threads."""
+    clock, start = time.perf_counter(), time.process_time()
+    result = work()
+    return result, time.perf_counter() - clock, time.process_time() - start
+
+
+def two_threads(repeat: int) -> Table:
+    """Exploration on two threads against one, by the clock."""
+    rows = []
+    for subject in SUBJECTS:
+        net = subject.net()
+        one, two = explorer(net), explorer(net, threads=2)
+        graph, again = one(), two()
+        if (graph.n_markings, graph.n_edges, graph.fired()) != (again.n_markings, again.n_edges, again.fired()):
+            raise SystemExit(f"{subject}: {graph} by one thread, {again} by two")
+        # Of the clock more runs are needed: whatever else the machine does is in it.
+        runs = [(clocked(one)[1:], clocked(two)[1:]) for _ in range(3 * repeat)]
+        clock, spent = (min(run[0][k] for run in runs) for k in (0, 1))
+        clock_two, spent_two = (min(run[1][k] for run in runs) for k in (0, 1))
+        rows.append(
+            (
+                str(subject),
+                spread([by_two[0] for _, by_two in runs], graph.n_edges),
+                against(TWO_THREADS_GOAL, clock / clock_two, at_least=True),
+                f"{spent_two / spent:.2f}",
+            )
+        )
+    return Table(
+        "Exploration, two threads",
+        "Nanoseconds an edge by the clock; how many times quicker than one thread by the clock, which means something "
+        "where nothing else wants the two processors; the processor time of both threads as a multiple of that of one.",
+        ("net", "ns/edge by the clock", "x one thread", "processor time, x one thread"),
+        tuple(rows),
+    )
+
+
+def compact(repeat: int) -> Table:
+    """All markings without their graph, against exploration."""
+    measured = []
+    for subject in SUBJECTS:
+        net = subject.net()
+        explore = explorer(net)
+        search = partial(
+            _engine.explore_compactly, *rows(net), goals=[], max_memory_bytes=MEMORY_BYTES_MAX, max_seconds=None
+        )
+        graph, found = explore(), search()
+        if (graph.n_markings, graph.n_edges, graph.fired()) != (found.n_markings, found.n_edges, found.fired()):
+            raise SystemExit(f"{subject}: {graph}, but the compact search has {found.n_markings} markings")
+        plain = [timed(explore)[1] for _ in range(repeat)]
+        seconds = [timed(search)[1] for _ in range(repeat)]
+        measured.append(
+            (
+                str(subject),
+                str(graph.words),
+                spread(seconds, graph.n_edges),
+                against(COMPACT_TIME_GOAL, min(seconds) / min(plain)),
+                f"{graph.bytes_per_marking:.1f}",
+                against(COMPACT_BYTES_GOAL, found.memory_bytes / found.n_markings),
+            )
+        )
+    return Table(
+        "All markings without a graph, one thread",
+        "Nanoseconds an edge; the time as a multiple of that of exploration; bytes a marking of the graph, and of the "
+        "compact search, the two levels that it works on included.",
+        ("net", "words", "ns/edge", "x explore", "bytes/marking, graph", "bytes/marking, compact"),
+        tuple(measured),
+    )
+
+
 def tables(repeat: int) -> list[Table]:
     """All tables of this benchmark."""
-    return [*interleaving(repeat), synchronous(repeat)]
+    return [*interleaving(repeat), two_threads(repeat), compact(repeat), synchronous(repeat)]
