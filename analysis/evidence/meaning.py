@@ -227,7 +227,7 @@ def suffices(
             return _never(shown, completions_clash(net), proved)
         case "effective-conflicts":
             goal = competing(net)
-            return goal is not None and _never(shown, goal, proved)
+            return goal is not None and Claim(ClaimKind.NEVER, goal) in shown if proved else _compete(shown)
         case "machine-never-stopped":
             return _stopped(shown) if proved else _never_stopped(shown)
         case "starvation":
@@ -264,6 +264,23 @@ def _races_have_an_order(net: Net) -> bool:
     while left and (free := left - {t for t, u in races if u in left}):
         left -= free
     return not left
+
+
+def _compete(shown: Shown) -> bool:
+    """Whether two transitions that share a place, and are openable together, are shown to be firable together."""
+    for claim in shown.claims:
+        match claim:
+            case Claim(ClaimKind.REACHABLE, And((Firable(one), Firable(other)))) if compete(shown.net, one, other):
+                return True
+    return False
+
+
+def compete(net: Net, one: str, other: str) -> bool:
+    """Whether two transitions share an input or an output place, and one valuation opens the gates of both."""
+    t, u = net.transition(one), net.transition(other)
+    shared = {*t.inputs} & {*u.inputs} or {*t.outputs} & {*u.outputs}
+    pair = net.transition_index[one], net.transition_index[other]
+    return one != other and bool(shared) and jointly_openable(net, pair)
 
 
 def _never(shown: Shown, bad: Formula, proved: bool) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import combinations
 from typing import Final
 
 from firable.analysis.evidence.certificate import Certificate, FiringSequence
@@ -16,6 +17,7 @@ from firable.analysis.evidence.claims import TRUE, Claim, ClaimKind, is_marking
 from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.meaning import (
     commands_clash,
+    compete,
     competing,
     completions_clash,
     contact,
@@ -35,10 +37,11 @@ from firable.analysis.evidence.runs import holds
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE
-from firable.nets.formula import Constant, Deadlock, Firable, Formula, Holds, Not, Start
+from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
 from firable.nets.net import Marking, Net, Property, TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
 from firable.nets.verdict import Status, Verdict, Witness
+from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
 
 Shown = list[tuple[Claim, Certificate]]
@@ -139,8 +142,7 @@ class _Verdicts:
             case "shared-completions":
                 return self._never(completions_clash(net), verdict)
             case "effective-conflicts":
-                pairs = competing(net)
-                return () if pairs is None else self._never(pairs, verdict)
+                return self._competing(verdict)
             case "machine-never-stopped":
                 return self._stopped() if proved else self._never_stopped()
             case "starvation":
@@ -154,6 +156,17 @@ class _Verdicts:
         if verdict.status is Status.PROVED:
             return self._one(Claim(ClaimKind.NEVER, Deadlock()))
         return self._one(Claim(ClaimKind.REACHABLE, Deadlock()), self.certifier.deadlock)
+
+    def _competing(self, verdict: Verdict) -> Iterator[tuple[Claim, Certificate]]:
+        net, goal = self.net, competing(self.net)
+        if verdict.status is Status.PROVED and goal is not None:
+            yield from self._never(goal, verdict)
+        elif verdict.witness is not None:
+            firable = [net.transitions[t].name for t in Player(net).may_fire(net.marking(verdict.witness.marking))]
+            pairs = (pair for pair in combinations(firable, 2) if compete(net, *pair))
+            if (pair := next(pairs, None)) is not None:
+                both = And((Firable(pair[0]), Firable(pair[1])))
+                yield from self._one(Claim(ClaimKind.REACHABLE, both), verdict.witness)
 
     def _home_claim(self, home: Marking) -> Claim:
         return Claim(ClaimKind.ALWAYS_POSSIBLE, tidy(is_marking(self.net, home)))

@@ -52,7 +52,9 @@ from firable.nets.verdict import Witness
 from firable.semantics.trace import Discipline
 
 MARKINGS_MAX: Final = 20_000
-"""How many markings are listed, each in a word of the document."""
+"""How many markings are listed where a decision diagram would do as well."""
+WIDE_MAX: Final = 100_000
+"""How many markings are listed where none would: for responses, LTL and synchronous steps."""
 _SECONDS: Final = 30.0
 
 Never = InductiveInvariant | Labelling
@@ -81,19 +83,32 @@ class Certifier:
 
     @cached_property
     def graph(self) -> ReachabilityGraph | None:
-        """All markings as a graph, where they are few enough to be listed."""
+        """All markings as a graph, where they are few enough to be listed for whatever is claimed."""
+        return self._explored(MARKINGS_MAX if self.discipline is Discipline.INTERLEAVING else WIDE_MAX)
+
+    @cached_property
+    def wide(self) -> ReachabilityGraph | None:
+        """The same, where only listed markings will do."""
+        return self.graph or self._explored(WIDE_MAX)
+
+    def _explored(self, most: int) -> ReachabilityGraph | None:
         graph = self._given
+        if isinstance(graph, SymbolicSpace) and graph.n_markings > most:
+            return None
         if not isinstance(graph, ReachabilityGraph) or not graph.complete:
-            if isinstance(graph, SymbolicSpace) and graph.n_markings > MARKINGS_MAX:
-                return None
-            budget = Budget(MARKINGS_MAX, self.limits.memory_bytes)
+            budget = Budget(most, self.limits.memory_bytes)
             graph = explore(self.net, self.discipline, budget, deadline=self._part(0.2))
-        return graph.until(self.limits.deadline) if graph.complete and graph.n_markings <= MARKINGS_MAX else None
+        return graph.until(self.limits.deadline) if graph.complete and graph.n_markings <= most else None
 
     @cached_property
     def markings(self) -> Markings | None:
-        """The same markings as they are written."""
+        """The markings of `graph` as they are written."""
         return None if self.graph is None else listed(self.graph)
+
+    @cached_property
+    def wide_markings(self) -> Markings | None:
+        """The markings of `wide` as they are written."""
+        return self.markings or (None if self.wide is None else listed(self.wide))
 
     @cached_property
     def symbolic(self) -> SymbolicSpace | None:
@@ -148,11 +163,13 @@ class Certifier:
             case ClaimKind.NOT_LTL | ClaimKind.NOT_LEADS_TO:
                 return None if witness is None else FiringSequence(witness.firings, witness.cycle)
             case ClaimKind.LTL:
-                return None if self.markings is None else Unfolded(self.markings)
+                if self.wide_markings is None:
+                    raise LackingError(f"a tableau is unfolded on up to {WIDE_MAX:,} markings")
+                return Unfolded(self.wide_markings)
             case ClaimKind.LEADS_TO:
-                if self.graph is None or self.markings is None:
-                    raise LackingError(f"ranks for a response are written for up to {MARKINGS_MAX:,} markings")
-                return progress(self.graph, self.markings, claim)
+                if self.wide is None or self.wide_markings is None:
+                    raise LackingError(f"ranks for a response are written for up to {WIDE_MAX:,} markings")
+                return progress(self.wide, self.wide_markings, claim)
             case ClaimKind.LIVE | ClaimKind.HOME:
                 return self.theorem(claim)
             case ClaimKind.FIRES:
