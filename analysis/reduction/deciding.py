@@ -55,7 +55,10 @@ def decide_reduced(
     >>> finding.reachable, finding.method[:44]
     (False, 'structural reduction from 28/15 to 0/0 place')
     """
-    reduced = reduce_for_goal(net, goal, limits)
+    try:
+        reduced = reduce_for_goal(net, goal, limits)
+    except BudgetExceeded as error:
+        return Finding(None, "structural reduction", bound=str(error))
     if isinstance(reduced.goal, Constant):
         witness = reduced.lift(()) if reduced.goal.value else None
         return Finding(reduced.goal.value, f"structural {reduced.summary}", witness)
@@ -164,7 +167,10 @@ def known_by_reduction(net: Net, limits: Limits) -> Mapping[str, Known]:
     """
     left = limits.deadline.left_seconds
     until = limits.deadline if left is None else limits.deadline.within(left / 2)
-    reduced = reduce_for_liveness(net, replace(limits, deadline=until))
+    try:
+        reduced = reduce_for_liveness(net, replace(limits, deadline=until))
+    except BudgetExceeded:
+        return {}
     if dead := tuple(name for name, image in reduced.transitions.items() if image is None):
         return {name: Known(no(dead), f"structural {reduced.summary}") for name in ("quasi-live", "live")}
     firings = find_firings(reduced.net, limits, net)

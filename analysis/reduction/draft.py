@@ -26,9 +26,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Final
 
+from firable.analysis._engine import BudgetExceeded
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.reduction.goals import Goal, Value, literals_in, rewritten
 from firable.nets.net import Net, Place, Transition
+
+_POLL: Final = 1_000  # transitions that are read between two looks at the deadline
 
 Literal = int
 """A place with a value: twice the index of the place, plus the value."""
@@ -108,6 +113,8 @@ class Tail:
 class Draft:
     """A net under reduction, and the goal that is preserved, None where it is what each transition can do.
 
+    Raises `BudgetExceeded` where the deadline comes before the net is read: a part of it says nothing.
+
     `values` are those of M0; `at[l]` are the moves that need literal l. What a rule does goes through the methods, so
     that the index keeps up. `number_of` gives the move that a transition was at first, `same_as` the one that it was
     merged into. `touched` are the places at which something has changed since a rule last took them.
@@ -115,6 +122,7 @@ class Draft:
 
     net: Net
     goal: Goal | None
+    deadline: Deadline = NEVER
     values: list[bool] = field(init=False)
     places: set[int] = field(init=False)
     moves: dict[int, Move] = field(default_factory=dict)
@@ -134,6 +142,8 @@ class Draft:
         self.touch_all()
         self.at = [set() for _ in range(2 * len(self.values))]
         for t, transition in enumerate(self.net.transitions):
+            if t and t % _POLL == 0 and self.deadline.over:
+                raise BudgetExceeded("the time was over before the net was read for its reduction")
             if (move := self._taken_over(t, transition)) is not None:
                 self.number_of[t] = self.add(move)
             else:

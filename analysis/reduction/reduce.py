@@ -129,9 +129,9 @@ def reduce_for_goal(net: Net, goal: Formula, limits: Limits | None = None) -> Re
     >>> len(reduced.net.places), reduced.lift([]).firings
     (0, (('t',), ('u',)))
     """
-    wanted = goal_of(net, goal)
-    draft = Draft(net, wanted)
-    _reduce(draft, limits or Limits())
+    limits = limits or Limits()
+    draft = Draft(net, goal_of(net, goal), limits.deadline)
+    _reduce(draft, limits)
     small, numbers = draft.as_net()
     assert draft.goal is not None
     moves = {name: draft.moves[number] for name, number in numbers.items()}
@@ -152,8 +152,9 @@ def reduce_for_liveness(net: Net, limits: Limits | None = None) -> ReducedTransi
     needs: each marking enables the same transitions as its image. Whether there is a deadlock is preserved too. How
     many markings there are is not, nor whether M0 can be reached again: two of them may have one image.
     """
-    draft = Draft(net, None)
-    _reduce(draft, limits or Limits())
+    limits = limits or Limits()
+    draft = Draft(net, None, limits.deadline)
+    _reduce(draft, limits)
     small, numbers = draft.as_net()
     names = {number: name for name, number in numbers.items()}
     images: dict[str, str | None] = {}

@@ -238,6 +238,11 @@ class ReachabilityGraph(Derived[Column]):
         """For each transition, in how many markings found it is in contact."""
         return self.engine.contacts()
 
+    def witness_of_contact(self, among: Sequence[int]) -> Witness | None:
+        """A shortest firing sequence to a marking in contact at one of some transitions, which the engine has noted."""
+        found = [index for t in among if (index := self.engine.contact_witness(t)) is not None]
+        return self.witness_at(min(found)) if found else None
+
     def fired(self) -> Sequence[int]:
         """For each transition, on how many edges it fires."""
         return self.engine.fired()

@@ -167,6 +167,10 @@ class StateSpace(Protocol[S]):
         """For each transition, in how many markings it is in contact."""
         ...
 
+    def witness_of_contact(self, among: Sequence[int]) -> Witness | None:
+        """A firing sequence to a marking in contact at one of some transitions, as `witness` gives it."""
+        ...
+
     def fired(self) -> Sequence[int]:
         """For each transition, on how many edges it fires, or 1 for "some" where only that is known."""
         ...
@@ -212,6 +216,10 @@ class Derived(Generic[S]):
     def contacts(self: StateSpace[S]) -> Sequence[int]:
         """For each transition, in how many markings it is in contact."""
         return tuple(self.count(self.in_contact(t)) for t in range(len(self.net.transitions)))
+
+    def witness_of_contact(self: StateSpace[S], among: Sequence[int]) -> Witness | None:
+        """A firing sequence to a marking in contact at one of some transitions, as `witness` gives it."""
+        return self.witness(self.algebra.disjunction(self.in_contact(t) for t in among))
 
     def fired(self: StateSpace[S]) -> Sequence[int]:
         """For each transition, in how many markings it may fire."""

@@ -168,7 +168,7 @@ def contact_free(behaviour: Behaviour[Any]) -> Verdict:
 def _nearest_contact(space: StateSpace[S], blocked: Sequence[int]) -> Witness:
     """A sequence to a marking in contact, and what is full there."""
     net = space.net
-    found = space.witness(space.algebra.disjunction(space.in_contact(t) for t in blocked))
+    found = space.witness_of_contact(blocked)
     if found is None:
         raise WitnessError("there are markings in contact, and none of them is found")
     marking = net.marking(found.marking)

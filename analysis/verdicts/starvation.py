@@ -77,6 +77,8 @@ def eager_run(net: Net, *, steps_max: int = STEPS_MAX, deadline: Deadline = NEVE
     (('t',), ('u',))
     """
     player, arbitration = Player(net), Arbitration.of(net)
+    if deadline.over:
+        return EagerRun((), (), complete=False)
     marking, turns = net.initial_marking, arbitration.first_turns
     seen = {(marking, turns): 0}
     fired: list[tuple[str, ...]] = []

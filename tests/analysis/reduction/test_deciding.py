@@ -15,6 +15,7 @@ from support.naive_space import NaiveSpace
 from support.small_text import net_of
 
 from firable.analysis.check import check
+from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import InductiveInvariant
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.reduction.components import parts
@@ -27,7 +28,7 @@ from firable.analysis.reduction.deciding import (
 from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.analysis.spaces.symbolic import SymbolicSpace
 from firable.nets.catalogue import catalogue_net
-from firable.nets.catalogue.processes import philosophers
+from firable.nets.catalogue.processes import machines, philosophers
 from firable.nets.formula import And, Deadlock, Formula, Holds, Not, parse_formula
 from firable.nets.net import Net, Place, Transition
 from firable.nets.verdict import Cost, Status, Witness
@@ -235,3 +236,11 @@ def test_a_diagram_without_room_decides_nothing() -> None:
     found = decide_by_diagram(philosophers(8), Deadlock(), Limits(memory_bytes=1000))
     assert found.reachable is None
     assert found.bound
+
+
+def test_a_net_that_was_not_read_in_time_is_left_undecided() -> None:
+    late, wide = Limits(Deadline.after(0)), machines(600)
+    found = decide_by_reduction(wide, Deadlock(), late)
+    assert found.reachable is None
+    assert found.bound == "the time was over before the net was read for its reduction"
+    assert known_by_reduction(wide, late) == {}
