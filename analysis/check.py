@@ -18,6 +18,7 @@ The report's `course` tells what was tried. A technique that is asked for by nam
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -66,8 +67,8 @@ def check(
 
     The verdicts on `queries` follow those on the net's own properties.
 
-    Raises `InputError` F2013 where the arbiters do not fit the conflicts of the net, F3004 where the budget does not
-    hold the net itself, F3006 where the method knows no synchronous steps.
+    Raises `InputError` F2001 where two queries have one name, F2013 where the arbiters do not fit the conflicts of the
+    net, F3004 where the budget does not hold the net itself, F3006 where the method knows no synchronous steps.
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> report = check(catalogue_net("conceptual_one_robot"))
@@ -75,6 +76,9 @@ def check(
     (14, 23, 'proved')
     """
     discipline, budget, method = Discipline(discipline), budget or Budget(), Method(method)
+    if twice := {name for name, count in Counter(query.name for query in queries).items() if count > 1}:
+        message = f"'{min(twice)}' is the name of two queries"
+        raise InputError([Diagnostic("F2001", message, "give each query a name of its own")])
     interrupted = Event()
     deadline = Deadline(cancelled=interrupted)
     if budget.seconds is not None:

@@ -10,6 +10,7 @@ states from the automaton, and each state costs a fixpoint over the whole state 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Final
 
 from firable.nets.formula import And, Constant, Formula, Not, Or
@@ -131,44 +132,47 @@ def _next(operand: Temporal) -> Temporal:
     return Next(operand)
 
 
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """Until or release, which are each other's mirror: what is true of the one is of the other with all sides turned.
+
+    `anything` on the left asks nothing of the time before, `nothing` on the left lets no time pass; `passes` says that
+    what is on the right is not changed by the time before it; the operator goes into each of `many`.
+    """
+
+    make: type[Until] | type[Release]
+    anything: Temporal
+    nothing: Temporal
+    passes: Callable[[Temporal], bool]
+    many: type[TemporalAnd] | type[TemporalOr]
+
+    def __call__(self, left: Temporal, right: Temporal) -> Temporal:
+        """The operator applied, simplified."""
+        if right in {TRUE, FALSE} or left == self.nothing or self.passes(right):
+            return right
+        if isinstance(right, self.make) and (left == self.anything or right.left == left):  # F (p U q), p U (p U q)
+            return self(left, right.right)
+        if isinstance(right, Next) and left == self.anything:
+            return _next(self(left, right.operand))
+        if isinstance(right, Next) and isinstance(left, Next):
+            return _next(self(left.operand, right.operand))
+        if not isinstance(right, TemporalAnd | TemporalOr):
+            return self.make(left, right)
+        join = _all_of if isinstance(right, TemporalAnd) else _any_of
+        if isinstance(right, self.many) and left == self.anything:
+            return join(self(left, operand) for operand in right.operands)
+        if free := [one for one in right.operands if _invariant(one)]:
+            rest = tuple(one for one in right.operands if one not in free)
+            return join((self(left, join(rest)), *free))
+        return self.make(left, right)
+
+
 def _until(left: Temporal, right: Temporal) -> Temporal:
-    if right in {TRUE, FALSE} or left == FALSE or _eventual(right):
-        return right
-    match right:
-        case Until(inner, last) if left == TRUE or inner == left:  # F (p U q), p U (p U q)
-            return _until(left, last)
-        case Next(later) if left == TRUE:
-            return _next(_until(TRUE, later))
-        case Next(later) if isinstance(left, Next):
-            return _next(_until(left.operand, later))
-        case TemporalOr(operands) if left == TRUE:
-            return _any_of(_until(TRUE, operand) for operand in operands)
-        case TemporalAnd(operands) | TemporalOr(operands) if free := [one for one in operands if _invariant(one)]:
-            rest = tuple(one for one in operands if one not in free)
-            if isinstance(right, TemporalAnd):
-                return _all_of((_until(left, _all_of(rest)), *free))
-            return _any_of((_until(left, _any_of(rest)), *free))
-    return Until(left, right)
+    return _Kind(Until, TRUE, FALSE, _eventual, TemporalOr)(left, right)
 
 
 def _release(left: Temporal, right: Temporal) -> Temporal:
-    if right in {TRUE, FALSE} or left == TRUE or _universal(right):
-        return right
-    match right:
-        case Release(inner, last) if left == FALSE or inner == left:  # G (p R q), p R (p R q)
-            return _release(left, last)
-        case Next(later) if left == FALSE:
-            return _next(_release(FALSE, later))
-        case Next(later) if isinstance(left, Next):
-            return _next(_release(left.operand, later))
-        case TemporalAnd(operands) if left == FALSE:
-            return _all_of(_release(FALSE, operand) for operand in operands)
-        case TemporalAnd(operands) | TemporalOr(operands) if free := [one for one in operands if _invariant(one)]:
-            rest = tuple(one for one in operands if one not in free)
-            if isinstance(right, TemporalAnd):
-                return _all_of((_release(left, _all_of(rest)), *free))
-            return _any_of((_release(left, _any_of(rest)), *free))
-    return Release(left, right)
+    return _Kind(Release, FALSE, TRUE, _universal, TemporalAnd)(left, right)
 
 
 def _eventual(formula: Temporal) -> bool:

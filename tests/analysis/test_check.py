@@ -111,3 +111,10 @@ def test_what_no_space_holds_follows_from_a_deadlock_that_was_found(monkeypatch:
 
 def _gives_up(*_: object) -> None:
     raise IncompleteGraph("no room")
+
+
+def test_two_queries_of_one_name_are_refused() -> None:
+    queries = (parse_query("AG EF robot.free", "again"), parse_query("G not robot.free", "again"))
+    with pytest.raises(InputError) as refused:
+        check(catalogue_net("one_robot"), queries=queries)
+    assert [d.code for d in refused.value.diagnostics] == ["F2001"]
