@@ -61,13 +61,19 @@ from firable.nets.net import Net
 from firable.nets.queries import parse_query
 from firable.nets.temporal import format_temporal
 from firable.semantics.formulas import evaluate
+from firable.semantics.player import Player
 
 TIMEOUT_MS: Final = 60_000
 
 _SHOWS: Final = {
-    FiringSequence: {ClaimKind.REACHABLE, ClaimKind.FIRES, ClaimKind.NOT_LTL, ClaimKind.NOT_LEADS_TO},
+    FiringSequence: {
+        *(ClaimKind.REACHABLE, ClaimKind.FIRES, ClaimKind.NOT_LTL, ClaimKind.NOT_LEADS_TO, ClaimKind.UNORDERED),
+    },
     InductiveInvariant: {ClaimKind.NEVER},
-    Labelling: {ClaimKind.NEVER, ClaimKind.REACHABLE, ClaimKind.ALWAYS_POSSIBLE, ClaimKind.LOST, ClaimKind.CTL},
+    Labelling: {
+        *(ClaimKind.NEVER, ClaimKind.REACHABLE, ClaimKind.ALWAYS_POSSIBLE, ClaimKind.LOST, ClaimKind.CTL),
+        ClaimKind.ORDERED,
+    },
     Continuation: {ClaimKind.LOST},
     Progress: {ClaimKind.LEADS_TO},
     Theorem: {ClaimKind.LIVE, ClaimKind.HOME, ClaimKind.ALWAYS_POSSIBLE},
@@ -230,6 +236,8 @@ class _Checker:
             if any(found) if isinstance(found, list) else found:
                 refuse(f"the goal ({format_formula(claim.state_goal)}) holds in a marking of the set")
             return Checked(shown=True, method=space.method)
+        if claim.kind is ClaimKind.ORDERED:
+            return _ordered(space)
         _require_initially(space, claim, labels)
         return Checked(shown=True, method=f"{space.method}{', and the labels looked through' if labels else ''}")
 
@@ -263,6 +271,17 @@ class _Checker:
         return ""
 
 
+def _ordered(space: Listed | Diagrams) -> Checked:
+    """Refuse a set of markings with a step that no order replays; under interleaving each firing is one."""
+    if isinstance(space, Listed):
+        steps = {fired for row in space.edges for fired, _ in row if len(fired) > 1}
+        for fired in steps:
+            if not space.player.serialisable(fired):
+                names = (space.net.transitions[t].name for t in fired)
+                refuse(f"the step of {' + '.join(names)} has no order")
+    return Checked(shown=True, method=f"{space.method}, and the steps put in order")
+
+
 def _require_initially(space: Listed | Diagrams, claim: Claim, labels: tuple[Label, ...]) -> None:
     """Refuse labels that do not show the claim of M0."""
     formula = as_ctl(claim)
@@ -287,6 +306,12 @@ def _run(evidence: Evidence, of: FiringSequence) -> Checked:
         case ClaimKind.NOT_LEADS_TO:
             check_unanswered_run(net, discipline, claim, of)
             return Checked(shown=True, method=f"{method}, a run that is fair and has no answer")
+    if claim.kind is ClaimKind.UNORDERED:
+        played(net, discipline, of.firings)
+        last = [net.transition_index[name] for name in of.firings[-1]] if of.firings else []
+        if Player(net).serialisable(last):
+            refuse("the last step of the run can be replayed one firing after the other")
+        return Checked(shown=True, method=f"{method}, the last of which have no order")
     if of.cycle:
         refuse("a run into a marking has no cycle")
     markings = played(net, discipline, of.firings)

@@ -38,6 +38,8 @@ class ClaimKind(StrEnum):
     NOT_LTL = "not_ltl"  # it does not hold of some maximal run
     LEADS_TO = "leads_to"  # every maximal and fair run that meets the goal meets `then` at that moment or later
     NOT_LEADS_TO = "not_leads_to"  # some does not
+    ORDERED = "ordered"  # every step can be replayed by some order of single firings
+    UNORDERED = "unordered"  # some cannot
     LIVE = "live"  # from every reachable marking every transition can fire again
     HOME = "home"  # some marking can be reached from every reachable marking
 
@@ -84,6 +86,9 @@ class Claim:
                 return f"{every} {runs} that meets ({goal}) {ends} ({format_formula(self.then)}) after it"
             case ClaimKind.LIVE:
                 return "from every reachable marking every transition can fire again, external gates free"
+            case ClaimKind.ORDERED | ClaimKind.UNORDERED:
+                quantor = "every step can" if self.kind is ClaimKind.ORDERED else "some step cannot"
+                return f"{quantor} be replayed by some order of single firings"
             case ClaimKind.HOME:
                 return "some marking can be reached from every reachable marking"
         return _PATTERNS[self.kind].format(goal)

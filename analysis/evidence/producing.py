@@ -143,6 +143,9 @@ class _Verdicts:
                 return self._never(completions_clash(net), verdict)
             case "effective-conflicts":
                 return self._competing(verdict)
+            case "steps-serialisable":
+                kind = ClaimKind.ORDERED if proved else ClaimKind.UNORDERED
+                return self._one(Claim(kind), verdict.witness)
             case "machine-never-stopped":
                 return self._stopped() if proved else self._never_stopped()
             case "starvation":

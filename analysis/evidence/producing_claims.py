@@ -49,6 +49,7 @@ from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Witness
+from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
 
 MARKINGS_MAX: Final = 20_000
@@ -170,11 +171,24 @@ class Certifier:
                 if self.wide is None or self.wide_markings is None:
                     raise LackingError(f"ranks for a response are written for up to {WIDE_MAX:,} markings")
                 return progress(self.wide, self.wide_markings, claim)
+            case ClaimKind.ORDERED:
+                return None if self.markings is None else Labelling(self.markings)
+            case ClaimKind.UNORDERED:
+                return None if witness is None else self._unordered(witness)
             case ClaimKind.LIVE | ClaimKind.HOME:
                 return self.theorem(claim)
             case ClaimKind.FIRES:
                 raise LackingError("runs are looked for together")
         return self._labelled(claim)
+
+    def _unordered(self, witness: Witness) -> FiringSequence | None:
+        """The run, with the step after it that has no order."""
+        player = Player(self.net)
+        for step in sorted(player.steps(self.net.marking(witness.marking))):
+            if not player.serialisable(step):
+                names = tuple(self.net.transitions[t].name for t in step)
+                return FiringSequence((*witness.firings, names))
+        return None
 
     def _labelled(self, claim: Claim) -> Labelling | None:
         formula = as_ctl(claim)

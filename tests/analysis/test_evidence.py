@@ -267,6 +267,8 @@ def test_another_net_is_refused_or_the_claim_is_true_of_it(example: Evidence) ->
             edited["net"]["places"][i]["marked"] ^= True
         else:
             edited["net"]["transitions"][i][key] = edited["net"]["transitions"][i][key][1:]
+        if edited == data:
+            continue
         assert refuses(sealed(edited))  # the digest is that of the old net
         try:
             net = net_from_json(edited["net"])

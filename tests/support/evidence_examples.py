@@ -1,6 +1,7 @@
 """One example of evidence for each kind of certificate, to be damaged, edited and weakened."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from support.evidence import certified, evidence_of_finding
 
@@ -67,6 +68,11 @@ CIRCUIT = Net(  # a marked graph of two circuits
         Transition("two", ("d",), ("c",)),
     ),
 )
+RACING = Net(  # each closes the other's gate, and both fire in one step
+    "racing",
+    (Place("a", marked=True), Place("b", marked=True)),
+    (Transition("t", ("a",), permissive=("b",)), Transition("u", ("b",), permissive=("a",))),
+)
 ENDING = Net("ending", (Place("a", marked=True), Place("b")), (Transition("end", ("a",), ("b",)),))
 
 
@@ -129,6 +135,12 @@ EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
     ),
     "unfolded": lambda: certified(TURNS, Claim(ClaimKind.LTL, parse_temporal("G (fires(go) -> X done)"))),
     "lasso": lambda: _invented(TURNS, Claim(ClaimKind.NOT_LTL, parse_temporal("G F done")), "tick", "tock tick"),
+    "unordered": lambda: replace(
+        _invented(RACING, Claim(ClaimKind.UNORDERED), ""),
+        discipline=Discipline.STEP,
+        certificate=FiringSequence((("t", "u"),)),
+    ),
+    "ordered": lambda: certified(CIRCUIT, Claim(ClaimKind.ORDERED), Discipline.STEP),
     "marked graph": lambda: _theorem(CIRCUIT, Claim(ClaimKind.LIVE)),
     "free choice": lambda: _theorem(CHOICE, Claim(ClaimKind.ALWAYS_POSSIBLE, Start())),
 }

@@ -24,6 +24,7 @@ from firable.nets.temporal import (
     Until,
     negated,
 )
+from firable.semantics.player import Player
 
 
 def true(evidence: Evidence) -> bool:
@@ -40,6 +41,10 @@ def true(evidence: Evidence) -> bool:
         case ClaimKind.LEADS_TO | ClaimKind.NOT_LEADS_TO:
             of = Property("asked", PropertyKind.LEADS_TO, claim.state_goal, claim.then, claim.fairness)
             return leads_to(space, of).holds is (claim.kind is ClaimKind.LEADS_TO)
+        case ClaimKind.ORDERED | ClaimKind.UNORDERED:
+            player = Player(net)
+            ordered = all(player.serialisable(fired) for edges in space.graph.values() for fired, _ in edges)
+            return ordered is (claim.kind is ClaimKind.ORDERED)
         case ClaimKind.LIVE:
             return all(space.live())
         case ClaimKind.HOME:
