@@ -29,6 +29,9 @@ use super::values::Value;
 use super::zdd::{EMPTY, Node};
 use crate::budget::{Stop, Watch};
 
+/// How many steps take as long as a result, about.
+const STEPS: u64 = 4;
+
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Frame {
     /// Fires a suffix below each value of a node; `at` is the first of its values that is not done.
@@ -134,14 +137,16 @@ impl Saturation {
         self.frames.iter().map_while(block).last().map_or(0, |block| blocks.low(block).saturating_sub(1))
     }
 
-    /// Works on, for about so many steps; the closure once it is found.
+    /// Works on until about so many results were computed; the closure once it is found.
     pub(super) fn run(
         &mut self,
         shop: &mut Workshop<'_>,
         fuel: u64,
         watch: &mut Watch<'_>,
     ) -> Result<Option<Node>, Stop> {
-        for _ in 0..fuel {
+        let (end, mut steps) = (shop.diagram.cache.work.saturating_add(fuel), 0);
+        while shop.diagram.cache.work.saturating_add(steps / STEPS) < end {
+            steps += 1;
             if let (Step::Return(node), true) = (self.step, self.frames.is_empty()) {
                 return Ok(Some(node));
             }
