@@ -4,6 +4,9 @@
 //! own: a net has half a million levels, and a recursion as deep ends in the stack of the thread, where running out is
 //! no return value. One loop serves all four operations, which differ only in their easy cases and in what becomes of
 //! a level that one operand passes over.
+//!
+//! A result is remembered only for the highest pair of nodes in a block of levels. A block has few paths, so what is done
+//! twice inside it is little, and to remember it all would fill the cache with several times as many results.
 
 use super::cache::{Cache, Op};
 use super::zdd::{EMPTY, Node, Store, TERMINAL, UNIT};
@@ -17,6 +20,8 @@ pub struct Diagram {
     /// The results.
     pub cache: Cache,
     calls: Vec<Call>,
+    /// The block of each level; 0 for level 0.
+    block_of: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +29,9 @@ struct Call {
     a: Node,
     b: Node,
     lo: Node,
+    level: u32,
+    /// Whether the result is remembered.
+    kept: bool,
 }
 
 const PENDING: Node = u32::MAX;
@@ -73,11 +81,12 @@ impl Binary {
 }
 
 impl Diagram {
-    /// An empty diagram within a budget; half of it at most goes to remembered results.
-    pub fn new(memory: Memory, bytes_max: usize) -> Result<Self, Stop> {
+    /// An empty diagram within a budget; half of it at most goes to remembered results. `block_of` gives each level from
+    /// 0 its block.
+    pub fn new(memory: Memory, bytes_max: usize, block_of: Vec<u32>) -> Result<Self, Stop> {
         let store = Store::new(memory)?;
         let cache = Cache::new(&store.memory, bytes_max / 2)?;
-        Ok(Diagram { store, cache, calls: Vec::new() })
+        Ok(Diagram { store, cache, calls: Vec::new(), block_of })
     }
 
     /// A Boolean operation on two sets.
@@ -111,25 +120,31 @@ impl Diagram {
                         Step::Call(a, b)
                     } else if binary == Binary::Difference && above < below {
                         Step::Call(a, self.store.lo(b))
-                    } else if let Some(known) = self.cache.get(op, 0, a, b) {
-                        Step::Return(known)
                     } else {
-                        watch.tick(1)?;
                         let level = above.max(below);
-                        self.store.memory.push(&mut self.calls, Call { a, b, lo: PENDING })?;
-                        Step::Call(self.store.split(a, level).0, self.store.split(b, level).0)
+                        let block = |level: u32| self.block_of[level as usize];
+                        let kept = self.calls.last().is_none_or(|up| block(up.level) != block(level));
+                        if let Some(known) = if kept { self.cache.get(op, 0, a, b) } else { None } {
+                            Step::Return(known)
+                        } else {
+                            watch.tick(1)?;
+                            self.store.memory.push(&mut self.calls, Call { a, b, lo: PENDING, level, kept })?;
+                            Step::Call(self.store.split(a, level).0, self.store.split(b, level).0)
+                        }
                     }
                 }
                 Step::Return(node) => {
                     let Some(mut call) = self.calls.pop() else { return Ok(node) };
-                    let level = self.store.level(call.a).max(self.store.level(call.b));
+                    let level = call.level;
                     if call.lo == PENDING {
                         call.lo = node;
                         self.calls.push(call); // into the room it came from
                         Step::Call(self.store.split(call.a, level).1, self.store.split(call.b, level).1)
                     } else {
                         let node = self.store.node(level, call.lo, node)?;
-                        self.cache.put(&self.store.memory, op, 0, call.a, call.b, node)?;
+                        if call.kept {
+                            self.cache.put(&self.store.memory, op, 0, call.a, call.b, node)?;
+                        }
                         Step::Return(node)
                     }
                 }

@@ -23,6 +23,8 @@ const WIDTH_MAX: usize = 16;
 const VALUES_MAX: usize = 24;
 /// What a block costs besides its values, in values.
 const OVERHEAD: usize = 6;
+/// The moves from a value that may be looked at altogether; what is left is cut into places.
+const WORK_MAX: usize = 1 << 24;
 
 /// The literals of transitions in descending order of level; without those that never fire or change nothing.
 #[derive(Debug)]
@@ -95,9 +97,9 @@ impl Blocks {
         let mut widths: HashMap<(u32, Vec<Local>), usize, Mixed> = HashMap::default();
         let mut seen = vec![0_u32; literals.len()];
         let (mut of, mut low) = (vec![0], vec![0]);
-        let mut start = 1;
+        let (mut start, mut work) = (1, 0);
         while start <= levels {
-            let most = WIDTH_MAX.min(levels + 1 - start);
+            let most = if work > WORK_MAX { 1 } else { WIDTH_MAX.min(levels + 1 - start) };
             let mut window: Vec<Local> = Vec::new();
             for &t in &joined[offsets[start] as usize..offsets[start + most] as usize] {
                 if std::mem::replace(&mut seen[t as usize], start as u32) != start as u32 {
@@ -107,8 +109,8 @@ impl Blocks {
             window.sort_unstable();
             window.dedup();
             let first = (0..most).fold(0, |value, at| value | u32::from(marked[start + at]) << at);
-            let width =
-                *widths.entry((first, window)).or_insert_with_key(|(first, window)| width(*first, window, most));
+            let best = |(first, window): &(u32, Vec<Local>)| width(*first, window, most, &mut work);
+            let width = *widths.entry((first, window)).or_insert_with_key(best);
             of.resize(start + width, low.len() as u32);
             low.push(start as u32);
             start += width;
@@ -167,7 +169,7 @@ fn local(literals: &[(u32, Kind)], start: u32, width: u32) -> Local {
 }
 
 /// How many places from the first of a window make the best block.
-fn width(first: u32, window: &[Local], most: usize) -> usize {
+fn width(first: u32, window: &[Local], most: usize, work: &mut usize) -> usize {
     let (mut best, mut width) = (usize::MAX, 1);
     for places in 1..=most {
         let mask = u32::MAX >> (32 - places);
@@ -175,11 +177,13 @@ fn width(first: u32, window: &[Local], most: usize) -> usize {
         moves.retain(|local| local[2] != 0);
         moves.sort_unstable();
         moves.dedup();
+        *work += window.len();
         let mut values = vec![first & mask];
         let mut at = 0;
         while at < values.len() && values.len() <= VALUES_MAX {
             let value = values[at];
             at += 1;
+            *work += moves.len();
             for [full, empty, flip] in &moves {
                 if value & full == *full && value & empty == 0 && !values.contains(&(value ^ flip)) {
                     values.push(value ^ flip);

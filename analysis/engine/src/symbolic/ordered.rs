@@ -55,11 +55,13 @@ impl Ordered {
         let mut marked = vec![false; places + 1];
         initial.iter().for_each(|&place| marked[level_of[place as usize] as usize] = true);
         let firings = Literals::new(transitions, &level_of, Sense::Forward);
+        let blocks = Blocks::new(&firings, &marked);
+        let block_of = (0..=places as u32).map(|level| blocks.of(level)).collect();
         let mut ordered = Ordered {
-            diagram: Diagram::new(Memory::new(bytes), bytes)?,
+            diagram: Diagram::new(Memory::new(bytes), bytes, block_of)?,
             suffixes: Suffixes::default(),
             tables: [const { None }; 4],
-            blocks: Blocks::new(&firings, &marked),
+            blocks,
             parts: Parts::default(),
             agendas: [const { None }; 2],
             level_of,
