@@ -72,7 +72,13 @@ KNOWERS: Final[dict[Method, Technique[Knower]]] = {
     Method.COMPACT: Technique("compact search of all markings", "firable.analysis.compact:known_by_counting"),
 }
 
-FIRST_KNOWERS: Final = {Method.REDUCTION: 0.5, Method.STRUCTURE: 0.3}
+WORTH_ASKING: Final[dict[Method, frozenset[str]]] = {
+    Method.REDUCTION: frozenset({"quasi-live", "deadlock-free"}),
+    Method.STUBBORN_SETS: frozenset({"quasi-live", "deadlock-free"}),
+}
+"""Which verdicts must be open for a technique to be asked what it knows: one of these, or any where it is not named."""
+
+FIRST_KNOWERS: Final = {Method.REDUCTION: 0.5, Method.STRUCTURE: 0.6}
 """Whom `auto` asks, in this order, and for which part of the time that is left.
 
 Stubborn sets know what those on the reduced net know, and later.

@@ -22,7 +22,7 @@ from typing import Final
 from firable.analysis._engine import IncompleteGraph
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Finding, Limits
-from firable.analysis.methods import GOALS, KNOWERS, Method
+from firable.analysis.methods import GOALS, KNOWERS, WORTH_ASKING, Method
 from firable.analysis.question import Answer, Question, no, yes
 from firable.analysis.race import SLICES_SECONDS, Contestant, Outcome, T, race
 from firable.analysis.spaces.space import WitnessError
@@ -64,7 +64,7 @@ class Settling:
     def learn(self, of: Method, among: Collection[str], deadline: Deadline) -> None:
         """Take from a technique what it knows at once of these verdicts, by name."""
         missing = {name for name in among if name not in self.found}
-        if not missing or deadline.over:
+        if missing.isdisjoint(WORTH_ASKING.get(of, missing)) or deadline.over:
             return
         began = perf_counter()
         try:
