@@ -2,7 +2,8 @@
 
 That each transition fires in some run is shown by few runs rather than by one for each: on a graph of all markings a
 run goes on to the nearest marking where an open transition may fire, and only where none is left ahead does another
-begin. On nets too large for that, searches by stubborn sets give such runs (`firable.analysis.stubborn`).
+begin. On nets too large for that, walks and searches by stubborn sets give such runs (`firable.analysis.stubborn`),
+best on the net reduced for liveness.
 
 That there is no home marking is shown by a formula: it holds for ever from one marking and never again from another.
 Of a bottom component a place that never changes in it, and not in another, will do; else its markings, if they are
@@ -11,16 +12,19 @@ few.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.compiled import engine_limits
 from firable.analysis.evidence.certificate import FiringSequence
 from firable.analysis.evidence.claims import is_marking
 from firable.analysis.evidence.meaning import tidy
 from firable.analysis.goal import Limits
+from firable.analysis.reduction.reduce import reduce_for_liveness
 from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.stubborn import find_firings
@@ -95,16 +99,34 @@ class _Run:
 
 
 def runs_by_search(net: Net, names: Sequence[str], limits: Limits) -> list[Run]:
-    """Runs from M0 that fire these transitions under interleaving, by stubborn sets."""
-    found = find_firings(net, limits)
-    wanted, runs = {net.transition_index[name] for name in names}, list[Run]()
-    # The last ones first: the ways to them lead past others.
-    for t in sorted(found.fires, key=found.fires.__getitem__, reverse=True):
-        if t in wanted and (witness := found.witness(net.transitions[t].name)) is not None:
-            runs.append(witness.firings)
-            wanted -= {net.transition_index[name] for fired in witness.firings for name in fired}
+    """Runs from M0 that fire these transitions under interleaving: by searches on the reduced net, then on this one.
+
+    A transition of the reduced net stands for others that may fire where it may: the last firing of its run is theirs.
+    """
+    wanted, runs = set(names), list[Run]()
+    for reduced in (True, False):
+        if not wanted:
+            break
+        images: Mapping[str, str | None] = {name: name for name in wanted}
+        searched, left = net, limits.deadline.left_seconds
+        part = limits if left is None or not reduced else replace(limits, deadline=limits.deadline.within(left / 2))
+        if reduced:
+            try:
+                small = reduce_for_liveness(net, part)
+            except BudgetExceeded:
+                continue
+            images, searched = small.transitions, small.net
+        found = find_firings(searched, part, net)
+        moments = {searched.transitions[t].name: moment for t, moment in found.fires.items()}
+        able = [(moments[image], name) for name in wanted if (image := images[name]) in moments and image is not None]
+        # The last ones first: the ways to them lead past others.
+        for _, name in sorted(able, reverse=True):
+            image = images[name]
+            if name in wanted and image is not None and (witness := found.witness(image)) is not None:
+                runs.append((*witness.firings[:-1], (name,)))
+                wanted -= {one for fired in runs[-1] for one in fired}
     if wanted:
-        raise NotFoundError(f"no run was found that fires {net.transitions[min(wanted)].name}")
+        raise NotFoundError(f"no run was found that fires {min(wanted)}")
     return runs
 
 

@@ -1,0 +1,323 @@
+"""Each condition of the checker is needed: a false claim for each, whose evidence breaks this one alone."""
+
+from collections.abc import Callable, Mapping
+
+import pytest
+from support.evidence import document
+from support.evidence_examples import CHOICE, CIRCUIT, ENDING, RACING, SOMETIMES, TRAPPED, TURNS
+from support.true_claims import true
+
+from firable.analysis.evidence.certificate import (
+    Back,
+    Certificate,
+    Clause,
+    Continuation,
+    Diagram,
+    Equation,
+    FiringSequence,
+    InductiveInvariant,
+    Label,
+    Labelling,
+    Markings,
+    Progress,
+    Ranks,
+    Root,
+    Rounds,
+    Theorem,
+    TheoremName,
+    Unfolded,
+    Whole,
+)
+from firable.analysis.evidence.checker import check_evidence
+from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking
+from firable.analysis.evidence.document import document_from_text
+from firable.analysis.evidence.meaning import suffices
+from firable.analysis.evidence.obligations import Evidence
+from firable.nets.diagnostics import InputError
+from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start, parse_formula
+from firable.nets.net import Fairness, Net, Place, Transition
+from firable.nets.temporal import parse_temporal
+from firable.semantics.trace import Discipline
+
+
+def net(name: str, marked: str, *moves: tuple[str, str]) -> Net:
+    """Places of one letter each, and transitions t0, t1, ... from some to others."""
+    letters = sorted(set(marked).union(*(x + y for x, y in moves), "z"))
+    places = tuple(Place(letter, marked=letter in marked) for letter in letters)
+    return Net(name, places, tuple(Transition(f"t{i}", tuple(x), tuple(y)) for i, (x, y) in enumerate(moves)))
+
+
+LOOP = net("loop", "a", ("a", "b"), ("b", "a"))  # z is never marked
+FORK = net("fork", "a", ("a", "b"), ("a", "c"))
+
+
+def listed(of: Net, text: str, markings: list[str], *ranks: int) -> Evidence:
+    space = Markings(tuple(map(of.marking, markings)))
+    labels: tuple[Label, ...] = (Ranks(ranks),) if ranks else ()
+    return Evidence(of, Discipline.INTERLEAVING, Claim(ClaimKind.CTL, parse_temporal(text)), Labelling(space, labels))
+
+
+def of_loop(label: Label, text: str, rows: str = "ab", of: Net = LOOP) -> Evidence:
+    """On a diagram of the markings with one token each, in order of the net's places; the second root is M0 alone."""
+    order = tuple(place.name for place in of.places)
+    cells, whole = list[tuple[int, int, int]](), 0
+    for name in sorted(rows):
+        cells.append((order.index(name) + 1, whole, 1))
+        whole = len(cells) + 1
+    cells.append((order.index("a") + 1, 0, 1))
+    space = Diagram(order, tuple(cells), (whole, len(cells) + 1))
+    return Evidence(of, Discipline.INTERLEAVING, Claim(ClaimKind.CTL, parse_temporal(text)), Labelling(space, (label,)))
+
+
+def never(of: Net, goal: str, space: Markings | Diagram) -> Evidence:
+    return Evidence(of, Discipline.INTERLEAVING, Claim(ClaimKind.NEVER, parse_formula(goal)), Labelling(space))
+
+
+LABELS: dict[str, Callable[[], Evidence]] = {
+    "M0 is left out": lambda: never(LOOP, "a", Markings((LOOP.marking("b"),))),
+    "a firing leads out": lambda: never(LOOP, "b", Markings((LOOP.marking("a"),))),
+    "the goal is inside": lambda: never(LOOP, "b", Markings((1, 2))),
+    "nearer is what has no rank": lambda: listed(LOOP, "EF z", ["a", "b"], 1, -1),
+    "the rank stays": lambda: listed(LOOP, "EF z", ["a", "b"], 1, 1),
+    "the end does not hold": lambda: listed(LOOP, "EF z", ["a", "b"], 0, 0),
+    "the way is not through": lambda: listed(LOOP, "E[z U b]", ["a", "b"], 1, 0),
+    "one next marking has no rank": lambda: listed(FORK, "AF b", ["a", "b", "c"], 1, 0, -1),
+    "the wait ends in a deadlock": lambda: listed(ENDING, "AF (a and b)", ["a", "b"], 2, 1),
+    "it ends with the next": lambda: listed(LOOP, "EG a", ["a", "b"], 0, -1),
+    "it does not hold throughout": lambda: listed(LOOP, "EG a", ["a", "b"], 0, 0),
+    "always is left": lambda: listed(LOOP, "AG a", ["a", "b"], 0, -1),
+    "M0 has no rank": lambda: listed(LOOP, "EF z", ["a", "b"], -1, -1),
+    "a label too few": lambda: listed(LOOP, "EF z", ["a", "b"]),
+    "a rank too few": lambda: listed(LOOP, "EF z", ["a", "b"], 0),
+    "a diagram leaves M0 out": lambda: of_loop(Whole(), "AG b", "b"),
+    "a diagram is left": lambda: of_loop(Whole(), "AG a", "a"),
+    "a diagram's whole does not hold": lambda: of_loop(Whole(), "AG a"),
+    "a diagram's part is left": lambda: of_loop(Root(1), "EG a"),
+    "a diagram's part does not hold": lambda: of_loop(Root(0), "EG a"),
+    "going back not through": lambda: of_loop(Back(("t0",)), "E[z U b]"),
+    "going back too little": lambda: of_loop(Back(("t1",)), "EF z"),
+    "rounds not through": lambda: of_loop(Rounds(2), "A[z U b]"),
+    "rounds out of a deadlock": lambda: of_loop(Rounds(3), "AF (a and b)", of=ENDING),
+    "ranks on a diagram": lambda: of_loop(Ranks((0, 0)), "EF z"),
+    "going back on every way": lambda: of_loop(Back(("t0",)), "AF z"),
+}
+
+
+def waits(of: Net, fairness: Fairness, ranks: Mapping[str, tuple[int, ...]], **helpful: str) -> Evidence:
+    """Ranks of some of the markings of four places: which of a and b, asked or done."""
+    markings = [of.marking(names) for names in (["a", "asked"], ["b", "asked"], ["a", "done"], ["b", "done"])]
+    of_each = tuple(ranks.get(name, ()) for name in ("a", "b", "c", "d"))
+    helping = tuple(((int(key[1:]),), name) for key, name in helpful.items())
+    claim = Claim(ClaimKind.LEADS_TO, Holds("asked"), Holds("done"), fairness)
+    return Evidence(of, Discipline.INTERLEAVING, claim, Progress(Markings(tuple(markings)), of_each, helping))
+
+
+ALL = {"a": (0,), "b": (0,)}
+STUCK = Net(
+    "stuck",
+    (*SOMETIMES.places, Place("off")),
+    (*SOMETIMES.transitions[:2], Transition("go", ("asked", "off"), ("done",))),
+)
+RESPONSES: dict[str, Callable[[], Evidence]] = {
+    "what is asked has no rank": lambda: waits(TURNS, Fairness.NONE, {}),
+    "nothing helps without fairness": lambda: waits(TURNS, Fairness.NONE, ALL, r0="go"),
+    "nobody helps": lambda: waits(TURNS, Fairness.NONE, ALL),
+    "it is not always enabled": lambda: waits(SOMETIMES, Fairness.WEAK, ALL, r0="now"),
+    "the rank goes up and down": lambda: waits(SOMETIMES, Fairness.WEAK, {"a": (0,), "b": (1,)}, r0="tick", r1="now"),
+    "who helps fires and stays": lambda: waits(STUCK, Fairness.STRONG, ALL, r0="tick"),
+    "it is never enabled": lambda: waits(STUCK, Fairness.STRONG, ALL, r0="go"),
+    "the next has no rank": lambda: waits(SOMETIMES, Fairness.WEAK, {"a": (0,)}, r0="tick"),
+    "ranks too few": lambda: Evidence(
+        ENDING,
+        Discipline.INTERLEAVING,
+        Claim(ClaimKind.LEADS_TO, Holds("a"), Constant(value=False)),
+        Progress(Markings((1, 2)), ((1,),)),
+    ),
+    "the wait ends in a deadlock": lambda: Evidence(
+        ENDING,
+        Discipline.INTERLEAVING,
+        Claim(ClaimKind.LEADS_TO, Holds("a"), Constant(value=False)),
+        Progress(Markings((1, 2)), ((1,), (0,))),
+    ),
+}
+
+
+def run(
+    of: Net, claim: Claim, firings: str, cycle: str = "", discipline: Discipline = Discipline.INTERLEAVING
+) -> Evidence:
+    parts = [tuple((name,) for name in names.split()) for names in (firings, cycle)]
+    return Evidence(of, discipline, claim, FiringSequence(*parts))
+
+
+def of_all_runs(of: Net, text: str) -> Evidence:
+    claim = Claim(ClaimKind.LTL, parse_temporal(text))
+    return Evidence(of, Discipline.INTERLEAVING, claim, Unfolded(Markings((1, 2))))
+
+
+def by_clauses(of: Net, goal: str, *clauses: Clause) -> Evidence:
+    claim = Claim(ClaimKind.NEVER, Holds(goal))
+    return Evidence(of, Discipline.INTERLEAVING, claim, InductiveInvariant(clauses=clauses))
+
+
+def refuted(text: str) -> Claim:
+    return Claim(ClaimKind.NOT_LTL, parse_temporal(text))
+
+
+def unanswered(of: Net, fairness: Fairness, firings: str, cycle: str = "") -> Evidence:
+    return run(of, Claim(ClaimKind.NOT_LEADS_TO, Holds("asked"), Holds("done"), fairness), firings, cycle)
+
+
+def fires(goal: Formula, *names: str) -> Claim:
+    return Claim(ClaimKind.FIRES, goal, fires=names)
+
+
+RUNS: dict[str, Callable[[], Evidence]] = {
+    "the cycle does not close": lambda: run(ENDING, refuted("F b"), "", "end"),
+    "the run could go on": lambda: run(ENDING, refuted("F b"), ""),
+    "the run satisfies it": lambda: run(LOOP, refuted("X b"), "", "t0 t1"),
+    "after the cycle comes its first": lambda: run(LOOP, refuted("X X a"), "", "t0 t1"),
+    "the answer comes in the cycle": lambda: unanswered(TURNS, Fairness.STRONG, "", "go again"),
+    "nothing was asked": lambda: run(LOOP, Claim(ClaimKind.NOT_LEADS_TO, Holds("z"), Holds("z")), "", "t0 t1"),
+    "the cycle is not weakly fair": lambda: unanswered(TURNS, Fairness.WEAK, "", "tick tock"),
+    "the cycle is not strongly fair": lambda: unanswered(SOMETIMES, Fairness.STRONG, "", "tick tock"),
+    "it fires before the goal only": lambda: run(ENDING, fires(Holds("b"), "end"), "end"),
+    "it does not fire": lambda: run(net("still", "a", ("z", "b")), fires(Holds("a"), "t0"), ""),
+    "the step has an order": lambda: run(CIRCUIT, Claim(ClaimKind.UNORDERED), "go", discipline=Discipline.STEP),
+    "the steps have no order": lambda: Evidence(
+        RACING, Discipline.STEP, Claim(ClaimKind.ORDERED), Labelling(Markings((3, 0)))
+    ),
+    "a run refutes it": lambda: of_all_runs(LOOP, "F z"),
+    "a run that ends refutes it": lambda: of_all_runs(ENDING, "F (a and b)"),
+    "a run that fires nothing else refutes it": lambda: of_all_runs(LOOP, "not G (a or not fires(t0))"),
+    "`start` means M0": lambda: Evidence(
+        LOOP,
+        Discipline.INTERLEAVING,
+        Claim(ClaimKind.LOST, Start()),
+        Continuation((("t0",),), InductiveInvariant(clauses=(Clause(),))),
+    ),
+    "from there the goal is met": lambda: Evidence(
+        LOOP,
+        Discipline.INTERLEAVING,
+        Claim(ClaimKind.LOST, Not(Start())),
+        Continuation((("t0",), ("t1",)), Labelling(Markings((1, 2)))),
+    ),
+    "nothing is initial": lambda: by_clauses(LOOP, "a", Clause(empty=("a",)), Clause(empty=("b",))),
+    "nothing is kept": lambda: by_clauses(LOOP, "b", Clause(marked=("a",)), Clause(empty=("b",))),
+}
+
+
+ONE_TOKEN = InductiveInvariant((Equation((("a", 1), ("b", 1), ("c", 1)), 1),))
+UNMARKED = net("unmarked", "", ("a", "b"), ("b", "a"))
+HALF_LIVE = net("half", "a", ("a", "b"), ("b", "a"), ("a", "c"))
+DEAD_END = net("end", "ac", ("a", "b"), ("b", "a"), ("ac", "d"))
+STARTED = net("started", "s", ("s", "a"), ("a", "b"), ("b", "a"))
+GATED = Net(
+    "gated",
+    (Place("a", marked=True), Place("b"), Place("g", marked=True)),
+    (Transition("t0", ("a",), ("b",), inhibitive=("g",)), Transition("t1", ("b",), ("a",))),
+)
+ONE_OF_TWO = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1),))
+NO_CONTACT = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1), Equation((("c", 1), ("d", 1)), 1)))
+
+
+def theorem(
+    of: Net, name: TheoremName, contact: InductiveInvariant, *traps: str, claim: Claim | None = None
+) -> Evidence:
+    certificate = Theorem(name, contact, tuple(map(tuple, traps)))
+    return Evidence(of, Discipline.INTERLEAVING, claim or Claim(ClaimKind.LIVE), certificate)
+
+
+HOME_AGAIN = Claim(ClaimKind.ALWAYS_POSSIBLE, Start())
+NO_TOKEN = InductiveInvariant(clauses=(Clause(empty=("a",)), Clause(empty=("b",))))
+THREE = InductiveInvariant((Equation((("s", 1), ("a", 1), ("b", 1)), 1),))
+THEOREMS: dict[str, Callable[[], Evidence]] = {
+    "a circuit without a token": lambda: theorem(UNMARKED, TheoremName.MARKED_GRAPH, NO_TOKEN),
+    "no marked graph": lambda: theorem(HALF_LIVE, TheoremName.MARKED_GRAPH, ONE_TOKEN),
+    "no trap in a siphon": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN, "abc"),
+    "no traps at all": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN),
+    "a trap that is none": lambda: theorem(HALF_LIVE, TheoremName.FREE_CHOICE, ONE_TOKEN, "ab"),
+    "a trap without a token": lambda: theorem(UNMARKED, TheoremName.FREE_CHOICE, NO_TOKEN, "ab"),
+    "an empty trap": lambda: theorem(STARTED, TheoremName.FREE_CHOICE, THREE, "abs", claim=HOME_AGAIN),
+    "not free choice": lambda: theorem(DEAD_END, TheoremName.FREE_CHOICE, NO_CONTACT, "ab", "cd"),
+    "gates": lambda: theorem(GATED, TheoremName.MARKED_GRAPH, ONE_OF_TWO),
+    "contact": lambda: theorem(TRAPPED, TheoremName.FREE_CHOICE, InductiveInvariant(), "abc"),
+}
+
+
+FALSE = {**LABELS, **RESPONSES, **RUNS, **THEOREMS}
+
+
+def refused(evidence: Evidence) -> bool:
+    try:
+        return check_evidence(evidence).shown is not True
+    except InputError as error:
+        return {found.code for found in error.diagnostics} == {"F6002"}
+
+
+@pytest.mark.parametrize("broken", FALSE)
+def test_a_false_claim_is_refused_by_the_one_condition_that_its_evidence_breaks(broken: str) -> None:
+    evidence = FALSE[broken]()
+    assert not true(evidence)
+    assert refused(evidence)
+
+
+def test_the_same_conditions_are_met_by_true_claims() -> None:
+    for evidence in (
+        listed(LOOP, "EF b", ["a", "b"], 1, 0),
+        listed(LOOP, "EG not z", ["a", "b"], 0, 0),
+        listed(ENDING, "AF b", ["a", "b"], 1, 0),
+        of_loop(Back(("t0",)), "EF b"),
+        of_loop(Rounds(1), "AF b"),
+        of_loop(Root(0), "EG not z"),
+        waits(TURNS, Fairness.WEAK, ALL, r0="go"),
+        waits(TURNS, Fairness.STRONG, ALL, r0="go"),
+        theorem(CHOICE, TheoremName.FREE_CHOICE, ONE_TOKEN, "abc"),
+        run(TURNS, fires(Holds("b"), "tock"), "tick tock"),
+    ):
+        assert true(evidence)
+        assert not refused(evidence)
+
+
+FIRES_ALL = fires(Constant(value=True), "t0", "t1")
+
+
+@pytest.mark.parametrize(
+    ("name", "proved", "claims"),
+    [
+        ("live", True, [fires(Start(), "t0", "t1")]),  # no home marking
+        ("live", True, [Claim(ClaimKind.ALWAYS_POSSIBLE, Holds("a")), fires(Holds("a"), "t0", "t1")]),  # no marking
+        ("live", True, [Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("t0"))]),  # of one
+        ("live", False, [Claim(ClaimKind.LOST, Holds("a"))]),
+        ("quasi-live", True, [fires(Constant(value=True), "t0")]),
+        ("quasi-live", False, [Claim(ClaimKind.LOST, Firable("t0"))]),
+        ("deadlock-free", True, [FIRES_ALL]),
+        ("deadlock-free", False, [Claim(ClaimKind.LOST, Deadlock())]),
+        ("home-markings", False, [Claim(ClaimKind.LOST, Holds("a")), Claim(ClaimKind.LOST, Not(Holds("b")))]),
+        ("home-markings", True, [Claim(ClaimKind.ALWAYS_POSSIBLE, Holds("a"))]),
+        ("starvation", True, []),
+        ("contact-free", True, [Claim(ClaimKind.NEVER, And((Holds("a"), Holds("z"))))]),
+        ("effective-conflicts", False, [Claim(ClaimKind.REACHABLE, And((Firable("t0"), Firable("t1"))))]),
+        ("query.q", True, [FIRES_ALL]),
+        ("nonsense", True, [FIRES_ALL]),
+    ],
+)
+def test_claims_that_say_less_do_not_suffice(name: str, proved: bool, claims: list[Claim]) -> None:
+    of = net("less", "ab", ("a", "c"), ("b", "d"), ("c", "a"))
+    assert not suffices(of, Discipline.INTERLEAVING, name, proved, claims, None)
+
+
+def test_two_helpers_in_one_rank_are_refused() -> None:
+    evidence = waits(TURNS, Fairness.WEAK, ALL, r0="go")
+    assert isinstance(evidence.certificate, Progress)
+    helpful = (*evidence.certificate.helpful, ((0,), "tick"))
+    doubled: Certificate = Progress(evidence.certificate.space, evidence.certificate.ranks, helpful)
+    text = document(Evidence(TURNS, Discipline.INTERLEAVING, evidence.claim, doubled)).to_text()
+    with pytest.raises(InputError, match="F6001"):
+        document_from_text(text)
+
+
+def test_a_home_marking_is_the_formula_of_all_places() -> None:
+    home = Claim(ClaimKind.ALWAYS_POSSIBLE, is_marking(LOOP, LOOP.marking("b")))
+    assert suffices(LOOP, Discipline.INTERLEAVING, "home-markings", proved=True, claims=[home], query=None)
+    both = [home, fires(home.state_goal, "t0", "t1")]
+    assert suffices(LOOP, Discipline.INTERLEAVING, "live", proved=True, claims=both, query=None)
