@@ -199,7 +199,7 @@ impl<S: Slot> Sweep<S> {
     ) -> Result<(), Stop> {
         (self.keys[0], self.origins[0]) = (plan.from, plan.from);
         self.exact.ask(&mut self.asked, 1, |_| plan.from, |_, _| ());
-        self.settle(plan, 0, swept)?;
+        self.settle(plan, 0, swept, watch)?;
         let mut batch = Batch::new(width.words());
         let (mut kept, mut marking) = (0, vec![0; width.words()]);
         let (mut keys, mut origins) = (Vec::with_capacity(64), Vec::with_capacity(64));
@@ -226,7 +226,7 @@ impl<S: Slot> Sweep<S> {
                     batch.markings.extend_from_slice(&marking);
                 }
                 batch.cut_known(width, &keys);
-                self.expand(of, plan, level, &batch, &origins, swept)?;
+                self.expand(of, (plan, level), &batch, &origins, swept, watch)?;
                 let outcome = &swept.outcome;
                 if !plan.all && plan.target.is_none() && outcome.goals.iter().all(Option::is_some) {
                     swept.outcome.met = true;
@@ -235,7 +235,7 @@ impl<S: Slot> Sweep<S> {
                 watch.found = Found { markings: self.exact.len() as u64, edges: outcome.found.edges };
                 watch.tick(64 + of.net.transitions.len() + 4 * keys.len())?;
             }
-            self.settle(plan, level + 1, swept)?;
+            self.settle(plan, level + 1, swept, watch)?;
         }
     }
 
@@ -244,11 +244,11 @@ impl<S: Slot> Sweep<S> {
     fn expand(
         &mut self,
         of: &mut Compact,
-        plan: Plan,
-        level: usize,
+        (plan, level): (Plan, usize),
         batch: &Batch,
         marked: &[u64],
         swept: &mut Swept,
+        watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
         let hit = |here: u64| {
             let key = batch.hashes[here.trailing_zeros() as usize];
@@ -296,7 +296,7 @@ impl<S: Slot> Sweep<S> {
                 },
             );
             if self.asked.count >= ROOM - 64 {
-                self.settle(plan, level + 1, swept)?;
+                self.settle(plan, level + 1, swept, watch)?;
             }
         }
         let dead = batch.valid & !alive;
@@ -312,10 +312,10 @@ impl<S: Slot> Sweep<S> {
 
     /// Looks up what was asked for; what is new belongs to a level.
     #[inline(always)]
-    fn settle(&mut self, plan: Plan, level: usize, swept: &mut Swept) -> Result<(), Stop> {
+    fn settle(&mut self, plan: Plan, level: usize, swept: &mut Swept, watch: &mut Watch<'_>) -> Result<(), Stop> {
         let (keys, origins, spare, memory) = (&self.keys, &self.origins, &mut self.spare, &self.memory);
         let [next, marks] = &mut self.next;
-        self.exact.put_all(&mut self.asked, memory, |c| {
+        self.exact.put_all(&mut self.asked, memory, watch, |c| {
             let key = keys[c];
             next.push(key, spare, memory)?;
             let origin = match plan.mark {

@@ -3,8 +3,9 @@
 //! Buckets are in the order of the mixed keys, so a half is the buckets of one side. What would have to move past the end
 //! of the lower half belongs to neither thread: it is given back, and put into the whole table when nobody works on it.
 
-use super::{Asked, Exact, ROOM, look};
+use super::{Asked, Exact, ROOM};
 use crate::seat::{FACTOR, LANES, REACH, Shape, Slot};
+use std::hint::black_box;
 use std::panic::resume_unwind;
 use std::thread;
 
@@ -111,50 +112,48 @@ impl Shape {
 }
 
 impl<S: Slot> HalfExact<'_, S> {
-    /// Takes the key of each bit of `members`: one of this half among those that are asked for, where there must be room,
-    /// any other at the end of `theirs`, of which so many are used.
+    /// Writes the record of the key of each bit of `members` at the end of `mine` or of `theirs`, of which so many words are
+    /// used: to both, and counts it in the one where it belongs, because which, no processor guesses.
     #[inline(always)]
     pub(crate) fn ask(
         &self,
-        asked: &mut Asked<S>,
         members: u64,
         key: impl Fn(usize) -> u64,
+        mine: (&mut [u64], &mut usize),
         theirs: (&mut [u64], &mut usize),
     ) {
-        let (theirs, len) = theirs;
-        let (shape, first, id) = (self.shape, self.first, self.id);
-        let (mut a, mut b, mut rest) = (asked.count, *len, members);
+        let ((mine, mine_len), (theirs, len)) = (mine, theirs);
+        let (shape, id) = (self.shape, self.id);
+        let (mut a, mut b, mut rest) = (*mine_len, *len, members);
         while rest != 0 {
-            let key = key(rest.trailing_zeros() as usize);
+            let mixed = shape.mix(key(rest.trailing_zeros() as usize));
             rest &= rest - 1;
-            let mixed = shape.mix(key);
-            let (home, wanted) = shape.seat(mixed);
-            asked.homes[a % ROOM] = home.wrapping_sub(first) as u32;
-            asked.wanted[a % ROOM] = wanted;
-            theirs[b] = key;
+            let (home, wanted) = shape.seat::<S>(mixed);
+            write(&mut mine[a..a + stride::<S>()], home, wanted);
+            write(&mut theirs[b..b + stride::<S>()], home, wanted);
             let is_theirs = (mixed >> 63) as usize ^ id;
-            a += 1 - is_theirs;
-            b += is_theirs;
+            a += stride::<S>() * (1 - is_theirs);
+            b += stride::<S>() * is_theirs;
         }
-        (asked.count, *len) = (a, b);
+        (*mine_len, *len) = (a, b);
     }
 
-    /// Takes keys of this half, fewer than `ROOM`, in the place of those that were asked for.
+    /// Looks at the one bucket where each of fewer than `ROOM` records belongs; how many were not found there (`open`).
     #[inline(always)]
-    pub(crate) fn ask_all(&self, asked: &mut Asked<S>, keys: &[u64]) {
-        let places = asked.homes.iter_mut().zip(&mut asked.wanted);
-        for ((home, wanted), &key) in places.zip(keys) {
-            let (bucket, slot) = self.shape.seat(self.shape.mix(key));
-            *home = (bucket - self.first) as u32;
-            *wanted = slot;
+    pub(crate) fn look(&self, records: &[u64], open: &mut [u8; ROOM]) -> usize {
+        // First a word of each, so that the cache misses overlap (see `exact.rs`).
+        let mut touched = 0;
+        for record in records.chunks_exact(stride::<S>()) {
+            touched ^= self.buckets[read::<S>(record).0 - self.first][0].get();
         }
-        asked.count = keys.len();
-    }
-
-    /// Looks at the one bucket where each key belongs; how many keys were not found there (`open`).
-    #[inline(always)]
-    pub(crate) fn look(&self, asked: &mut Asked<S>) -> usize {
-        look(self.buckets, asked)
+        black_box(touched);
+        let mut count = 0_u8;
+        for (c, record) in records.chunks_exact(stride::<S>()).enumerate() {
+            let (home, wanted) = read::<S>(record);
+            open[usize::from(count)] = c as u8;
+            count += u8::from(S::matches(&self.buckets[home - self.first], wanted) == 0);
+        }
+        usize::from(count)
     }
 
     /// Puts those of all keys that belong here into this half; gives back those that belong past its end.
@@ -190,10 +189,11 @@ impl<S: Slot> HalfExact<'_, S> {
         past
     }
 
-    /// Where the key asked for as number `c` stands, or where it belongs.
+    /// Where the key of a record stands, or where it belongs.
     #[inline(always)]
-    pub(crate) fn seek(&self, asked: &Asked<S>, c: usize) -> Sought {
-        let (home, wanted) = (asked.homes[c % ROOM] as usize, asked.wanted[c % ROOM]);
+    pub(crate) fn seek(&self, record: &[u64]) -> Sought {
+        let (home, wanted) = read::<S>(record);
+        let home = home - self.first;
         let end = self.buckets.len().min(home + REACH);
         for (moved, bucket) in self.buckets[home..end].iter().enumerate() {
             if S::matches(bucket, S::new(wanted.get() + moved as u64)) != 0 {
@@ -207,18 +207,42 @@ impl<S: Slot> HalfExact<'_, S> {
         Sought::Past
     }
 
-    /// The key asked for as number `c`.
+    /// The key of a record.
     #[inline(always)]
-    pub(crate) fn key(&self, asked: &Asked<S>, c: usize) -> u64 {
-        let home = self.first + asked.homes[c % ROOM] as usize;
-        self.shape.key(self.shape.mixed(home, asked.wanted[c % ROOM].get()))
+    pub(crate) fn key(&self, record: &[u64]) -> u64 {
+        let (home, wanted) = read::<S>(record);
+        self.shape.key(self.shape.mixed(home, wanted.get()))
     }
 
-    /// Puts the key asked for as number `c` where it belongs.
+    /// Puts the key of a record where it belongs.
     #[inline(always)]
-    pub(crate) fn take(&mut self, asked: &Asked<S>, c: usize, (bucket, slot): (usize, usize)) {
-        let moved = bucket - asked.homes[c % ROOM] as usize;
-        self.buckets[bucket][slot] = S::new(asked.wanted[c % ROOM].get() + moved as u64);
+    pub(crate) fn take(&mut self, record: &[u64], (bucket, slot): (usize, usize)) {
+        let (home, wanted) = read::<S>(record);
+        self.buckets[bucket][slot] = S::new(wanted.get() + (self.first + bucket - home) as u64);
+    }
+}
+
+/// The words of a record: the bucket where a key belongs, and what would stand there.
+#[inline(always)]
+pub(crate) fn stride<S>() -> usize {
+    size_of::<S>() / 4
+}
+
+#[inline(always)]
+fn write<S: Slot>(record: &mut [u64], home: usize, wanted: S) {
+    if stride::<S>() == 1 {
+        record[0] = (home as u64) << 32 | wanted.get();
+    } else {
+        (record[0], record[1]) = (home as u64, wanted.get());
+    }
+}
+
+#[inline(always)]
+fn read<S: Slot>(record: &[u64]) -> (usize, S) {
+    if stride::<S>() == 1 {
+        ((record[0] >> 32) as usize, S::new(record[0]))
+    } else {
+        (record[0] as usize, S::new(record[1]))
     }
 }
 

@@ -8,7 +8,7 @@
 //! Such a table may also be filled further than one that is copied, to nine tenths: it is for those who have no memory left.
 
 use super::{Asked, Exact, Place, ROOM};
-use crate::budget::{Memory, Stop};
+use crate::budget::{Memory, Stop, Watch};
 use crate::region::Region;
 use crate::seat::{LANES, REACH, Shape, Slot};
 
@@ -44,6 +44,7 @@ impl<S: Slot> Exact<S> {
         &mut self,
         asked: &mut Asked<S>,
         memory: &Memory,
+        watch: &mut Watch<'_>,
         mut new: impl FnMut(usize) -> Result<(), Stop>,
     ) -> Result<(), Stop> {
         for k in 0..self.first_look(asked) {
@@ -60,7 +61,7 @@ impl<S: Slot> Exact<S> {
                     }
                     Place::Full => {
                         let before = self.shape;
-                        self.grow_in_place(memory)?;
+                        self.grow_in_place(memory, watch)?;
                         self.ask_again(asked, before);
                     }
                 }
@@ -68,14 +69,14 @@ impl<S: Slot> Exact<S> {
         }
         asked.count = 0;
         while 10 * (self.len + ROOM) > 9 * LANES * self.shape.buckets as usize {
-            self.grow_in_place(memory)?;
+            self.grow_in_place(memory, watch)?;
         }
         Ok(())
     }
 
-    /// Takes more buckets of the region.
+    /// Takes more buckets of the region. An end of time leaves the set without some of its keys.
     #[cold]
-    fn grow_in_place(&mut self, memory: &Memory) -> Result<(), Stop> {
+    fn grow_in_place(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
         let mut homeless = Vec::new();
         loop {
             let (old, shape) = (self.shape, self.shape.larger());
@@ -84,7 +85,7 @@ impl<S: Slot> Exact<S> {
             }
             memory.claim(Self::bytes(shape) - Self::bytes(old))?;
             self.shape = shape;
-            homeless = self.move_up(old, homeless);
+            homeless = self.move_up(old, homeless, watch)?;
             if homeless.is_empty() {
                 return Ok(());
             }
@@ -93,7 +94,7 @@ impl<S: Slot> Exact<S> {
 
     /// Moves all keys to where they belong now, and puts some mixed keys beside them; gives back those that find all
     /// buckets full.
-    fn move_up(&mut self, old: Shape, more: Vec<u64>) -> Vec<u64> {
+    fn move_up(&mut self, old: Shape, more: Vec<u64>, watch: &mut Watch<'_>) -> Result<Vec<u64>, Stop> {
         let (shape, mut homeless) = (self.shape, Vec::new());
         let buckets: &mut [[S; LANES]] = self.slots.all_mut().as_chunks_mut().0;
         let end = old.buckets as usize + REACH;
@@ -106,6 +107,7 @@ impl<S: Slot> Exact<S> {
                     homeless.push(mixed);
                 }
             }
+            watch.tick(1)?;
         }
         let mut first = more;
         for (at, bucket) in buckets[..FIRST.min(end)].iter_mut().enumerate() {
@@ -114,7 +116,7 @@ impl<S: Slot> Exact<S> {
             *bucket = [S::new(0); LANES];
         }
         homeless.extend(first.into_iter().filter(|&mixed| !seat(shape, buckets, mixed)));
-        homeless
+        Ok(homeless)
     }
 }
 
@@ -135,11 +137,12 @@ fn seat<S: Slot>(shape: Shape, buckets: &mut [[S; LANES]], mixed: u64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::unwatched;
 
     fn put(table: &mut Exact<u32>, asked: &mut Asked<u32>, key: u64, memory: &Memory) -> Result<bool, Stop> {
-        let mut new = false;
+        let (mut new, mut poll) = (false, unwatched);
         table.ask(asked, 1, |_| key, |_, _| ());
-        table.put_all(asked, memory, |_| {
+        table.put_all(asked, memory, &mut Watch::new(None, &mut poll), |_| {
             new = true;
             Ok(())
         })?;

@@ -1,7 +1,7 @@
 //! What the two threads of a pair share out: a set of markings in two halves, by the highest bit of the mixed key or hash.
 //!
 //! A candidate goes from thread to thread as a *record* of a few words, which says where it belongs and what it is. Which
-//! words these are is the set's affair: a key alone (`keyed.rs`), or a hash with a marking (`hashed.rs`).
+//! words these are is the set's affair: the place of a key (`keyed.rs`), or a hash with a marking (`hashed.rs`).
 
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop};
@@ -38,7 +38,7 @@ pub(crate) struct Finds {
     pub(crate) fresh: Store,
     /// How many there may be.
     pub(crate) most: usize,
-    /// Records that found no place.
+    /// What found no place, as `Shared::insert_left` takes it.
     pub(crate) left: Vec<u64>,
     /// Why it must end.
     pub(crate) end: Option<End>,
@@ -56,7 +56,7 @@ impl Finds {
         self.end = self.end.max(Some(end));
     }
 
-    /// Keeps a record that finds no place in the half.
+    /// Keeps what finds no place in the half.
     #[cold]
     pub(crate) fn leave(&mut self, record: &[u64]) {
         self.left.extend_from_slice(record);
@@ -102,7 +102,7 @@ pub(crate) trait Shared<W: Width>: Arrivals<W> {
     /// Makes room for more; false where there is no memory for that. After an error the set cannot be used any more.
     fn grow(&mut self, width: W, space: &mut Space) -> Result<bool, Stop>;
 
-    /// Puts the markings of some records into the whole set.
+    /// Puts what found no place in its half into the whole set: keys, or records of markings.
     fn insert_left(&mut self, width: W, space: &mut Space, records: &[u64], max: usize) -> Result<(), Stop>;
 
     /// Forgets what is not in the array.

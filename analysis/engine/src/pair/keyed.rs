@@ -1,12 +1,13 @@
-//! The halves of a set of exact keys: a record is a key, and its marking is made of it where it is new.
+//! The halves of a set of exact keys: a record is where a key belongs and what would stand there, so that who receives it
+//! has nothing left to compute. A marking is made of it where it is new.
 //!
 //! The set says no indexes, so nothing is numbered before the markings stand in the array.
 
 use super::half::{End, Finds, Half, Shared};
 use crate::batch::Batch;
 use crate::budget::Stop;
-use crate::exact::halves::{HalfExact, Sought};
-use crate::exact::{Asked, ROOM};
+use crate::exact::ROOM;
+use crate::exact::halves::{HalfExact, Sought, stride};
 use crate::explore::Space;
 use crate::known::ByKey;
 use crate::marking::Width;
@@ -20,9 +21,9 @@ use crate::table::Table;
 /// A half of the buckets.
 pub(crate) struct KeyedHalf<'a, S> {
     half: HalfExact<'a, S>,
-    /// Keys of its own that wait, and room for those that come.
-    asked: Box<Asked<S>>,
-    came: Box<Asked<S>>,
+    /// Records of its own that wait, and how many words of them.
+    mine: Vec<u64>,
+    waiting: usize,
     span: &'a Span,
     spread: &'a Spread,
     /// New keys that there is room for.
@@ -33,7 +34,7 @@ pub(crate) struct KeyedHalf<'a, S> {
 impl<W: Width, S: Slot> Half<W> for KeyedHalf<'_, S> {
     #[inline(always)]
     fn stride(&self, _: W) -> usize {
-        1
+        stride::<S>()
     }
 
     #[inline(always)]
@@ -44,45 +45,44 @@ impl<W: Width, S: Slot> Half<W> for KeyedHalf<'_, S> {
     #[inline(always)]
     fn push(&mut self, _: W, _: &Net, batch: &Batch, t: usize, fire: u64, theirs: (&mut [u64], &mut usize)) {
         let flip = self.span.flips[t];
-        self.half.ask(&mut self.asked, fire, |j| batch.hashes[j] ^ flip, theirs);
+        self.half.ask(fire, |j| batch.hashes[j] ^ flip, (&mut self.mine, &mut self.waiting), theirs);
     }
 
     #[inline(always)]
     fn settle(&mut self, width: W, all: bool, finds: &mut Finds) {
-        if all || self.asked.count >= ROOM - 64 {
-            let mut asked = std::mem::take(&mut self.asked);
-            self.put(width, &mut asked, finds);
-            self.asked = asked;
+        if all || self.waiting >= (ROOM - 64) * stride::<S>() {
+            let mine = std::mem::take(&mut self.mine);
+            self.put(width, &mine[..self.waiting], finds);
+            (self.mine, self.waiting) = (mine, 0);
         }
     }
 
     #[inline(always)]
     fn insert(&mut self, width: W, records: &[u64], finds: &mut Finds) {
-        let mut asked = std::mem::take(&mut self.came);
-        for keys in records.chunks(ROOM - 64) {
-            self.half.ask_all(&mut asked, keys);
-            self.put(width, &mut asked, finds);
+        for records in records.chunks((ROOM - 64) * stride::<S>()) {
+            self.put(width, records, finds);
         }
-        self.came = asked;
     }
 }
 
 impl<S: Slot> KeyedHalf<'_, S> {
-    /// Looks up what was asked, and takes what is new.
+    /// Looks up fewer than `ROOM` records, and takes what is new.
     #[inline(always)]
-    fn put<W: Width>(&mut self, width: W, asked: &mut Asked<S>, finds: &mut Finds) {
-        for k in 0..self.half.look(asked) {
-            let c = usize::from(asked.open[k % ROOM]);
-            match self.half.seek(asked, c) {
+    fn put<W: Width>(&mut self, width: W, records: &[u64], finds: &mut Finds) {
+        let mut open = [0; ROOM];
+        for k in 0..self.half.look(records, &mut open) {
+            let c = usize::from(open[k % ROOM]) * stride::<S>();
+            let record = &records[c..c + stride::<S>()];
+            match self.half.seek(record) {
                 Sought::Known => {}
-                Sought::Past => finds.leave(&[self.half.key(asked, c)]),
+                Sought::Past => finds.leave(&[self.half.key(record)]),
                 Sought::Free(slot) if finds.fresh.len() < self.room => {
-                    let key = self.half.key(asked, c);
+                    let key = self.half.key(record);
                     let marking = &mut self.marking[..width.words()];
                     self.spread.marking(key, marking);
                     let (fresh, memory) = (&mut finds.fresh, &finds.memory);
                     if fresh.len() < finds.most && fresh.push(width, marking, finds.most, memory).is_ok() {
-                        self.half.take(asked, c, slot);
+                        self.half.take(record, slot);
                     } else {
                         finds.end(End::Short);
                         finds.left.push(key);
@@ -90,11 +90,10 @@ impl<S: Slot> KeyedHalf<'_, S> {
                 }
                 Sought::Free(_) => {
                     finds.end(End::Full);
-                    finds.left.push(self.half.key(asked, c));
+                    finds.left.push(self.half.key(record));
                 }
             }
         }
-        asked.count = 0;
     }
 }
 
@@ -110,8 +109,8 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
         // As full as one thread would let it become, if both halves were equally full.
         let room = exact.free() / 2;
         let half = |half| {
-            let (asked, came, marking) = (Box::default(), Box::default(), vec![0; spread.words()]);
-            KeyedHalf { half, asked, came, span, spread, room, marking }
+            let (mine, marking) = (vec![0; ROOM * stride::<S>()], vec![0; spread.words()]);
+            KeyedHalf { half, mine, waiting: 0, span, spread, room, marking }
         };
         (store, exact.halves().map(half))
     }
