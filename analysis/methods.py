@@ -75,6 +75,7 @@ KNOWERS: Final[dict[Method, Technique[Knower]]] = {
 WORTH_ASKING: Final[dict[Method, frozenset[str]]] = {
     Method.REDUCTION: frozenset({"quasi-live", "deadlock-free"}),
     Method.STUBBORN_SETS: frozenset({"quasi-live", "deadlock-free"}),
+    Method.COMPACT: frozenset({"contact-free", "deadlock-free", "quasi-live"}),
 }
 """Which verdicts must be open for a technique to be asked what it knows: one of these, or any where it is not named."""
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import random
 
+import pytest
 from support.lively_nets import lively_net
 
+from firable.analysis import check as checking
 from firable.analysis.check import check
 from firable.analysis.compact import METHOD, decide_by_compact_search, known_by_counting
 from firable.analysis.goal import Limits
@@ -65,3 +67,16 @@ def test_a_compact_search_holds_more_than_the_graph_in_the_same_memory() -> None
     assert graph.engine.reason == "memory"
     known = known_by_counting(net, Limits(memory_bytes=memory_bytes))
     assert [known[name].answer.holds for name in ("contact-free", "deadlock-free", "quasi-live")] == [True] * 3
+
+
+@pytest.mark.parametrize(("budget", "comes_to_it"), [(Budget(markings=1000), True), (Budget(seconds=0.0), False)])
+def test_check_comes_to_a_compact_search_where_the_graph_had_no_room(
+    monkeypatch: pytest.MonkeyPatch, budget: Budget, comes_to_it: bool
+) -> None:
+    monkeypatch.setattr(checking, "SPACES", {})
+    monkeypatch.setattr(checking, "FIRST_KNOWERS", {})
+    report = check(family_net("interlocked-7"), budget=budget)
+    assert any(line.startswith("compact search of all markings") for line in report.course) is comes_to_it
+    verdict = report.verdict("contact-free")
+    assert (verdict.status is Status.PROVED) is comes_to_it
+    assert (verdict.method == METHOD) is comes_to_it
