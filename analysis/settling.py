@@ -12,7 +12,7 @@ for all markings. What is told of it goes into the course of the report.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import Event
@@ -26,13 +26,16 @@ from firable.analysis.methods import GOALS, KNOWERS, WORTH_ASKING, Method
 from firable.analysis.question import Answer, Question, no, yes
 from firable.analysis.race import SLICES_SECONDS, Contestant, Outcome, T, race
 from firable.analysis.spaces.space import WitnessError
+from firable.analysis.temporal.queries import question_of
 from firable.analysis.verdicts.behaviour import QUESTIONS
+from firable.analysis.verdicts.combined import combined, is_combined
 from firable.analysis.verdicts.consequences import consequences
 from firable.analysis.verdicts.goals import Goal, goals_of, query_goals
 from firable.analysis.verdicts.starvation import STARVATION
 from firable.nets.formula import Formula
-from firable.nets.net import Net
-from firable.nets.queries import Query
+from firable.nets.net import Net, TemporalProperty
+from firable.nets.queries import Query, QueryKind
+from firable.nets.temporal import Temporal
 from firable.nets.verdict import Cost, Status, Verdict
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
@@ -41,6 +44,11 @@ from firable.semantics.trace import Discipline
 
 Lanes = Sequence[Sequence[Method]]
 
+_SAID_BY: Final = {
+    QueryKind.LIVE: "live",
+    QueryKind.QUASI_LIVE: "quasi-live",
+    QueryKind.ONE_SAFE: "contact-free",
+}
 _GOALS_MAX: Final = 64  # a verdict of more goals than this takes longer than anybody waits
 _QUESTIONS: Final = {question.name: question for question in (*QUESTIONS, STARVATION)}
 
@@ -84,6 +92,7 @@ class Settling:
         following = consequences(self.net, decided | self.found)
         for name, known in following.items():
             self._settle(_QUESTIONS[name], known.answer, known.method, Cost(seconds=0.0))
+        self._pass_on(decided | self.found)
 
     def ask(
         self,
@@ -97,8 +106,13 @@ class Settling:
 
         `fired` names transitions that are known to fire.
         """
+        if verdict.name in self.found or not lanes:
+            return
         asked = goals_of(self.net, verdict.name, fired) or query_goals(self.queries, verdict)
-        if verdict.name in self.found or asked is None or not lanes or len(asked[1]) > _GOALS_MAX:
+        if asked is None:
+            self._combine(verdict, lanes, deadline, slices_seconds)
+            return
+        if len(asked[1]) > _GOALS_MAX:
             return
         question, goals = asked
         finding = None
@@ -111,6 +125,52 @@ class Settling:
                 return
         if finding is not None:
             self._settle(question, yes(finding.witness), finding.method, finding.cost)
+
+    def _combine(self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float]) -> None:
+        """Settle the verdict on a formula that is put together from goals."""
+        formula, branching = self._formula_of(verdict.name)
+        if formula is None or not is_combined(formula, branching=branching):
+            return
+        asked: list[Finding] = []
+
+        def reached(goal: Formula) -> Finding | None:
+            one = Goal(goal, lambda _: ((), ""), wanted=True)
+            finding = self._race(verdict.name, one, lanes, deadline, slices_seconds)
+            asked.extend([] if finding is None else [finding])
+            return finding
+
+        holds, shown = combined(self.net, formula, reached)
+        if holds is None:
+            return
+        witness = None if shown is None or shown.witness is None else shown.witness
+        method = "; ".join(dict.fromkeys(finding.method for finding in asked)) or "the initial marking"
+        cost = Cost(seconds=sum(finding.cost.seconds or 0.0 for finding in asked))
+        question = Question(verdict.name, verdict.statement, verdict.weight)
+        self._settle(question, Answer(holds, witness=witness), method, cost)
+
+    def _formula_of(self, name: str) -> tuple[Temporal | None, bool]:
+        """The temporal formula of a query or a property, by the name of its verdict, and whether it is of CTL."""
+        for query in self.queries:
+            if name == f"query.{query.name}":
+                return query.formula, query.kind is QueryKind.CTL
+        for of in self.net.properties:
+            if name == f"property.{of.name}" and isinstance(of, TemporalProperty):
+                return of.formula, QueryKind(of.logic) is QueryKind.CTL
+        return None, False
+
+    def _pass_on(self, decided: Mapping[str, Verdict]) -> None:
+        """Answer the queries that ask for what a verdict on the net says."""
+        for query in self.queries:
+            source = decided.get(_SAID_BY.get(query.kind, ""))
+            if source is None or f"query.{query.name}" in self.found:
+                continue
+            if query.kind is QueryKind.ONE_SAFE and (
+                not source.holds or any(t.self_loops for t in self.net.transitions)
+            ):
+                continue  # a transition that never opens may be in contact, and puts no token anywhere
+            question = question_of(query)
+            answer = Answer(source.holds, source.subjects, source.witness, source.hint)
+            self._settle(question, answer, f"follows from {source.name}: {source.method}", source.cost)
 
     def _settle(self, question: Question, answer: Answer, method: str, cost: Cost) -> None:
         self.found[question.name] = question.settle(answer, method, Discipline.INTERLEAVING, cost)
