@@ -14,8 +14,8 @@ use crate::table::Table;
 
 /// Markings that are dealt out together, and numbered together.
 pub(crate) const BLOCK: usize = 64;
-/// Records that found no place and are kept before one thread takes over.
-const LEFT_MAX: usize = 1 << 12;
+/// Finds past the end of a half that a thread keeps in a level before one thread takes over.
+const STRAYS_MAX: usize = 1 << 12;
 
 /// Why a thread ends before the level is done; the last is the most urgent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -38,8 +38,9 @@ pub(crate) struct Finds {
     pub(crate) fresh: Store,
     /// How many there may be.
     pub(crate) most: usize,
-    /// What found no place, as `Shared::insert_left` takes it.
+    /// What found no place, as `Shared::insert_left` takes it, and how much of it for good.
     pub(crate) left: Vec<u64>,
+    strays: usize,
     /// Why it must end.
     pub(crate) end: Option<End>,
 }
@@ -47,7 +48,14 @@ pub(crate) struct Finds {
 impl Finds {
     /// Nothing yet.
     pub(crate) fn new(id: usize, words: usize) -> Self {
-        Finds { id, memory: Memory::new(0), fresh: Store::new(words), most: 0, left: Vec::new(), end: None }
+        Finds { id, memory: Memory::new(0), fresh: Store::new(words), most: 0, left: Vec::new(), strays: 0, end: None }
+    }
+
+    /// Begins to work, with so many bytes more than are held and so many markings.
+    pub(crate) fn allow(&mut self, bytes: usize, markings: usize) {
+        let held = self.memory.used();
+        self.memory.allow(held + bytes);
+        (self.most, self.strays, self.end) = (markings, 0, None);
     }
 
     /// Ends for a reason, if not for one more urgent.
@@ -60,7 +68,8 @@ impl Finds {
     #[cold]
     pub(crate) fn leave(&mut self, record: &[u64]) {
         self.left.extend_from_slice(record);
-        if self.left.len() >= LEFT_MAX * record.len() {
+        self.strays += 1;
+        if self.strays >= STRAYS_MAX {
             self.end(End::Short);
         }
     }

@@ -101,14 +101,6 @@ impl Member {
         }
     }
 
-    /// Begins a level or goes on with it: so many bytes more than are held, and so many markings, may be found.
-    pub(crate) fn allow(&mut self, bytes: usize, markings: usize) {
-        let held = self.finds.memory.used();
-        self.finds.memory.allow(held + bytes);
-        self.finds.most = markings;
-        self.finds.end = None;
-    }
-
     /// Works on the level until it is done or somebody cannot go on; why it ended.
     pub(crate) fn work<W: Width>(
         &mut self,

@@ -110,7 +110,7 @@ impl Pair {
         let free = (space.memory.limit() - space.memory.used()).saturating_sub(ROUNDING_BYTES);
         let base = space.table.store.len();
         for member in &mut self.members {
-            member.allow(free / 4, max.saturating_sub(base) / 2);
+            member.finds.allow(free / 4, max.saturating_sub(base) / 2);
         }
         let (store, [mut low, mut high]) = set.halves(&mut space.table);
         let before = Found { markings: base as u64, edges: space.edges };
