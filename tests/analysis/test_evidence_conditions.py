@@ -1,6 +1,7 @@
 """Each condition of the checker is needed: a false claim for each, whose evidence breaks this one alone."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import pytest
 from support.evidence import document
@@ -32,10 +33,11 @@ from firable.analysis.evidence.checker import check_evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking
 from firable.analysis.evidence.document import document_from_text
 from firable.analysis.evidence.meaning import suffices
+from firable.analysis.evidence.nodes import EMPTY, UNIT, Nodes
 from firable.analysis.evidence.obligations import Evidence
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start, parse_formula
-from firable.nets.net import Fairness, Net, Place, Transition
+from firable.nets.net import Command, ExternalGate, Fairness, Net, Place, Signal, Transition
 from firable.nets.temporal import parse_temporal
 from firable.semantics.trace import Discipline
 
@@ -82,14 +84,15 @@ LABELS: dict[str, Callable[[], Evidence]] = {
     "the end does not hold": lambda: listed(LOOP, "EF z", ["a", "b"], 0, 0),
     "the way is not through": lambda: listed(LOOP, "E[z U b]", ["a", "b"], 1, 0),
     "one next marking has no rank": lambda: listed(FORK, "AF b", ["a", "b", "c"], 1, 0, -1),
-    "the wait ends in a deadlock": lambda: listed(ENDING, "AF (a and b)", ["a", "b"], 2, 1),
+    "until every next ends in a deadlock": lambda: listed(ENDING, "AF (a and b)", ["a", "b"], 2, 1),
     "it ends with the next": lambda: listed(LOOP, "EG a", ["a", "b"], 0, -1),
     "it does not hold throughout": lambda: listed(LOOP, "EG a", ["a", "b"], 0, 0),
     "always is left": lambda: listed(LOOP, "AG a", ["a", "b"], 0, -1),
     "M0 has no rank": lambda: listed(LOOP, "EF z", ["a", "b"], -1, -1),
     "a label too few": lambda: listed(LOOP, "EF z", ["a", "b"]),
     "a rank too few": lambda: listed(LOOP, "EF z", ["a", "b"], 0),
-    "a diagram leaves M0 out": lambda: of_loop(Whole(), "AG b", "b"),
+    "a diagram leaves M0 out": lambda: of_loop(Whole(), "AG b", "b", ENDING),
+    "nothing is said of M0": lambda: never(ENDING, "a", Diagram(("a", "b"), ((2, 0, 1),), (2,))),
     "a diagram is left": lambda: of_loop(Whole(), "AG a", "a"),
     "a diagram's whole does not hold": lambda: of_loop(Whole(), "AG a"),
     "a diagram's part is left": lambda: of_loop(Root(1), "EG a"),
@@ -163,6 +166,9 @@ def refuted(text: str) -> Claim:
     return Claim(ClaimKind.NOT_LTL, parse_temporal(text))
 
 
+LATE = net("late", "a", ("a", "b"), ("b", "c"), ("c", "b"))
+
+
 def unanswered(of: Net, fairness: Fairness, firings: str, cycle: str = "") -> Evidence:
     return run(of, Claim(ClaimKind.NOT_LEADS_TO, Holds("asked"), Holds("done"), fairness), firings, cycle)
 
@@ -177,6 +183,9 @@ RUNS: dict[str, Callable[[], Evidence]] = {
     "the run satisfies it": lambda: run(LOOP, refuted("X b"), "", "t0 t1"),
     "after the cycle comes its first": lambda: run(LOOP, refuted("X X a"), "", "t0 t1"),
     "the answer comes in the cycle": lambda: unanswered(TURNS, Fairness.STRONG, "", "go again"),
+    "the answer comes before it is asked again": lambda: unanswered(TURNS, Fairness.WEAK, "go", "tick again tock go"),
+    "after the last comes the first of the cycle": lambda: run(LATE, refuted("X X X b"), "t0", "t1 t2"),
+    "different things are put off": lambda: of_all_runs(LOOP, "F G a or F G b"),
     "nothing was asked": lambda: run(LOOP, Claim(ClaimKind.NOT_LEADS_TO, Holds("z"), Holds("z")), "", "t0 t1"),
     "the cycle is not weakly fair": lambda: unanswered(TURNS, Fairness.WEAK, "", "tick tock"),
     "the cycle is not strongly fair": lambda: unanswered(SOMETIMES, Fairness.STRONG, "", "tick tock"),
@@ -190,10 +199,10 @@ RUNS: dict[str, Callable[[], Evidence]] = {
     "a run that ends refutes it": lambda: of_all_runs(ENDING, "F (a and b)"),
     "a run that fires nothing else refutes it": lambda: of_all_runs(LOOP, "not G (a or not fires(t0))"),
     "`start` means M0": lambda: Evidence(
-        LOOP,
+        ENDING,
         Discipline.INTERLEAVING,
-        Claim(ClaimKind.LOST, Start()),
-        Continuation((("t0",),), InductiveInvariant(clauses=(Clause(),))),
+        Claim(ClaimKind.LOST, Not(Start())),
+        Continuation((("end",),), Labelling(Markings((2,)))),
     ),
     "from there the goal is met": lambda: Evidence(
         LOOP,
@@ -215,6 +224,13 @@ GATED = Net(
     "gated",
     (Place("a", marked=True), Place("b"), Place("g", marked=True)),
     (Transition("t0", ("a",), ("b",), inhibitive=("g",)), Transition("t1", ("b",), ("a",))),
+)
+_BOTH = (ExternalGate("s", wanted=True), ExternalGate("s", wanted=False))
+SHUT = Net(
+    "shut",
+    (Place("a", marked=True), Place("b")),
+    (Transition("t0", ("a",), ("b",), external=_BOTH), Transition("t1", ("b",), ("a",))),
+    (Signal("s"),),
 )
 ONE_OF_TWO = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1),))
 NO_CONTACT = InductiveInvariant((Equation((("a", 1), ("b", 1)), 1), Equation((("c", 1), ("d", 1)), 1)))
@@ -239,6 +255,7 @@ THEOREMS: dict[str, Callable[[], Evidence]] = {
     "a trap without a token": lambda: theorem(UNMARKED, TheoremName.FREE_CHOICE, NO_TOKEN, "ab"),
     "an empty trap": lambda: theorem(STARTED, TheoremName.FREE_CHOICE, THREE, "abs", claim=HOME_AGAIN),
     "not free choice": lambda: theorem(DEAD_END, TheoremName.FREE_CHOICE, NO_CONTACT, "ab", "cd"),
+    "a transition that never opens": lambda: theorem(SHUT, TheoremName.MARKED_GRAPH, ONE_OF_TWO),
     "gates": lambda: theorem(GATED, TheoremName.MARKED_GRAPH, ONE_OF_TWO),
     "contact": lambda: theorem(TRAPPED, TheoremName.FREE_CHOICE, InductiveInvariant(), "abc"),
 }
@@ -321,3 +338,45 @@ def test_a_home_marking_is_the_formula_of_all_places() -> None:
     assert suffices(LOOP, Discipline.INTERLEAVING, "home-markings", proved=True, claims=[home], query=None)
     both = [home, fires(home.state_goal, "t0", "t1")]
     assert suffices(LOOP, Discipline.INTERLEAVING, "live", proved=True, claims=both, query=None)
+
+
+def test_a_theorem_says_nothing_of_steps() -> None:
+    evidence = theorem(CHOICE, TheoremName.FREE_CHOICE, ONE_TOKEN, "abc")
+    assert not refused(evidence)
+    assert refused(replace(evidence, discipline=Discipline.STEP))
+
+
+def test_what_was_not_included_once_is_not_included_afterwards() -> None:
+    nodes = Nodes()
+    p, q = nodes.node(1, EMPTY, UNIT), nodes.node(2, EMPTY, UNIT)
+    both = nodes.either(p, q)
+    assert [nodes.includes(p, both) for _ in range(3)] == [False, False, False]
+    assert nodes.includes(both, p)
+
+
+def test_a_machine_is_stopped_by_another_command_in_the_same_run() -> None:
+    places = (
+        Place("a", marked=True),
+        Place("b", command=Command("M", "RUN")),
+        Place("c", command=Command("M", "STOP")),
+    )
+    of = Net("m", places, (Transition("go", ("a",), ("b",)), Transition("halt", ("b",), ("c",))))
+
+    def enough(*claims: Claim) -> bool:
+        return suffices(of, Discipline.INTERLEAVING, "machine-never-stopped", proved=True, claims=claims, query=None)
+
+    anything = Constant(value=True)
+    assert enough(fires(anything, "go", "halt"))
+    assert not enough(fires(anything, "go"), fires(anything, "halt"))
+    assert not enough(fires(anything, "go"))
+
+
+def test_starvation_is_excluded_by_all_that_wait() -> None:
+    of = net("waiting", "a", ("a", "b"), ("b", "a"), ("zb", "a"), ("zc", "a"))
+
+    def enough(*names: str) -> bool:
+        claims = [Claim(ClaimKind.NEVER, Firable(name)) for name in names]
+        return suffices(of, Discipline.INTERLEAVING, "starvation", proved=True, claims=claims, query=None)
+
+    assert enough("t2", "t3")
+    assert not enough("t2")
