@@ -13,18 +13,15 @@
 use std::sync::OnceLock;
 
 use crate::batch::Batch;
-use crate::budget::{Memory, Stop, Watch};
-use crate::exact::{Asked, Exact, Place, ROOM};
-use crate::explore::Space;
+use crate::budget::{Memory, Stop};
+use crate::exact::{Asked, Exact, ROOM};
+use crate::indexes::Indexes;
 use crate::marking::{Width, linear_hash};
 use crate::net::Net;
-use crate::region::Region;
 use crate::seat::Slot;
 use crate::span::Span;
 use crate::spread::Spread;
-use crate::store::Store;
-use crate::table::{Candidates, NONE, Table};
-use crate::with_width;
+use crate::table::{Candidates, Table};
 
 /// The least table for keys is not larger than this, and not than this part of what is allowed.
 const LEAST_BYTES: usize = 1 << 22;
@@ -41,14 +38,14 @@ pub enum Set {
     Wide(Keyed<u64>),
 }
 
-/// A set of exact keys, and, once somebody asked for them, the indexes of its markings.
+/// A set of exact keys, and, once somebody asked for them, the indexes of its markings (`indexes.rs`).
 #[derive(Debug)]
 pub struct Keyed<S> {
     /// The keys.
     pub span: Span,
     spread: Spread,
-    exact: Exact<S>,
-    indexes: OnceLock<Region<u32>>,
+    pub(crate) exact: Exact<S>,
+    pub(crate) indexes: OnceLock<Indexes<S>>,
 }
 
 impl Set {
@@ -60,17 +57,6 @@ impl Set {
             return Keyed::new(net, span, memory).map_or(Set::Hashed, Set::Narrow);
         }
         Keyed::new(net, span, memory).map_or(Set::Hashed, Set::Wide)
-    }
-
-    /// The indexes of up to `ROOM` markings by their keys; none where markings are hashed.
-    #[inline(always)]
-    pub fn find<'a>(&self, keys: &[u64], found: &'a mut [u32; ROOM]) -> Option<&'a [u32]> {
-        match self {
-            Set::Hashed => return None,
-            Set::Narrow(keyed) => keyed.find(keys, found),
-            Set::Wide(keyed) => keyed.find(keys, found),
-        }
-        Some(&found[..keys.len()])
     }
 
     /// The keys; none where markings are hashed.
@@ -95,60 +81,6 @@ impl<S: Slot> Keyed<S> {
     /// The keys, the way back from them, and the set itself.
     pub(crate) fn parts(&mut self) -> (&Span, &Spread, &mut Exact<S>) {
         (&self.span, &self.spread, &mut self.exact)
-    }
-
-    /// Puts the indexes of all markings beside their keys, if they are not there.
-    pub fn index<W: Width>(&self, width: W, store: &Store, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
-        if self.indexes.get().is_some() {
-            return Ok(());
-        }
-        let bytes = 4 * self.exact.slots();
-        memory.claim(bytes)?;
-        let Some(mut region) = Region::zeroed(self.exact.slots()) else {
-            memory.release(bytes);
-            return Err(Stop::Memory);
-        };
-        let indexes: &mut [u32] = region.all_mut();
-        let mut batch = Batch::new(width.words());
-        let mut slots = [0; ROOM];
-        for first in (0..store.len()).step_by(64) {
-            batch.markings.clear();
-            store.copy_range(first, store.len().min(first + 64), &mut batch.markings);
-            batch.cut_by(width, &self.span);
-            self.exact.find(&batch.hashes[..batch.count], &mut slots);
-            for (index, &slot) in (first..).zip(&slots[..batch.count]) {
-                indexes[slot] = index as u32;
-            }
-            if let Err(stop) = watch.tick(64) {
-                memory.release(bytes);
-                return Err(stop);
-            }
-        }
-        // Somebody may have done the same meanwhile.
-        if self.indexes.set(region).is_err() {
-            memory.release(bytes);
-        }
-        Ok(())
-    }
-
-    /// The index of a marking and its key. Without `index` before, which needs memory, the store is searched through.
-    fn find_one<W: Width>(&self, width: W, store: &Store, marking: &[u64], key: u64) -> Option<u32> {
-        let Place::Known(slot) = self.exact.place(key) else { return None };
-        match self.indexes.get() {
-            Some(indexes) => Some(indexes.all()[slot]),
-            None => (0..store.len()).find(|&index| store.get(width, index) == marking).map(|index| index as u32),
-        }
-    }
-
-    /// The index of the marking with each of up to `ROOM` keys, `NONE` where there is none; after `index`.
-    #[inline(always)]
-    pub fn find(&self, keys: &[u64], found: &mut [u32; ROOM]) {
-        let Some(indexes) = self.indexes.get() else { return found.fill(NONE) };
-        let (mut slots, indexes) = ([0; ROOM], indexes.all());
-        self.exact.find(keys, &mut slots);
-        for (found, &slot) in found.iter_mut().zip(&slots[..keys.len()]) {
-            *found = if slot < indexes.len() { indexes[slot] } else { NONE };
-        }
     }
 }
 
@@ -274,59 +206,13 @@ impl<W: Width, S: Slot> Arrivals<W> for ByKey<'_, S> {
     }
 }
 
-impl Space {
-    /// Slices a batch, with the hashes that `find_told` asks for.
-    #[inline(always)]
-    pub fn cut<W: Width>(&self, width: W, batch: &mut Batch) {
-        match self.set.span() {
-            None => batch.cut(width),
-            Some(span) => batch.cut_by(width, span),
-        }
-    }
-
-    /// What a firing changes in these hashes.
-    #[inline(always)]
-    pub fn flip_hash(&self, t: usize) -> u64 {
-        self.set.span().map_or_else(|| self.net.flip_hashes[t], |span| span.flips[t])
-    }
-
-    /// Makes it quick to find the indexes of markings.
-    pub fn index(&self, watch: &mut Watch<'_>) -> Result<(), Stop> {
-        with_width!(self.net.words, width => match &self.set {
-            Set::Hashed => Ok(()),
-            Set::Narrow(keyed) => keyed.index(width, &self.table.store, &self.memory, watch),
-            Set::Wide(keyed) => keyed.index(width, &self.table.store, &self.memory, watch),
-        })
-    }
-
-    /// The index of a marking one firing before or after a known one, if it was found, by its hash.
-    #[inline(always)]
-    pub fn find_told<W: Width>(&self, width: W, marking: &[u64], hash: u64) -> Option<u32> {
-        match &self.set {
-            Set::Hashed => self.table.find(width, marking, hash),
-            Set::Narrow(keyed) => keyed.find_one(width, &self.table.store, marking, hash),
-            Set::Wide(keyed) => keyed.find_one(width, &self.table.store, marking, hash),
-        }
-    }
-
-    /// The index of any marking, if it was found.
-    pub fn find(&self, marking: &[u64]) -> Option<u32> {
-        with_width!(self.net.words, width => {
-            let told = self.set.span().map_or_else(|| linear_hash(width, marking), |span| span.key(marking));
-            let found = self.find_told(width, marking, told);
-            // A key tells only reachable markings apart.
-            found.filter(|&index| self.marking(index as usize) == marking)
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::budget::unwatched;
-    use crate::explore::Limits;
+    use crate::explore::{Limits, Space};
     use crate::net::Transition;
-    use crate::samples::{explore, machines, random_spaces};
+    use crate::samples::{explore, machines};
 
     /// Eleven machines, and a chain that makes the keys long: their kind is that of the chain's length.
     fn chained(length: u32) -> Net {
@@ -391,17 +277,6 @@ mod tests {
                     assert_eq!(space.find(marking), expected.map(|index| index as u32));
                 }
             }
-        }
-    }
-
-    #[test]
-    fn a_marking_out_of_reach_is_not_found_even_where_its_key_is_that_of_another() {
-        let space = explore(machines(3, 0), false);
-        // Both places of a machine are full: one of them decides the key.
-        assert_eq!(space.find(&[0b01_01_11]), None);
-        assert_eq!(space.find(&[0b01_01_01]), Some(0));
-        for space in random_spaces(200, false) {
-            assert!((0..space.len()).all(|index| space.find(space.marking(index)) == Some(index as u32)));
         }
     }
 }

@@ -30,6 +30,8 @@ pub mod fan;
 #[forbid(unsafe_code)]
 pub mod fixpoints;
 #[forbid(unsafe_code)]
+pub mod indexes;
+#[forbid(unsafe_code)]
 pub mod known;
 #[forbid(unsafe_code)]
 pub mod marking;

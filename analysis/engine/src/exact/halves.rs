@@ -248,7 +248,6 @@ fn read<S: Slot>(record: &[u64]) -> (usize, S) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Place;
     use super::*;
 
     #[test]
@@ -270,7 +269,7 @@ mod tests {
                 }
             }
             assert_eq!(table.len, distinct);
-            assert!(keys().all(|key| matches!(table.place(key), Place::Known(_))));
+            assert!(keys().all(|key| table.has(key)));
             assert_eq!(memory.used(), Exact::<u64>::bytes(table.shape));
         }
     }

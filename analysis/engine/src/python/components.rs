@@ -21,11 +21,11 @@ impl Components {
     }
 
     fn of<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        little_endian(py, &self.scc.of)
+        little_endian(py, &self.scc.of, u32::to_le_bytes)
     }
 
     fn sizes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        little_endian(py, &self.scc.sizes)
+        little_endian(py, &self.scc.sizes, u32::to_le_bytes)
     }
 
     fn bottom<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {

@@ -178,14 +178,7 @@ impl Graph {
 
     fn markings_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let words = self.space.net.words;
-        PyBytes::new_with(py, self.space.len() * words * 8, |bytes| {
-            for (index, place) in bytes.chunks_exact_mut(words * 8).enumerate() {
-                for (to, word) in place.chunks_exact_mut(8).zip(self.space.marking(index)) {
-                    to.copy_from_slice(&word.to_le_bytes());
-                }
-            }
-            Ok(())
-        })
+        little_endian(py, &self.space.table.store.all()[..self.space.len() * words], u64::to_le_bytes)
     }
 
     fn find(&self, mask: &Bound<'_, PyInt>) -> PyResult<Option<u32>> {
@@ -308,8 +301,7 @@ impl Graph {
         let patience = Patience::new(max_seconds, cancelled)?;
         self.whole("the list of edges")?;
         let csr = self.long(py, &patience, |space, watch| Csr::new(space, None, &space.memory.clone(), watch))?;
-        let offsets: Vec<u8> = csr.offsets.iter().flat_map(|offset| offset.to_le_bytes()).collect();
-        Ok((PyBytes::new(py, &offsets), little_endian(py, &csr.targets)?))
+        Ok((little_endian(py, &csr.offsets, u64::to_le_bytes)?, little_endian(py, &csr.targets, u32::to_le_bytes)?))
     }
 
     #[pyo3(signature = (*, max_seconds=None, cancelled=None))]

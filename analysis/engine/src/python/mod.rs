@@ -160,11 +160,15 @@ pub(crate) fn marking_of(mask: &Bound<'_, PyInt>, words: usize) -> PyResult<Opti
     Ok(Some(bytes.as_bytes().as_chunks::<8>().0.iter().map(|&word| u64::from_le_bytes(word)).collect()))
 }
 
-/// Numbers end to end, little-endian, for `numpy.frombuffer`.
-pub(crate) fn little_endian<'py>(py: Python<'py>, words: &[u32]) -> PyResult<Bound<'py, PyBytes>> {
-    PyBytes::new_with(py, 4 * words.len(), |bytes| {
-        for (to, word) in bytes.chunks_exact_mut(4).zip(words) {
-            to.copy_from_slice(&word.to_le_bytes());
+/// Numbers end to end, for `numpy.frombuffer`: each as its little-endian bytes.
+pub(crate) fn little_endian<'py, T: Copy, const BYTES: usize>(
+    py: Python<'py>,
+    numbers: &[T],
+    to_bytes: impl Fn(T) -> [u8; BYTES],
+) -> PyResult<Bound<'py, PyBytes>> {
+    PyBytes::new_with(py, BYTES * numbers.len(), |bytes| {
+        for (to, &number) in bytes.as_chunks_mut().0.iter_mut().zip(numbers) {
+            *to = to_bytes(number);
         }
         Ok(())
     })

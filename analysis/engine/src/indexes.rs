@@ -1,0 +1,251 @@
+//! The indexes of markings beside their keys: what the methods that go along edges ask for.
+//!
+//! Exploring needs no index, so the table of keys (`exact.rs`) has none. Whoever asks first has the table copied, each
+//! bucket followed by the indexes of its eight keys. Key and index then stand in one line of the cache, and a look-up is
+//! one miss, as while exploring. It costs 8 bytes a slot (16 where slots have 64 bits), held for as long as the graph.
+//!
+//! Rejected: indexes in an array of their own beside the table (half the memory, but a second miss: 4 ns an edge); to
+//! build them while exploring (each growth would move them, and most questions never ask); a table of hashes and indexes
+//! with a look at the marking itself (no further memory, and two misses too).
+
+use std::hint::black_box;
+
+use crate::batch::Batch;
+use crate::budget::{Memory, Stop, Watch};
+use crate::exact::{Exact, ROOM};
+use crate::explore::Space;
+use crate::known::{Keyed, Set};
+use crate::marking::{Width, linear_hash};
+use crate::region::Region;
+use crate::seat::{LANES, REACH, Shape, Slot};
+use crate::store::Store;
+use crate::table::NONE;
+use crate::with_width;
+
+/// A bucket of slots and the indexes of their keys.
+const LINE: usize = 2 * LANES;
+
+/// Keys and indexes.
+#[derive(Debug)]
+pub struct Indexes<S> {
+    lines: Region<S>,
+    shape: Shape,
+}
+
+/// The slots of a line.
+#[inline(always)]
+fn slots<S>(line: &[S; LINE]) -> &[S; LANES] {
+    line.first_chunk().expect("a line is longer")
+}
+
+impl<S: Slot> Indexes<S> {
+    /// The indexes of all markings, whose keys are in the set.
+    fn new<W: Width>(
+        width: W,
+        keyed: &Keyed<S>,
+        exact: &Exact<S>,
+        store: &Store,
+        memory: &Memory,
+        watch: &mut Watch<'_>,
+    ) -> Result<Self, Stop> {
+        let from = exact.all();
+        let bytes = 2 * size_of_val(from);
+        memory.claim(bytes)?;
+        let Some(lines) = Region::zeroed(2 * from.len()) else {
+            memory.release(bytes);
+            return Err(Stop::Memory);
+        };
+        let mut indexes = Indexes { lines, shape: exact.shape() };
+        let fill = indexes.fill(width, keyed, from, store, watch);
+        fill.inspect_err(|_| memory.release(bytes)).map(|()| indexes)
+    }
+
+    fn fill<W: Width>(
+        &mut self,
+        width: W,
+        keyed: &Keyed<S>,
+        from: &[S],
+        store: &Store,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
+        let lines = self.lines.all_mut().as_chunks_mut::<LINE>().0;
+        for (line, bucket) in lines.iter_mut().zip(from.as_chunks::<LANES>().0) {
+            line[..LANES].copy_from_slice(bucket);
+        }
+        let mut batch = Batch::new(width.words());
+        let mut places = [(0, 0); ROOM];
+        for first in (0..store.len()).step_by(64) {
+            batch.markings.clear();
+            store.copy_range(first, store.len().min(first + 64), &mut batch.markings);
+            batch.cut_by(width, &keyed.span);
+            self.places(&batch.hashes[..batch.count], &mut places);
+            let lines = self.lines.all_mut().as_chunks_mut::<LINE>().0;
+            for (index, &(line, lane)) in (first as u64..).zip(&places[..batch.count]) {
+                lines[line][LANES + lane % LANES] = S::new(index);
+            }
+            watch.tick(64)?;
+        }
+        Ok(())
+    }
+
+    /// Line and lane of each key; the lane is `LANES` where it is not in the set.
+    #[inline(always)]
+    fn places(&self, keys: &[u64], places: &mut [(usize, usize); ROOM]) {
+        let (shape, lines) = (self.shape, self.lines.all().as_chunks::<LINE>().0);
+        let mut wanted = [S::new(0); ROOM];
+        for ((place, wanted), &key) in places.iter_mut().zip(&mut wanted).zip(keys) {
+            (place.0, *wanted) = shape.seat(shape.mix(key));
+        }
+        // As in `Exact::touch`.
+        let mut read = 0;
+        for place in places.iter().take(keys.len()) {
+            read ^= lines[place.0][0].get();
+        }
+        black_box(read);
+        for c in 0..keys.len().min(ROOM) {
+            let found = S::matches(slots(&lines[places[c].0]), wanted[c]);
+            places[c].1 = found.trailing_zeros() as usize;
+            if found == 0 {
+                places[c] = self.search(places[c].0, wanted[c]);
+            }
+        }
+    }
+
+    /// The same for one key, in all buckets where it may be.
+    fn search(&self, home: usize, wanted: S) -> (usize, usize) {
+        for (moved, line) in self.lines.all().as_chunks::<LINE>().0[home..home + REACH].iter().enumerate() {
+            let found = S::matches(slots(line), S::new(wanted.get() + moved as u64));
+            if found != 0 {
+                return (home + moved, found.trailing_zeros() as usize);
+            }
+            if S::matches(slots(line), S::new(0)) != 0 {
+                break;
+            }
+        }
+        (home, LANES)
+    }
+
+    /// The index of the marking with a key.
+    fn find_one(&self, key: u64) -> Option<u32> {
+        let (home, wanted) = self.shape.seat(self.shape.mix(key));
+        let (line, lane) = self.search(home, wanted);
+        (lane < LANES).then(|| self.lines.all()[line * LINE + LANES + lane].get() as u32)
+    }
+
+    /// The index of the marking with each of up to `ROOM` keys, `NONE` where there is none.
+    #[inline(always)]
+    fn find(&self, keys: &[u64], found: &mut [u32; ROOM]) {
+        let mut places = [(0, 0); ROOM];
+        self.places(keys, &mut places);
+        let lines = self.lines.all().as_chunks::<LINE>().0;
+        for (found, &(line, lane)) in found.iter_mut().zip(&places[..keys.len()]) {
+            let index = lines[line][LANES + lane % LANES].get() as u32;
+            *found = if lane < LANES { index } else { NONE };
+        }
+    }
+}
+
+impl<S: Slot> Keyed<S> {
+    fn index<W: Width>(&self, width: W, store: &Store, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
+        if self.indexes.get().is_none() {
+            let indexes = Indexes::new(width, self, &self.exact, store, memory, watch)?;
+            if let Err(second) = self.indexes.set(indexes) {
+                // Somebody has done the same meanwhile.
+                memory.release(size_of_val(second.lines.all()));
+            }
+        }
+        Ok(())
+    }
+
+    /// The index of a marking and its key. Without `index` before, which needs memory, the store is searched through.
+    fn find_one<W: Width>(&self, width: W, store: &Store, marking: &[u64], key: u64) -> Option<u32> {
+        if let Some(indexes) = self.indexes.get() {
+            return indexes.find_one(key);
+        }
+        let known = self.exact.has(key);
+        (0..store.len()).find(|&index| known && store.get(width, index) == marking).map(|index| index as u32)
+    }
+
+    #[inline(always)]
+    fn find(&self, keys: &[u64], found: &mut [u32; ROOM]) {
+        match self.indexes.get() {
+            Some(indexes) => indexes.find(keys, found),
+            None => found.fill(NONE),
+        }
+    }
+}
+
+impl Set {
+    /// The indexes of up to `ROOM` markings by their keys, after `Space::index`; none where markings are hashed.
+    #[inline(always)]
+    pub fn find<'a>(&self, keys: &[u64], found: &'a mut [u32; ROOM]) -> Option<&'a [u32]> {
+        match self {
+            Set::Hashed => return None,
+            Set::Narrow(keyed) => keyed.find(keys, found),
+            Set::Wide(keyed) => keyed.find(keys, found),
+        }
+        Some(&found[..keys.len()])
+    }
+}
+
+impl Space {
+    /// Slices a batch, with the hashes that `find_told` asks for.
+    #[inline(always)]
+    pub fn cut<W: Width>(&self, width: W, batch: &mut Batch) {
+        match self.set.span() {
+            None => batch.cut(width),
+            Some(span) => batch.cut_by(width, span),
+        }
+    }
+
+    /// What a firing changes in these hashes.
+    #[inline(always)]
+    pub fn flip_hash(&self, t: usize) -> u64 {
+        self.set.span().map_or_else(|| self.net.flip_hashes[t], |span| span.flips[t])
+    }
+
+    /// Makes it quick to find the indexes of markings.
+    pub fn index(&self, watch: &mut Watch<'_>) -> Result<(), Stop> {
+        with_width!(self.net.words, width => match &self.set {
+            Set::Hashed => Ok(()),
+            Set::Narrow(keyed) => keyed.index(width, &self.table.store, &self.memory, watch),
+            Set::Wide(keyed) => keyed.index(width, &self.table.store, &self.memory, watch),
+        })
+    }
+
+    /// The index of a marking one firing before or after a known one, if it was found, by its hash.
+    #[inline(always)]
+    pub fn find_told<W: Width>(&self, width: W, marking: &[u64], hash: u64) -> Option<u32> {
+        match &self.set {
+            Set::Hashed => self.table.find(width, marking, hash),
+            Set::Narrow(keyed) => keyed.find_one(width, &self.table.store, marking, hash),
+            Set::Wide(keyed) => keyed.find_one(width, &self.table.store, marking, hash),
+        }
+    }
+
+    /// The index of any marking, if it was found.
+    pub fn find(&self, marking: &[u64]) -> Option<u32> {
+        with_width!(self.net.words, width => {
+            let told = self.set.span().map_or_else(|| linear_hash(width, marking), |span| span.key(marking));
+            let found = self.find_told(width, marking, told);
+            // A key tells only reachable markings apart.
+            found.filter(|&index| self.marking(index as usize) == marking)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::samples::{explore, machines, random_spaces};
+
+    #[test]
+    fn a_marking_out_of_reach_is_not_found_even_where_its_key_is_that_of_another() {
+        let space = explore(machines(3, 0), false);
+        // Both places of a machine are full: one of them decides the key.
+        assert_eq!(space.find(&[0b01_01_11]), None);
+        assert_eq!(space.find(&[0b01_01_01]), Some(0));
+        for space in random_spaces(200, false) {
+            assert!((0..space.len()).all(|index| space.find(space.marking(index)) == Some(index as u32)));
+        }
+    }
+}
