@@ -22,7 +22,7 @@ const WIDTH_MAX: usize = 16;
 /// The most values that a block may have.
 const VALUES_MAX: usize = 24;
 /// What a block costs besides its values, in values.
-const OVERHEAD: usize = 6;
+const OVERHEAD: usize = 12;
 /// The moves from a value that may be looked at altogether; what is left is cut into places.
 const WORK_MAX: usize = 1 << 24;
 

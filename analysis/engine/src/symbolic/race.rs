@@ -19,7 +19,7 @@ use crate::net::Transition;
 
 /// The results that a search may compute in the first round, and more for each level.
 const FUEL: u64 = 1 << 15;
-const FUEL_PER_LEVEL: u64 = 8;
+const FUEL_PER_LEVEL: u64 = 16;
 /// How many times that each search has before the first drops out.
 const PATIENCE: u64 = 7;
 /// The searches that are kept to the end, and how many times less than the first of them the others get.
