@@ -7,8 +7,8 @@
 //! for the table and one for the array of markings, and half as many instructions. What is found is dropped at once;
 //! only for the rest does anybody ask which marking it was.
 //!
-//! A bucket is eight slots, filled from the first on and compared by vector instructions; at four fifths full, nine keys
-//! of ten stand in the bucket where they belong. The others stand in a following one, and a slot says how far it has
+//! A bucket is eight slots, filled from the first on and compared by vector instructions; at four fifths full, five keys
+//! of six stand in the bucket where they belong. The others stand in a following one, and a slot says how far it has
 //! moved (its low bits; 0 is an empty slot), so that its key can still be told. There are 2^k or 3 * 2^k buckets, so
 //! the table grows by a third or by half, never by two, and is never less than half full. Buckets are in the order of
 //! the mixed keys; so growing reads one table and writes the other from end to end, and needs neither the markings nor
@@ -18,7 +18,7 @@
 //!
 //! Rejected: tags of 16 bits with a look at the array on a match (two misses an edge again); a slot for each key with
 //! plain linear probing (a third of the look-ups enter a loop, whose exit the processor guesses wrong); a second hash
-//! where a bucket is full (one more miss for one edge in ten; the next bucket is at hand).
+//! where a bucket is full (one more miss for one edge in six; the next bucket is at hand).
 
 pub(crate) mod halves;
 mod in_place;
@@ -80,7 +80,7 @@ fn touch<S: Slot>(buckets: &[[S; LANES]], asked: &Asked<S>) {
 }
 
 /// Looks at the one bucket where each key belongs; how many keys were not found there (`open`). Loops over numbers, here
-/// and above: compilers make half as many instructions of them as of iterators joined together.
+/// and above: compilers make a fifth fewer instructions of them than of iterators joined together.
 #[inline(always)]
 fn look<S: Slot>(buckets: &[[S; LANES]], asked: &mut Asked<S>) -> usize {
     touch(buckets, asked);

@@ -4,7 +4,8 @@
 //! bucket followed by the indexes of its eight keys. Key and index then stand in one line of the cache, and a look-up is
 //! one miss, as while exploring. It costs 8 bytes a slot (16 where slots have 64 bits), held for as long as the graph.
 //!
-//! Rejected: indexes in an array of their own beside the table (half the memory, but a second miss: 4 ns an edge); to
+//! Rejected: indexes in an array of their own beside the table (half the memory, but a second miss: storing all edges
+//! then takes a third longer); to
 //! build them while exploring (each growth would move them, and most questions never ask); a table of hashes and indexes
 //! with a look at the marking itself (no further memory, and two misses too).
 
