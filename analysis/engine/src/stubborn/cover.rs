@@ -11,7 +11,8 @@
 
 use super::dependencies::{Dependencies, negation};
 use super::marks::Marks;
-use super::walk::{DRAWS, LENGTH_MAX, Plan, Random, Target, UNIT, Walker, cut_down, luby, without_loops};
+use super::relaxed::Plan;
+use super::walk::{DRAWS, LENGTH_MAX, Random, Target, UNIT, Walker, cut_down, luby, without_loops};
 use crate::budget::{Stop, Watch};
 use crate::net::Net;
 

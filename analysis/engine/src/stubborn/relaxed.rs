@@ -14,8 +14,10 @@
 use super::dependencies::{Dependencies, Literal, is_true, negation};
 use super::formula::Formula;
 use super::marks::Marks;
-use super::walk::Random;
+use super::walk::{Random, Target, Walker};
 
+/// Firings along one relaxed plan before the next is made.
+const PLAN_STEPS: usize = 64;
 const NEVER: u32 = u32::MAX;
 
 /// Room for plans in one net.
@@ -157,6 +159,69 @@ impl<'a> Relaxed<'a> {
                 }
             }
         }
+    }
+}
+
+/// A relaxed plan that a walk follows, and is made anew when it has been followed for a while.
+pub(super) struct Plan<'a> {
+    relaxed: Relaxed<'a>,
+    left: Vec<u32>,
+    steps: usize,
+}
+
+impl<'a> Plan<'a> {
+    pub(super) fn new(net: &'a Dependencies, places: usize, transitions: usize) -> Self {
+        Plan { relaxed: Relaxed::new(net, places, transitions), left: Vec::new(), steps: 0 }
+    }
+
+    /// Lets go of the plan.
+    pub(super) fn forget(&mut self) {
+        self.left.clear();
+    }
+
+    /// Whether there is something left to do for the plan.
+    pub(super) fn is_fresh(&self) -> bool {
+        self.steps > 0 && !self.left.is_empty()
+    }
+
+    /// Makes a plan from where a walk stands to some literals; false where there is none.
+    pub(super) fn towards(&mut self, walker: &Walker<'_>, goal: &[Literal], random: &mut Random) -> bool {
+        self.steps = PLAN_STEPS;
+        self.relaxed.plan(&walker.marking, goal, random, &mut self.left)
+    }
+
+    /// What the work of making one is.
+    pub(super) fn size(&self) -> usize {
+        self.relaxed.size()
+    }
+
+    /// A transition of the plan that is firable, which is taken out of it; now and then, and where there is none, any.
+    pub(super) fn follow(&mut self, walker: &Walker<'_>, random: &mut Random) -> u32 {
+        self.steps = self.steps.saturating_sub(1);
+        if random.below(16) > 0 && !self.left.is_empty() {
+            let (begin, count) = (random.below(self.left.len()), self.left.len());
+            let firable = (begin..begin + count).map(|k| k % count).find(|&at| walker.may_fire(self.left[at]));
+            if let Some(at) = firable {
+                return self.left.swap_remove(at);
+            }
+        }
+        walker.firable[random.below(walker.firable.len())]
+    }
+
+    /// The next transition of a plan to the target, and the work of finding it.
+    pub(super) fn next(&mut self, walker: &Walker<'_>, target: &mut Target, random: &mut Random) -> (u32, usize) {
+        let mut work = 0;
+        if !self.is_fresh() {
+            self.steps = PLAN_STEPS;
+            work = self.size() + target.size();
+            match target {
+                Target::Deadlock => _ = self.relaxed.plan_to_deadlock(&walker.marking, random, &mut self.left),
+                Target::Formula(formula) => {
+                    self.relaxed.plan_to(formula, &walker.marking, random, &mut self.left);
+                }
+            }
+        }
+        (self.follow(walker, random), work)
     }
 }
 
