@@ -132,18 +132,19 @@ class Nodes:
 
     def includes(self, b: int, a: int) -> bool:
         """Whether the second set is a part of the first."""
-        todo = [(a, b)]
+        todo, met = [(a, b)], set[tuple[int, int]]()
         while todo:
             a, b = todo.pop()
-            if a in (EMPTY, b) or (a, b) in self._included:
+            if a in (EMPTY, b) or (a, b) in met or (a, b) in self._included:
                 continue
             if b == EMPTY:
-                self._included.clear()  # of what was under way nothing is known
                 return False
             self.tick()
-            self._included.add((a, b))
+            met.add((a, b))
             _, lo, hi = self.split(a, b)
             todo += [(lo[0], lo[1]), (hi[0], hi[1])]
+        # Only now: of a pair whose parts were not all gone through, be it for want of time, nothing is known.
+        self._included |= met
         return True
 
     def contains(self, node: int, full: set[int]) -> bool:
