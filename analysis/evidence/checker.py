@@ -15,7 +15,7 @@ claim shows is only claimed, and told so.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -67,7 +67,8 @@ TIMEOUT_MS: Final = 60_000
 
 _SHOWS: Final = {
     FiringSequence: {
-        *(ClaimKind.REACHABLE, ClaimKind.FIRES, ClaimKind.NOT_LTL, ClaimKind.NOT_LEADS_TO, ClaimKind.UNORDERED),
+        *(ClaimKind.REACHABLE, ClaimKind.FIRES, ClaimKind.IN_ORDER, ClaimKind.UNORDERED),
+        *(ClaimKind.NOT_LTL, ClaimKind.NOT_LEADS_TO),
     },
     InductiveInvariant: {ClaimKind.NEVER},
     Labelling: {
@@ -322,6 +323,18 @@ def _run(evidence: Evidence, of: FiringSequence) -> Checked:
     begin = next((i for i, marking in enumerate(markings) if holds(net, claim.state_goal, marking)), None)
     if begin is None:
         refuse(f"({format_formula(claim.state_goal)}) holds nowhere on the run")
-    if left := set(claim.fires) - {name for fired in of.firings[begin:] for name in fired}:
+    if claim.kind is ClaimKind.IN_ORDER:
+        _require_in_order(claim, of.firings[begin:])
+    elif left := set(claim.fires) - {name for fired in of.firings[begin:] for name in fired}:
         refuse(f"the run does not fire {min(left)}")
     return Checked(shown=True, method=method)
+
+
+def _require_in_order(claim: Claim, firings: Sequence[Sequence[str]]) -> None:
+    """Refuse firings of which none, one moment after the other, are those of the claim; a step is one moment."""
+    wanted = list(claim.fires)
+    for fired in firings:
+        if wanted and wanted[0] in fired:
+            wanted.pop(0)
+    if wanted:
+        refuse(f"the run does not fire {', and later '.join(claim.fires)}")

@@ -16,10 +16,10 @@ other.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from itertools import combinations
-from typing import Final
+from itertools import combinations, permutations
 
 from firable.analysis.evidence.claims import Claim, ClaimKind, marking_of, negation_in_ctl
+from firable.analysis.evidence.read_off import eager_cycle, read_off
 from firable.nets.formula import (
     And,
     Compare,
@@ -39,13 +39,8 @@ from firable.nets.formula import (
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty, Transition
 from firable.nets.queries import Query, QueryKind
 from firable.nets.temporal import Logic, Temporal
-from firable.semantics.arbitration import Arbitration
-from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts
-from firable.semantics.player import Player
+from firable.semantics.conflict import jointly_openable, structural_conflicts
 from firable.semantics.trace import Discipline
-
-STEPS_MAX: Final = 100_000
-"""How many steps of the arbitrated run are played."""
 
 
 def tidy(formula: Formula) -> Formula:
@@ -128,29 +123,6 @@ def tokens_at_least(places: tuple[str, ...], bound: int) -> Formula:
     return tidy(Compare(Count(places), Sign.AT_LEAST, Count(added=bound)))
 
 
-def eager_cycle(net: Net) -> frozenset[str] | None:
-    """What fires for ever in the arbitrated run with all gates open; None where there is none, or it takes too long.
-
-    Raises `InputError` F2013 where the arbiters do not fit the conflicts.
-    """
-    player, arbitration = Player(net), Arbitration.of(net)
-    marking, turns = net.initial_marking, arbitration.first_turns
-    seen = {(marking, turns): 0}
-    fired: list[tuple[int, ...]] = []
-    while len(fired) < STEPS_MAX:
-        enabled = player.may_fire(marking)
-        if not enabled:
-            return frozenset()
-        if not jointly_openable(net, enabled):
-            return None
-        step, turns = arbitration.decide(enabled, turns)
-        marking = player.fire(marking, step)
-        fired.append(tuple(step))
-        if (start := seen.setdefault((marking, turns), len(fired))) < len(fired):
-            return frozenset(net.transitions[t].name for step in fired[start:] for t in step)
-    return None
-
-
 class Shown:
     """The claims that are shown, asked for what they say together."""
 
@@ -159,7 +131,7 @@ class Shown:
         self.claims = frozenset(claims)
         homes = (c.state_goal for c in claims if c.kind is ClaimKind.ALWAYS_POSSIBLE)
         self.homes = {home for home in homes if marking_of(net, home) is not None}
-        of_runs = [c for c in claims if c.kind is ClaimKind.FIRES]
+        of_runs = [c for c in claims if c.kind in {ClaimKind.FIRES, ClaimKind.IN_ORDER}]
         self.fired = {name for claim in of_runs for name in claim.fires}
         self.fired_at_home = {name for claim in of_runs if claim.goal in self.homes for name in claim.fires}
 
@@ -234,39 +206,13 @@ def suffices(
             return _served(shown, proved)
         case "self-loops" | "structural-conflicts" | "gate-races" | "output-signals-in-M0":
             return read_off(net, discipline, name) is proved
-        case "steps-serialisable":
+        case "steps-serialisable" if discipline is Discipline.STEP:  # no verdict of single firings
             said = Claim(ClaimKind.ORDERED if proved else ClaimKind.UNORDERED) in shown
             return said or read_off(net, discipline, name) is proved
     kind, _, of = name.partition(".")
     if kind == "property":
         return any(_property(shown, one, proved) for one in net.properties if one.name == of)
     return kind == "query" and query is not None and query.name == of and _query(shown, query, proved)
-
-
-def read_off(net: Net, discipline: Discipline, name: str) -> bool | None:
-    """What the net itself says of a verdict, without a look at its markings; None where it does not."""
-    match name:
-        case "self-loops":
-            return not any(t.self_loops for t in net.transitions)
-        case "structural-conflicts":
-            return not any(listed.pairs for listed in structural_conflicts(net))
-        case "gate-races":
-            return next(gate_races(net), None) is None
-        case "output-signals-in-M0":
-            return not any(place.marked and place.command is not None for place in net.places)
-        case "steps-serialisable" if discipline is Discipline.STEP and _races_have_an_order(net):
-            return True
-    return None
-
-
-def _races_have_an_order(net: Net) -> bool:
-    """Whether the gate races among transitions that may fire together are acyclic."""
-    rivals = conflicts(net).rivals
-    races = [(t, u) for t, u in gate_races(net) if u not in rivals[t] and jointly_openable(net, (t, u))]
-    left = {t for t, _ in races}
-    while left and (free := left - {t for t, u in races if u in left}):
-        left -= free
-    return not left
 
 
 def _compete(shown: Shown) -> bool:
@@ -291,14 +237,38 @@ def _never(shown: Shown, bad: Formula, proved: bool) -> bool:
 
 
 def _stopped(shown: Shown) -> bool:
-    """Each command is never sent, or some run sends it and another one to its machine."""
-    runs = [set(claim.fires) for claim in shown.claims if claim.kind is ClaimKind.FIRES]
+    """Each command is never sent, or some run sends it and, at another moment, another one to its machine."""
+    followed = _followed(shown)
     return all(
-        Claim(ClaimKind.NEVER, some_firable(names[one])) in shown
-        or any(run & {*names[one]} and run & {*names[other]} for run in runs for other in names if other != one)
-        for names in senders(shown.net).values()
-        for one in names
+        (machine, name) in followed or Claim(ClaimKind.NEVER, some_firable(sending)) in shown
+        for machine, names in senders(shown.net).items()
+        for name, sending in names.items()
     )
+
+
+def _followed(shown: Shown) -> set[tuple[str, str]]:
+    """The commands, by machine and name, that come before or after another one of their machine.
+
+    What one firing sends at once, or one step, does not follow each other; so the claims must be of firings in order.
+    """
+    sends: dict[str, list[tuple[str, str]]] = {}
+    for machine, names in senders(shown.net).items():
+        for name, sending in names.items():
+            for t in sending:
+                sends.setdefault(t, []).append((machine, name))
+    found: set[tuple[str, str]] = set()
+    for claim in shown.claims:
+        if claim.kind is ClaimKind.IN_ORDER:
+            spans: dict[str, dict[str, tuple[int, int]]] = {}  # of each command the first moment and the last
+            for moment, t in enumerate(claim.fires):
+                for machine, name in sends.get(t, ()):
+                    of = spans.setdefault(machine, {})
+                    of[name] = of.get(name, (moment, moment))[0], moment
+            for machine, of in spans.items():
+                for one, other in permutations(of, 2):
+                    if of[one][0] < of[other][1]:
+                        found |= {(machine, one), (machine, other)}
+    return found
 
 
 def _never_stopped(shown: Shown) -> bool:

@@ -21,9 +21,7 @@ from firable.analysis.evidence.meaning import (
     competing,
     completions_clash,
     contact,
-    eager_cycle,
     property_claim,
-    read_off,
     senders,
     some_firable,
     suffices,
@@ -33,16 +31,16 @@ from firable.analysis.evidence.meaning import (
 )
 from firable.analysis.evidence.obligations import played
 from firable.analysis.evidence.producing_claims import Certifier, LackingError
+from firable.analysis.evidence.read_off import eager_cycle, read_off
 from firable.analysis.evidence.runs import holds
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
-from firable.nets.net import Marking, Net, Property, TemporalProperty
+from firable.nets.net import Marking, Property, TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
 from firable.nets.verdict import Status, Verdict, Witness
 from firable.semantics.player import Player
-from firable.semantics.trace import Discipline
 
 Shown = list[tuple[Claim, Certificate]]
 _FALSE: Final = Constant(value=False)
@@ -66,16 +64,6 @@ def evidence_of_report(report: CheckReport, queries: Sequence[Query] = (), limit
     certifier.deadlock = next((verdict.witness for verdict in deadlocked), None)
     decided = [verdict for verdict in report.verdicts if verdict.status is not Status.UNKNOWN]
     return Document(report.net, report.discipline, tuple(map(one.record, decided)))
-
-
-def evidence_of_claim(
-    net: Net, claim: Claim, discipline: Discipline = Discipline.INTERLEAVING, limits: Limits | None = None
-) -> Certificate | None:
-    """A certificate for one claim, looked for within the limits; None where none is found."""
-    try:
-        return Certifier(net, discipline, limits or Limits()).certify(claim)
-    except LackingError:
-        return None
 
 
 class _Verdicts:
@@ -270,10 +258,10 @@ class _Verdicts:
         dead = set()
         for names in senders(self.net).values():
             for name, sending in names.items():
-                others = [t for other, of in names.items() if other != name for t in of]
-                found = self._pair(sending, others)
+                others = dict.fromkeys(t for other, of in names.items() if other != name for t in of)
+                found = self.certifier.run_in_order(sending, tuple(others))
                 if found is not None:
-                    yield found
+                    yield Claim(ClaimKind.IN_ORDER, fires=found[0]), found[1]
                 elif sending not in dead:
                     dead.add(sending)
                     yield from self._never_sent(sending)
@@ -281,20 +269,6 @@ class _Verdicts:
     def _never_sent(self, sending: tuple[str, ...]) -> Iterator[tuple[Claim, Certificate]]:
         goal = some_firable(sending)
         return iter(()) if goal == _FALSE else self._one(Claim(ClaimKind.NEVER, goal))
-
-    def _pair(self, one: Sequence[str], others: Sequence[str]) -> tuple[Claim, Certificate] | None:
-        """A run that fires one of these and one of those."""
-        for first in one:
-            for second in others:
-                try:
-                    runs = self.certifier.runs_firing((first, second))
-                except LackingError:
-                    continue
-                for run in runs:
-                    fired = {name for names in run.firings for name in names}
-                    if {first, second} <= fired:
-                        return Claim(ClaimKind.FIRES, TRUE, fires=(first, second)), run
-        return None
 
     def _never_stopped(self) -> Iterator[tuple[Claim, Certificate]]:
         alone = [next(iter(names.values())) for names in senders(self.net).values() if len(names) == 1]

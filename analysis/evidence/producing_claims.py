@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
+from itertools import product
 from typing import Any, Final
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
@@ -32,7 +33,7 @@ from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl, is_markin
 from firable.analysis.evidence.meaning import contact, tidy
 from firable.analysis.evidence.producing_labels import TooLargeError, drawn, labelling, listed
 from firable.analysis.evidence.producing_ranks import progress
-from firable.analysis.evidence.producing_runs import NotFoundError, parting, runs_by_search, runs_on_graph
+from firable.analysis.evidence.producing_runs import NotFoundError, parting, run_in_order, runs_by_search, runs_on_graph
 from firable.analysis.evidence.theorems import check_premises
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
@@ -343,6 +344,24 @@ class Certifier:
             raise LackingError(str(error)) from None
         except (BudgetExceeded, IncompleteGraph):
             raise LackingError("the time for evidence was over") from None
+
+    def run_in_order(
+        self, one: tuple[str, ...], others: tuple[str, ...]
+    ) -> tuple[tuple[str, str], FiringSequence] | None:
+        """A run that fires one of these, and one of those at a moment before or after it, and which two."""
+        if self.graph is not None:
+            return run_in_order(self.graph, one, others) or run_in_order(self.graph, others, one)
+        for pair in product(one, others):
+            try:
+                runs = self.runs_firing(pair) if pair[0] != pair[1] else []
+            except LackingError:
+                continue
+            for run in runs:
+                fired = [name for names in run.firings for name in names]  # a step of one firing each
+                if {*pair} <= {*fired}:
+                    first, second = sorted(pair, key=fired.index)
+                    return (first, second), run
+        return None
 
     def homes(self) -> Marking | None:
         """A home marking, M0 if it is one; None where there is none or it is not known."""

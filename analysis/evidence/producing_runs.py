@@ -59,6 +59,36 @@ def runs_on_graph(graph: ReachabilityGraph, names: Sequence[str], home: Marking 
     return runs
 
 
+def run_in_order(
+    graph: ReachabilityGraph, one: Sequence[str], then: Sequence[str]
+) -> tuple[tuple[str, str], FiringSequence] | None:
+    """A run of a complete graph that fires one of these, and later one of those, and which two; None without one.
+
+    None too where the time was over first.
+    """
+    try:
+        return _in_order(graph, one, then)
+    except BudgetExceeded:
+        return None
+
+
+def _in_order(
+    graph: ReachabilityGraph, one: Sequence[str], then: Sequence[str]
+) -> tuple[tuple[str, str], FiringSequence] | None:
+    first, second = ({graph.net.transition_index[name] for name in names} for names in (one, then))
+    may = np.zeros(graph.n_markings, dtype=np.bool_)
+    for t in second:
+        may |= graph.may_fire(t)
+    ahead, run = graph.backward(may), _Run(graph)
+    if not run.go(graph.before(ahead, sorted(first))):
+        return None
+    before = next(t for t in run.fire_into(first, ahead) if t in first)
+    run.go(may)
+    after = next(t for t in run.fire_into(second, np.ones(graph.n_markings, dtype=np.bool_)) if t in second)
+    names = graph.net.transitions[before].name, graph.net.transitions[after].name
+    return names, FiringSequence(tuple(run.firings))
+
+
 class _Run:
     """A run through a graph."""
 
@@ -88,10 +118,15 @@ class _Run:
             may |= graph.may_fire(t)
         if not self.go(may):
             return False
-        fired, after = next((f, to) for f, to in graph.successors(self.at) if open_.intersection(f))
-        self._note(fired)
-        self.at = after
+        self.fire_into(open_, np.ones(graph.n_markings, dtype=np.bool_))
         return True
+
+    def fire_into(self, among: set[int], targets: Any) -> tuple[int, ...]:
+        """Fire what holds one of these transitions and leads into a set, where something does; what it was."""
+        edges = self.graph.successors(self.at)
+        fired, self.at = next((fired, to) for fired, to in edges if targets[to] and among.intersection(fired))
+        self._note(fired)
+        return fired
 
     def _note(self, fired: tuple[int, ...]) -> None:
         self.firings.append(self.graph.witnesses.names(fired))

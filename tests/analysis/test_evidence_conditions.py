@@ -5,9 +5,22 @@ from dataclasses import replace
 
 import pytest
 from support.evidence import document
-from support.evidence_examples import CHOICE, CIRCUIT, ENDING, RACING, SOMETIMES, TRAPPED, TURNS
+from support.evidence_examples import (
+    CHOICE,
+    CIRCUIT,
+    ENDING,
+    LOOP,
+    RACING,
+    SOMETIMES,
+    TRAPPED,
+    TURNS,
+    fires,
+    in_order,
+    net,
+)
 from support.true_claims import true
 
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import (
     Back,
     Certificate,
@@ -30,27 +43,19 @@ from firable.analysis.evidence.certificate import (
     Whole,
 )
 from firable.analysis.evidence.checker import check_evidence
-from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking
+from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import document_from_text
-from firable.analysis.evidence.meaning import suffices
 from firable.analysis.evidence.nodes import EMPTY, UNIT, Nodes
 from firable.analysis.evidence.obligations import Evidence
+from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start, parse_formula
-from firable.nets.net import Command, ExternalGate, Fairness, Net, Place, Signal, Transition
+from firable.nets.formula import Constant, Holds, Not, Start, parse_formula
+from firable.nets.net import ExternalGate, Fairness, Net, Place, Signal, Transition
 from firable.nets.temporal import parse_temporal
 from firable.semantics.trace import Discipline
 
-
-def net(name: str, marked: str, *moves: tuple[str, str]) -> Net:
-    """Places of one letter each, and transitions t0, t1, ... from some to others."""
-    letters = sorted(set(marked).union(*(x + y for x, y in moves), "z"))
-    places = tuple(Place(letter, marked=letter in marked) for letter in letters)
-    return Net(name, places, tuple(Transition(f"t{i}", tuple(x), tuple(y)) for i, (x, y) in enumerate(moves)))
-
-
-LOOP = net("loop", "a", ("a", "b"), ("b", "a"))  # z is never marked
 FORK = net("fork", "a", ("a", "b"), ("a", "c"))
+HALF_LIVE = net("half", "a", ("a", "b"), ("b", "a"), ("a", "c"))
 
 
 def listed(of: Net, text: str, markings: list[str], *ranks: int) -> Evidence:
@@ -173,10 +178,6 @@ def unanswered(of: Net, fairness: Fairness, firings: str, cycle: str = "") -> Ev
     return run(of, Claim(ClaimKind.NOT_LEADS_TO, Holds("asked"), Holds("done"), fairness), firings, cycle)
 
 
-def fires(goal: Formula, *names: str) -> Claim:
-    return Claim(ClaimKind.FIRES, goal, fires=names)
-
-
 RUNS: dict[str, Callable[[], Evidence]] = {
     "the cycle does not close": lambda: run(ENDING, refuted("F b"), "", "end"),
     "the run could go on": lambda: run(ENDING, refuted("F b"), ""),
@@ -191,6 +192,12 @@ RUNS: dict[str, Callable[[], Evidence]] = {
     "the cycle is not strongly fair": lambda: unanswered(SOMETIMES, Fairness.STRONG, "", "tick tock"),
     "it fires before the goal only": lambda: run(ENDING, fires(Holds("b"), "end"), "end"),
     "it does not fire": lambda: run(net("still", "a", ("z", "b")), fires(Holds("a"), "t0"), ""),
+    "it fires in another order": lambda: run(HALF_LIVE, in_order(Start(), "t2", "t0"), "t0 t1 t2"),
+    "it fires in order before the goal": lambda: run(ENDING, in_order(Holds("b"), "end"), "end"),
+    "it fires once": lambda: run(ENDING, in_order(Start(), "end", "end"), "end"),
+    "one step has no order": lambda: Evidence(
+        RACING, Discipline.STEP, in_order(Start(), "t", "u"), FiringSequence((("t", "u"),))
+    ),
     "the step has an order": lambda: run(CIRCUIT, Claim(ClaimKind.UNORDERED), "go", discipline=Discipline.STEP),
     "the steps have no order": lambda: Evidence(
         RACING, Discipline.STEP, Claim(ClaimKind.ORDERED), Labelling(Markings((3, 0)))
@@ -217,7 +224,6 @@ RUNS: dict[str, Callable[[], Evidence]] = {
 
 ONE_TOKEN = InductiveInvariant((Equation((("a", 1), ("b", 1), ("c", 1)), 1),))
 UNMARKED = net("unmarked", "", ("a", "b"), ("b", "a"))
-HALF_LIVE = net("half", "a", ("a", "b"), ("b", "a"), ("a", "c"))
 DEAD_END = net("end", "ac", ("a", "b"), ("b", "a"), ("ac", "d"))
 STARTED = net("started", "s", ("s", "a"), ("a", "b"), ("b", "a"))
 GATED = Net(
@@ -290,37 +296,11 @@ def test_the_same_conditions_are_met_by_true_claims() -> None:
         waits(TURNS, Fairness.STRONG, ALL, r0="go"),
         theorem(CHOICE, TheoremName.FREE_CHOICE, ONE_TOKEN, "abc"),
         run(TURNS, fires(Holds("b"), "tock"), "tick tock"),
+        run(TURNS, in_order(Holds("b"), "tock", "tick"), "tick tock tick"),
+        run(HALF_LIVE, in_order(Start(), "t0", "t2"), "t0 t1 t2"),
     ):
         assert true(evidence)
         assert not refused(evidence)
-
-
-FIRES_ALL = fires(Constant(value=True), "t0", "t1")
-
-
-@pytest.mark.parametrize(
-    ("name", "proved", "claims"),
-    [
-        ("live", True, [fires(Start(), "t0", "t1")]),  # no home marking
-        ("live", True, [Claim(ClaimKind.ALWAYS_POSSIBLE, Holds("a")), fires(Holds("a"), "t0", "t1")]),  # no marking
-        ("live", True, [Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("t0"))]),  # of one
-        ("live", False, [Claim(ClaimKind.LOST, Holds("a"))]),
-        ("quasi-live", True, [fires(Constant(value=True), "t0")]),
-        ("quasi-live", False, [Claim(ClaimKind.LOST, Firable("t0"))]),
-        ("deadlock-free", True, [FIRES_ALL]),
-        ("deadlock-free", False, [Claim(ClaimKind.LOST, Deadlock())]),
-        ("home-markings", False, [Claim(ClaimKind.LOST, Holds("a")), Claim(ClaimKind.LOST, Not(Holds("b")))]),
-        ("home-markings", True, [Claim(ClaimKind.ALWAYS_POSSIBLE, Holds("a"))]),
-        ("starvation", True, []),
-        ("contact-free", True, [Claim(ClaimKind.NEVER, And((Holds("a"), Holds("z"))))]),
-        ("effective-conflicts", False, [Claim(ClaimKind.REACHABLE, And((Firable("t0"), Firable("t1"))))]),
-        ("query.q", True, [FIRES_ALL]),
-        ("nonsense", True, [FIRES_ALL]),
-    ],
-)
-def test_claims_that_say_less_do_not_suffice(name: str, proved: bool, claims: list[Claim]) -> None:
-    of = net("less", "ab", ("a", "c"), ("b", "d"), ("c", "a"))
-    assert not suffices(of, Discipline.INTERLEAVING, name, proved, claims, None)
 
 
 def test_two_helpers_in_one_rank_are_refused() -> None:
@@ -331,13 +311,6 @@ def test_two_helpers_in_one_rank_are_refused() -> None:
     text = document(Evidence(TURNS, Discipline.INTERLEAVING, evidence.claim, doubled)).to_text()
     with pytest.raises(InputError, match="F6001"):
         document_from_text(text)
-
-
-def test_a_home_marking_is_the_formula_of_all_places() -> None:
-    home = Claim(ClaimKind.ALWAYS_POSSIBLE, is_marking(LOOP, LOOP.marking("b")))
-    assert suffices(LOOP, Discipline.INTERLEAVING, "home-markings", proved=True, claims=[home], query=None)
-    both = [home, fires(home.state_goal, "t0", "t1")]
-    assert suffices(LOOP, Discipline.INTERLEAVING, "live", proved=True, claims=both, query=None)
 
 
 def test_a_theorem_says_nothing_of_steps() -> None:
@@ -354,29 +327,14 @@ def test_what_was_not_included_once_is_not_included_afterwards() -> None:
     assert nodes.includes(both, p)
 
 
-def test_a_machine_is_stopped_by_another_command_in_the_same_run() -> None:
-    places = (
-        Place("a", marked=True),
-        Place("b", command=Command("M", "RUN")),
-        Place("c", command=Command("M", "STOP")),
-    )
-    of = Net("m", places, (Transition("go", ("a",), ("b",)), Transition("halt", ("b",), ("c",))))
-
-    def enough(*claims: Claim) -> bool:
-        return suffices(of, Discipline.INTERLEAVING, "machine-never-stopped", proved=True, claims=claims, query=None)
-
-    anything = Constant(value=True)
-    assert enough(fires(anything, "go", "halt"))
-    assert not enough(fires(anything, "go"), fires(anything, "halt"))
-    assert not enough(fires(anything, "go"))
-
-
-def test_starvation_is_excluded_by_all_that_wait() -> None:
-    of = net("waiting", "a", ("a", "b"), ("b", "a"), ("zb", "a"), ("zc", "a"))
-
-    def enough(*names: str) -> bool:
-        claims = [Claim(ClaimKind.NEVER, Firable(name)) for name in names]
-        return suffices(of, Discipline.INTERLEAVING, "starvation", proved=True, claims=claims, query=None)
-
-    assert enough("t2", "t3")
-    assert not enough("t2")
+def test_what_was_not_gone_through_in_time_is_not_included_afterwards() -> None:
+    nodes, depth = Nodes(Deadline.after(0)), 5_000  # deeper than a look at the clock
+    all_subsets, without_first = nodes.node(1, UNIT, UNIT), UNIT
+    for level in range(2, depth):
+        all_subsets = nodes.node(level, all_subsets, all_subsets)
+        without_first = nodes.node(level, without_first, without_first)
+    with pytest.raises(TimeIsOverError):
+        nodes.includes(without_first, all_subsets)
+    nodes.deadline = NEVER
+    assert not nodes.includes(without_first, all_subsets)
+    assert nodes.includes(all_subsets, without_first)

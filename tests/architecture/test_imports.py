@@ -87,5 +87,5 @@ def test_the_checker_of_evidence_loads_nothing_that_finds_any() -> None:
             f"evidence.{name}"
             for name in ("document_records", "labelling", "listed", "meaning", "nodes", "obligations")
         ),
-        *(f"evidence.{name}" for name in ("progress", "refusal", "runs", "theorems", "unfolding")),
+        *(f"evidence.{name}" for name in ("progress", "read_off", "refusal", "runs", "theorems", "unfolding")),
     }

@@ -23,6 +23,15 @@ from firable.semantics.trace import Discipline
 
 BOTH_EAT = And((Holds("p1.eating"), Holds("p2.eating")))
 
+
+def net(name: str, marked: str, *moves: tuple[str, str]) -> Net:
+    """Places of one letter each, and transitions t0, t1, ... from some to others."""
+    letters = sorted(set(marked).union(*(x + y for x, y in moves), "z"))
+    places = tuple(Place(letter, marked=letter in marked) for letter in letters)
+    return Net(name, places, tuple(Transition(f"t{i}", tuple(x), tuple(y)) for i, (x, y) in enumerate(moves)))
+
+
+LOOP = net("loop", "a", ("a", "b"), ("b", "a"))  # z is never marked
 TRAPPED = Net(  # no sum of tokens stays the same, and yet somewhere there is always a token
     "trapped",
     (Place("a", marked=True), Place("b"), Place("c")),
@@ -111,6 +120,14 @@ def _invented(net: Net, claim: Claim, firings: str, cycle: str = "") -> Evidence
     return _of(net, claim, FiringSequence(prefix, around))
 
 
+def fires(goal: Formula, *names: str) -> Claim:
+    return Claim(ClaimKind.FIRES, goal, fires=names)
+
+
+def in_order(goal: Formula, *names: str) -> Claim:
+    return Claim(ClaimKind.IN_ORDER, goal, fires=names)
+
+
 _END = "deadlock or p1.eating or p2.eating"
 _ROBOT = "conceptual_one_robot"
 EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
@@ -127,6 +144,9 @@ EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
     "continuation": lambda: certified(family_net("philosophers-3"), Claim(ClaimKind.LOST, Start())),
     "fires": lambda: _invented(
         TURNS, Claim(ClaimKind.FIRES, Holds("b"), fires=("go", "tock")), "tick tock tick go tock"
+    ),
+    "in order": lambda: _invented(
+        TURNS, Claim(ClaimKind.IN_ORDER, Holds("b"), fires=("tock", "go", "tock")), "tick tock go tick tock"
     ),
     "weak": lambda: certified(TURNS, _leads(Fairness.WEAK)),
     "strong": lambda: certified(SOMETIMES, _leads(Fairness.STRONG)),

@@ -36,6 +36,8 @@ def true(evidence: Evidence) -> bool:
     match claim.kind:
         case ClaimKind.FIRES:
             return _fires(space, claim)
+        case ClaimKind.IN_ORDER:
+            return _in_order(space, claim)
         case ClaimKind.LTL | ClaimKind.NOT_LTL:
             return (refuting(Sets(space), claim.goal) is None) is (claim.kind is ClaimKind.LTL)
         case ClaimKind.LEADS_TO | ClaimKind.NOT_LEADS_TO:
@@ -67,6 +69,21 @@ def _fires(space: NaiveSpace, claim: Claim) -> bool:
                 seen.add(pair)
                 todo.append(pair)
     return False
+
+
+def _in_order(space: NaiveSpace, claim: Claim) -> bool:
+    """Some run meets the goal and then fires each at a later moment: step by step, from all markings it may be at."""
+    at = frozenset[int](space.satisfying(claim.state_goal))
+    for name in claim.fires:
+        t = space.net.transition_index[name]
+        todo, ahead = list(at), set(at)
+        while todo:
+            for _, after in space.graph[todo.pop()]:
+                if after not in ahead:
+                    ahead.add(after)
+                    todo.append(after)
+        at = frozenset(after for marking in ahead for label, after in space.graph[marking] if t in label)
+    return bool(at)
 
 
 def where(space: NaiveSpace, formula: Temporal) -> Markings:

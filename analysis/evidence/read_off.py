@@ -1,0 +1,67 @@
+"""What the net itself says of a verdict: read off its arcs, or by playing its one arbitrated run.
+
+These verdicts want no certificate, since to look again costs no more than to check one. A document brings its own net,
+so each look ends with a deadline, as everything does that is checked.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from firable.nets.net import Net
+from firable.semantics.arbitration import Arbitration
+from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts
+from firable.semantics.player import Player
+from firable.semantics.trace import Discipline
+
+STEPS_MAX: Final = 100_000
+"""How many steps of the arbitrated run are played."""
+
+
+def read_off(net: Net, discipline: Discipline, name: str) -> bool | None:
+    """What the net itself says of a verdict, without a look at its markings; None where it does not."""
+    match name:
+        case "self-loops":
+            return not any(t.self_loops for t in net.transitions)
+        case "structural-conflicts":
+            return not any(listed.pairs for listed in structural_conflicts(net))
+        case "gate-races":
+            return next(gate_races(net), None) is None
+        case "output-signals-in-M0":
+            return not any(place.marked and place.command is not None for place in net.places)
+        case "steps-serialisable" if discipline is Discipline.STEP and _races_have_an_order(net):
+            return True
+    return None
+
+
+def _races_have_an_order(net: Net) -> bool:
+    """Whether the gate races among transitions that may fire together are acyclic."""
+    rivals = conflicts(net).rivals
+    races = [(t, u) for t, u in gate_races(net) if u not in rivals[t] and jointly_openable(net, (t, u))]
+    left = {t for t, _ in races}
+    while left and (free := left - {t for t, u in races if u in left}):
+        left -= free
+    return not left
+
+
+def eager_cycle(net: Net) -> frozenset[str] | None:
+    """What fires for ever in the arbitrated run with all gates open; None where there is none, or it takes too long.
+
+    Raises `InputError` F2013 where the arbiters do not fit the conflicts.
+    """
+    player, arbitration = Player(net), Arbitration.of(net)
+    marking, turns = net.initial_marking, arbitration.first_turns
+    seen = {(marking, turns): 0}
+    fired: list[tuple[int, ...]] = []
+    while len(fired) < STEPS_MAX:
+        enabled = player.may_fire(marking)
+        if not enabled:
+            return frozenset()
+        if not jointly_openable(net, enabled):
+            return None
+        step, turns = arbitration.decide(enabled, turns)
+        marking = player.fire(marking, step)
+        fired.append(tuple(step))
+        if (start := seen.setdefault((marking, turns), len(fired))) < len(fired):
+            return frozenset(net.transitions[t].name for step in fired[start:] for t in step)
+    return None

@@ -1,0 +1,164 @@
+"""Whether claims suffice for a verdict: those that say less do not, and true ones never for its opposite."""
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+from support.evidence_examples import LOOP, fires, in_order, net
+from support.lively_nets import lively_net
+from support.naive_space import NaiveSpace
+from support.true_claims import true
+
+from firable.analysis.evidence.certificate import FiringSequence
+from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking
+from firable.analysis.evidence.meaning import (
+    commands_clash,
+    competing,
+    contact,
+    senders,
+    some_firable,
+    suffices,
+    tidy,
+)
+from firable.analysis.evidence.obligations import Evidence
+from firable.analysis.report import report_on
+from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
+from firable.nets.net import Command, Net, Place, Transition
+from firable.nets.verdict import Status
+from firable.semantics.trace import Discipline
+
+FIRES_ALL = fires(Constant(value=True), "t0", "t1")
+
+
+@pytest.mark.parametrize(
+    ("name", "proved", "claims"),
+    [
+        ("live", True, [fires(Start(), "t0", "t1")]),  # no home marking
+        ("live", True, [Claim(ClaimKind.ALWAYS_POSSIBLE, Holds("a")), fires(Holds("a"), "t0", "t1")]),  # no marking
+        ("live", True, [Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("t0"))]),  # of one
+        ("live", False, [Claim(ClaimKind.LOST, Holds("a"))]),
+        ("quasi-live", True, [fires(Constant(value=True), "t0")]),
+        ("quasi-live", False, [Claim(ClaimKind.LOST, Firable("t0"))]),
+        ("deadlock-free", True, [FIRES_ALL]),
+        ("deadlock-free", False, [Claim(ClaimKind.LOST, Deadlock())]),
+        ("home-markings", False, [Claim(ClaimKind.LOST, Holds("a")), Claim(ClaimKind.LOST, Not(Holds("b")))]),
+        ("home-markings", True, [Claim(ClaimKind.ALWAYS_POSSIBLE, Holds("a"))]),
+        ("starvation", True, []),
+        ("contact-free", True, [Claim(ClaimKind.NEVER, And((Holds("a"), Holds("z"))))]),
+        ("effective-conflicts", False, [Claim(ClaimKind.REACHABLE, And((Firable("t0"), Firable("t1"))))]),
+        ("query.q", True, [FIRES_ALL]),
+        ("nonsense", True, [FIRES_ALL]),
+    ],
+)
+def test_claims_that_say_less_do_not_suffice(name: str, proved: bool, claims: list[Claim]) -> None:
+    of = net("less", "ab", ("a", "c"), ("b", "d"), ("c", "a"))
+    assert not suffices(of, Discipline.INTERLEAVING, name, proved, claims, None)
+
+
+def test_a_home_marking_is_the_formula_of_all_places() -> None:
+    home = Claim(ClaimKind.ALWAYS_POSSIBLE, is_marking(LOOP, LOOP.marking("b")))
+    assert suffices(LOOP, Discipline.INTERLEAVING, "home-markings", proved=True, claims=[home], query=None)
+    both = [home, fires(home.state_goal, "t0", "t1")]
+    assert suffices(LOOP, Discipline.INTERLEAVING, "live", proved=True, claims=both, query=None)
+
+
+def test_a_machine_is_stopped_by_another_command_in_the_same_run() -> None:
+    places = (
+        Place("a", marked=True),
+        Place("b", command=Command("M", "RUN")),
+        Place("c", command=Command("M", "STOP")),
+    )
+    of = Net("m", places, (Transition("go", ("a",), ("b",)), Transition("halt", ("b",), ("c",))))
+
+    def enough(*claims: Claim) -> bool:
+        return suffices(of, Discipline.INTERLEAVING, "machine-never-stopped", proved=True, claims=claims, query=None)
+
+    anything = Constant(value=True)
+    assert enough(in_order(anything, "go", "halt"))
+    assert enough(in_order(anything, "halt", "go"))
+    assert enough(fires(anything, "go"), in_order(anything, "go", "go", "halt"))
+    assert not enough(fires(anything, "go", "halt"))  # in one step, it may be
+    assert not enough(in_order(anything, "go", "go"))
+    assert not enough(fires(anything, "go"), fires(anything, "halt"))
+    assert not enough(fires(anything, "go"))
+
+
+@pytest.mark.parametrize("discipline", list(Discipline))
+def test_two_commands_sent_at_one_moment_do_not_follow_each_other(discipline: Discipline) -> None:
+    places = (
+        Place("a", marked=True),
+        Place("b", command=Command("M", "RUN")),
+        Place("c", command=Command("M", "STOP")),
+    )
+    of = Net("m", places, (Transition("both", ("a",), ("b", "c")),))
+    claims = [fires(Start(), "both"), in_order(Start(), "both")]
+    assert all(true(Evidence(of, discipline, claim, FiringSequence(()))) for claim in claims)
+    assert not suffices(of, discipline, "machine-never-stopped", proved=True, claims=claims, query=None)
+    again = [in_order(Start(), "both", "both")]
+    assert suffices(of, discipline, "machine-never-stopped", proved=True, claims=again, query=None)
+
+
+def test_of_single_firings_nobody_asks_whether_their_steps_have_an_order() -> None:
+    ordered = [Claim(ClaimKind.ORDERED)]
+    assert suffices(LOOP, Discipline.STEP, "steps-serialisable", proved=True, claims=ordered, query=None)
+    assert not suffices(LOOP, Discipline.INTERLEAVING, "steps-serialisable", proved=True, claims=ordered, query=None)
+
+
+def test_starvation_is_excluded_by_all_that_wait() -> None:
+    of = net("waiting", "a", ("a", "b"), ("b", "a"), ("zb", "a"), ("zc", "a"))
+
+    def enough(*names: str) -> bool:
+        claims = [Claim(ClaimKind.NEVER, Firable(name)) for name in names]
+        return suffices(of, Discipline.INTERLEAVING, "starvation", proved=True, claims=claims, query=None)
+
+    assert enough("t2", "t3")
+    assert not enough("t2")
+
+
+def _commanded(draw: random.Random) -> Net:
+    """A lively net of which half the places send one of two commands to one of two machines."""
+    of = lively_net(draw, most_places=8)
+
+    def command() -> Command | None:
+        return Command(draw.choice("mn"), draw.choice(["RUN", "STOP"])) if draw.random() < 0.5 else None
+
+    return replace(of, places=tuple(replace(place, command=command()) for place in of.places))
+
+
+def _claims(of: Net, space: NaiveSpace, draw: random.Random) -> Iterator[Claim]:
+    """Whatever a verdict of the net may come down to, true or not."""
+    names = [t.name for t in of.transitions]
+    everywhere: list[Formula] = [Deadlock(), Start(), *map(Firable, names)]
+    sent = [some_firable(sending) for commands in senders(of).values() for sending in commands.values()]
+    goals: list[Formula] = [contact(of), commands_clash(of), competing(of) or Deadlock(), *sent]
+    for kind in (ClaimKind.NEVER, ClaimKind.REACHABLE):
+        yield from (Claim(kind, goal) for goal in everywhere + goals)
+    for kind in (ClaimKind.ALWAYS_POSSIBLE, ClaimKind.LOST):
+        yield from (Claim(kind, goal) for goal in everywhere)
+    homes = [tidy(is_marking(of, marking)) for marking in sorted(space.graph)[:4]]
+    yield from (Claim(ClaimKind.ALWAYS_POSSIBLE, goal) for goal in homes)
+    yield from map(Claim, (ClaimKind.LIVE, ClaimKind.HOME, ClaimKind.ORDERED, ClaimKind.UNORDERED))
+    for goal in (Start(), *homes):
+        some = draw.sample(names, min(len(names), 2))
+        yield fires(goal, *some)
+        yield in_order(goal, *some)
+        yield in_order(goal, some[0], some[0])
+
+
+@pytest.mark.parametrize("discipline", list(Discipline))
+def test_true_claims_never_suffice_for_the_opposite_of_a_verdict(discipline: Discipline) -> None:
+    judged = 0
+    for seed in range(40):
+        draw = random.Random(seed)
+        of = _commanded(draw)
+        space = NaiveSpace(of, discipline)
+        if len(space.graph) > 40:
+            continue  # the oracle goes through everything for each claim
+        known = [c for c in _claims(of, space, draw) if true(Evidence(of, discipline, c, FiringSequence(())))]
+        for verdict in report_on(space).verdicts:
+            if verdict.status is not Status.UNKNOWN:
+                judged += 1
+                opposite = verdict.status is not Status.PROVED
+                assert not suffices(of, discipline, verdict.name, opposite, known, None), f"{seed}: {verdict.name}"
+    assert judged > 200
