@@ -28,6 +28,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from firable.analysis.question import Answer, Known, no, yes
+from firable.analysis.verdicts.starvation import NONE_STARVES
 from firable.nets.net import Net
 from firable.nets.verdict import Status, Verdict
 from firable.semantics.player import Player
@@ -94,7 +95,7 @@ def _deadlock(known: _Known) -> Iterator[tuple[str, Answer, str]]:
         all_of_them = tuple(transition.name for transition in known.net.transitions)
         yield "live", shown("no transition can ever fire after this", all_of_them), "deadlock-free"
     yield "doomed-markings", shown("a deadlock is doomed; the way to it may have been so before"), "deadlock-free"
-    yield "starvation", replace(yes(), hint="no transition is live, so none starves"), "deadlock-free"
+    yield "starvation", NONE_STARVES, "deadlock-free"
     if known.begins:
         yield "reversible", shown("the initial marking can never be reached again"), "deadlock-free"
 

@@ -7,13 +7,14 @@ or in a cycle, found by running it. A transition that is live in the net and doe
 
 What this does and does not say: it is a verdict on one run, the one in which every machine answers at once. In another
 timing the transition may fire, or others may starve; the statement says so. Where two transitions that meet want a
-signal 1 and 0, no valuation opens all gates, that run does not exist, and the verdict is UNKNOWN.
+signal 1 and 0, no valuation opens all gates, that run does not exist, and the verdict is UNKNOWN, unless no
+transition is live: then none starves in any run.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from firable.analysis.deadline import NEVER, Deadline
@@ -171,6 +172,9 @@ def starved(run: EagerRun, live: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in live if name not in served)
 
 
+NONE_STARVES: Final = replace(yes(), hint="no transition is live, so none starves")
+
+
 def starvation_free(behaviour: Behaviour[Any]) -> Verdict:
     """Every live transition fires again and again under the arbiters of the file, in the eager run with all gates open.
 
@@ -182,8 +186,12 @@ def starvation_free(behaviour: Behaviour[Any]) -> Verdict:
         try:
             run = eager_run(space.net, deadline=space.deadline if isinstance(space, ReachabilityGraph) else NEVER)
         except GatesCannotBeOpenError as error:
+            if space.complete and not behaviour.live:
+                return NONE_STARVES
             return unknown(str(error), "there is no run with all gates open; starvation depends on the signals")
         if not run.complete:
+            if space.complete and not behaviour.live:
+                return NONE_STARVES
             bound = f"{len(run.prefix):,} steps of the run"
             return unknown(bound, "the run has not come back to an earlier marking", "F3004")
         hungry = starved(run, behaviour.live)

@@ -75,6 +75,19 @@ def test_gates_that_cannot_all_be_open_leave_starvation_unknown() -> None:
     assert (verdict.method, verdict.code) == ("eager run of synchronous steps under the arbiters", "")
 
 
+def test_where_no_transition_is_live_none_starves_even_if_no_run_has_all_gates_open() -> None:
+    places = (Place("p", marked=True), Place("q"))
+    ways = (
+        Transition("t", ("p",), ("q",), external=(ExternalGate("s"),)),
+        Transition("u", ("p",), ("q",), external=(ExternalGate("s", wanted=False),)),
+    )
+    net = Net("n", places, ways, (Signal("s"),))
+    with pytest.raises(GatesCannotBeOpenError):
+        eager_run(net)
+    verdict = check(net).verdict("starvation")
+    assert (verdict.status, verdict.hint) == (Status.PROVED, "no transition is live, so none starves")
+
+
 def test_a_run_that_is_cut_off_says_so() -> None:
     run = eager_run(two_ways(), steps_max=1)
     assert run == EagerRun((("t1",),), (), complete=False)
