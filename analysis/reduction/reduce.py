@@ -26,7 +26,7 @@ from firable.analysis.reduction.implied import remove_dead, remove_implied_gates
 from firable.analysis.reduction.pairs import MATRIX_BYTES_MAX, NoFacts, Pairs, pairs
 from firable.analysis.reduction.relevance import remove_irrelevant
 from firable.analysis.spaces.space import WitnessError, Witnesses
-from firable.nets.formula import Constant, Deadlock, Formula
+from firable.nets.formula import Constant, Formula
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Witness
 from firable.semantics.algebra import BOOL
@@ -138,11 +138,6 @@ def reduce_for_goal(net: Net, goal: Formula, limits: Limits | None = None) -> Re
     return Reduced(
         net, goal, small, draft.goal.as_formula(), draft.applied, tuple(draft.first), moves, tuple(draft.tails)
     )
-
-
-def reduce_for_deadlock(net: Net, limits: Limits | None = None) -> Reduced:
-    """Reduce a net, preserving whether a deadlock is reachable under interleaving."""
-    return reduce_for_goal(net, Deadlock(), limits)
 
 
 def reduce_for_liveness(net: Net, limits: Limits | None = None) -> ReducedTransitions:

@@ -136,11 +136,6 @@ def minimal_traps(net: Net, *, most: int = SIPHONS_MAX, deadline: Deadline = NEV
     return _minimal_sets(net, trap_rules(ordinary(net)), most, deadline)
 
 
-def largest_trap(net: Net, places: Marking) -> Marking:
-    """The largest trap within a set of places, given and returned as bit masks."""
-    return _mask(trap_rules(ordinary(net)).largest(_bits(places)))
-
-
 def largest_siphon(net: Net, places: Marking) -> Marking:
     """The largest siphon within a set of places, given and returned as bit masks.
 

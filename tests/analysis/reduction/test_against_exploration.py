@@ -23,7 +23,7 @@ from firable.analysis.goal import Limits
 from firable.analysis.reduction.draft import Draft
 from firable.analysis.reduction.goals import goal_of
 from firable.analysis.reduction.pairs import pairs
-from firable.analysis.reduction.reduce import Reduced, reduce_for_deadlock, reduce_for_goal, reduce_for_liveness
+from firable.analysis.reduction.reduce import Reduced, reduce_for_goal, reduce_for_liveness
 from firable.analysis.spaces.space import WitnessError
 from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.formula import And, Compare, Constant, Count, Deadlock, Formula, Holds, Not, Sign, parse_formula
@@ -161,7 +161,7 @@ def _deadlock(reduced: Reduced) -> list[str]:
 
 def test_where_the_deadline_is_over_nothing_but_what_cannot_fire_is_gone() -> None:
     net = net_of("a", "t: a -> b", "u: b -> a", "loop: a -> a")
-    reduced = reduce_for_deadlock(net, Limits(Deadline.after(0)))
+    reduced = reduce_for_goal(net, Deadlock(), Limits(Deadline.after(0)))
     assert [transition.name for transition in reduced.net.transitions] == ["t", "u"]
     assert len(reduced.net.places) == 2
 
@@ -189,12 +189,12 @@ def test_whatever_the_deadline_interrupts_the_result_is_sound(net: Net, polls: i
 
 def test_the_result_is_a_function_of_the_net() -> None:
     net = catalogue_net("one_robot_mc_late")
-    assert reduce_for_deadlock(net) == reduce_for_deadlock(net)
+    assert reduce_for_goal(net, Deadlock()) == reduce_for_goal(net, Deadlock())
 
 
 def test_a_net_with_a_transition_that_needs_nothing_has_no_deadlock() -> None:
     net = net_of("g", "t: a -> b", "u: -> if g", "v: b -> a")
-    assert reduce_for_deadlock(net).goal == Constant(value=False)
+    assert reduce_for_goal(net, Deadlock()).goal == Constant(value=False)
 
 
 def test_composed_transitions_have_names_of_their_own() -> None:
