@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
-from itertools import product
 from typing import Any, Final
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
@@ -33,7 +32,15 @@ from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl, is_markin
 from firable.analysis.evidence.meaning import contact, tidy
 from firable.analysis.evidence.producing_labels import TooLargeError, drawn, labelling, listed
 from firable.analysis.evidence.producing_ranks import progress
-from firable.analysis.evidence.producing_runs import NotFoundError, parting, run_in_order, runs_by_search, runs_on_graph
+from firable.analysis.evidence.producing_runs import (
+    InOrder,
+    NotFoundError,
+    maximal,
+    parting,
+    run_in_order,
+    runs_by_search,
+    runs_on_graph,
+)
 from firable.analysis.evidence.theorems import check_premises
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
@@ -163,7 +170,7 @@ class Certifier:
             case ClaimKind.LOST:
                 return self._lost(claim.state_goal, witness)
             case ClaimKind.NOT_LTL | ClaimKind.NOT_LEADS_TO:
-                return None if witness is None else FiringSequence(witness.firings, witness.cycle)
+                return None if witness is None else maximal(self.net, self.discipline, witness)
             case ClaimKind.LTL:
                 if self.wide_markings is None:
                     raise LackingError(f"a tableau is unfolded on up to {WIDE_MAX:,} markings")
@@ -272,7 +279,9 @@ class Certifier:
         net = replace(net, places=places, properties=())
         if self.symbolic is not None:
             symbolic = self.symbolic
-            after = symbolic.engine.forward(symbolic.engine.single(list(_indexes(marking))))
+            after = symbolic.engine.forward(
+                symbolic.engine.single([i for i in range(marking.bit_length()) if marking >> i & 1])
+            )
             if after & symbolic.satisfying(goal):
                 return None
             found = Continuation(way.firings, Labelling(_alone(drawn(symbolic, [after]))))
@@ -345,22 +354,19 @@ class Certifier:
         except (BudgetExceeded, IncompleteGraph):
             raise LackingError("the time for evidence was over") from None
 
-    def run_in_order(
-        self, one: tuple[str, ...], others: tuple[str, ...]
-    ) -> tuple[tuple[str, str], FiringSequence] | None:
+    def run_in_order(self, one: tuple[str, ...], others: tuple[str, ...]) -> InOrder | None:
         """A run that fires one of these, and one of those at a moment before or after it, and which two."""
         if self.graph is not None:
             return run_in_order(self.graph, one, others) or run_in_order(self.graph, others, one)
-        for pair in product(one, others):
+        for pair in ((t, u) for t in one for u in others if t != u):
             try:
-                runs = self.runs_firing(pair) if pair[0] != pair[1] else []
+                runs = self.runs_firing(pair)
             except LackingError:
                 continue
             for run in runs:
-                fired = [name for names in run.firings for name in names]  # a step of one firing each
+                fired = [name for (name,) in run.firings]  # a search is by single firings
                 if {*pair} <= {*fired}:
-                    first, second = sorted(pair, key=fired.index)
-                    return (first, second), run
+                    return (pair if fired.index(pair[0]) < fired.index(pair[1]) else pair[::-1]), run
         return None
 
     def homes(self) -> Marking | None:
@@ -387,10 +393,6 @@ class Certifier:
 
 def _one(space: StateSpace[Any], marking: Marking) -> Any:
     return space.satisfying(is_marking(space.net, marking))
-
-
-def _indexes(marking: Marking) -> Iterable[int]:
-    return (i for i in range(marking.bit_length()) if marking >> i & 1)
 
 
 def _alone(diagram: Diagram) -> Diagram:

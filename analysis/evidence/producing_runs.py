@@ -30,10 +30,17 @@ from firable.analysis.spaces.space import StateSpace
 from firable.analysis.stubborn import find_firings
 from firable.nets.formula import Formula, Holds, Not, Or
 from firable.nets.net import Marking, Net
+from firable.nets.verdict import Witness
+from firable.semantics.player import Player
+from firable.semantics.trace import Discipline
 
 Run = tuple[tuple[str, ...], ...]
+InOrder = tuple[tuple[str, str], FiringSequence]
+"""Two transitions, and a run that fires the first of them and later the second."""
 PARTING_MAX: Final = 200
 """How many markings a formula lists."""
+PROLONGED_MAX: Final = 10_000
+"""How many firings are added to a run, so that it ends in a deadlock or a cycle."""
 
 
 class NotFoundError(Exception):
@@ -59,9 +66,7 @@ def runs_on_graph(graph: ReachabilityGraph, names: Sequence[str], home: Marking 
     return runs
 
 
-def run_in_order(
-    graph: ReachabilityGraph, one: Sequence[str], then: Sequence[str]
-) -> tuple[tuple[str, str], FiringSequence] | None:
+def run_in_order(graph: ReachabilityGraph, one: Sequence[str], then: Sequence[str]) -> InOrder | None:
     """A run of a complete graph that fires one of these, and later one of those, and which two; None without one.
 
     None too where the time was over first.
@@ -72,9 +77,7 @@ def run_in_order(
         return None
 
 
-def _in_order(
-    graph: ReachabilityGraph, one: Sequence[str], then: Sequence[str]
-) -> tuple[tuple[str, str], FiringSequence] | None:
+def _in_order(graph: ReachabilityGraph, one: Sequence[str], then: Sequence[str]) -> InOrder | None:
     first, second = ({graph.net.transition_index[name] for name in names} for names in (one, then))
     may = np.zeros(graph.n_markings, dtype=np.bool_)
     for t in second:
@@ -163,6 +166,24 @@ def runs_by_search(net: Net, names: Sequence[str], limits: Limits) -> list[Run]:
     if wanted:
         raise NotFoundError(f"no run was found that fires {min(wanted)}")
     return runs
+
+
+def maximal(net: Net, discipline: Discipline, witness: Witness) -> FiringSequence | None:
+    """The run of a witness, gone on with until it is a maximal one; None where that takes too long.
+
+    What refutes "always p" may end in the first marking without p, and every run that begins so refutes it too.
+    """
+    firings, cycle = list(witness.firings), witness.cycle
+    player, marking = Player(net), net.marking(witness.marking)
+    met: dict[Marking, int] = {}
+    while not cycle and (ahead := next(player.successors(marking, step=discipline is Discipline.STEP), None)):
+        if (begin := met.setdefault(marking, len(firings))) < len(firings):
+            return FiringSequence(tuple(firings[:begin]), tuple(firings[begin:]))
+        if len(met) > PROLONGED_MAX:
+            return None
+        fired, marking = ahead
+        firings.append(tuple(net.transitions[t].name for t in fired))
+    return FiringSequence(tuple(firings), cycle)
 
 
 def parting(space: StateSpace[Any]) -> Formula | None:

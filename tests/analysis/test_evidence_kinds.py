@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from support.classed_nets import free_choice_nets, marked_graphs
 from support.dense_nets import dense_nets
 from support.evidence import certified, document
-from support.evidence_examples import EXAMPLES, on_diagram
+from support.evidence_examples import ENDING, EXAMPLES, LOOP, on_diagram
 from support.examples import examples, seeds
 from support.lively_nets import lively_net
 from support.ring_nets import ring_nets
@@ -97,8 +97,21 @@ def test_a_formula_of_ltl_is_shown_iff_it_holds_and_its_run_iff_not(question: tu
     assert shows(found) is true(found)
     verdict = answer(explore(net), Query("asked", QueryKind.LTL, formula))
     if verdict.witness is not None:
-        run = FiringSequence(verdict.witness.firings, verdict.witness.cycle)
-        assert shows(replace(found, claim=Claim(ClaimKind.NOT_LTL, formula), certificate=run))
+        refuted = Claim(ClaimKind.NOT_LTL, formula)
+        run = Certifier(net, Discipline.INTERLEAVING, Limits()).certify(refuted, verdict.witness)
+        assert shows(replace(found, claim=refuted, certificate=run))
+
+
+@pytest.mark.parametrize("discipline", DISCIPLINES)
+@pytest.mark.parametrize("net", [LOOP, ENDING])
+def test_a_run_into_a_marking_that_refutes_always_goes_on_to_its_end(net: Net, discipline: Discipline) -> None:
+    query = Query("q", QueryKind.LTL, parse_temporal("G not b"))
+    verdict = answer(explore(net, discipline), query)
+    assert verdict.witness is not None
+    assert not verdict.witness.cycle
+    claim = Claim(ClaimKind.NOT_LTL, parse_temporal("G not b"))
+    run = Certifier(net, discipline, Limits()).certify(claim, verdict.witness)
+    assert shows(Evidence(net, discipline, claim, run))
 
 
 @st.composite
