@@ -67,7 +67,7 @@ def _report(file: str, of: Net | None, smt_dir: str | None, timeout_ms: int, *, 
     files: tuple[str, ...] = ()
     if smt_dir is not None:
         folder = str(Path(smt_dir) / file_stem(Path(file).stem)) if many else smt_dir
-        files = write_folder(folder, dict(_obligations(document)))
+        files = write_folder(folder, dict(_obligations(document, timeout_ms)))
     discipline = document.discipline.value
     return Report("verify", file, document.net, tuple(verdicts), discipline=discipline, files=files)
 
@@ -109,16 +109,22 @@ def _refuse_another_net(file: str, document: Document, of: Net) -> None:
         raise InputError([Diagnostic("F6002", message, hint, span=Span(printable(file), 1, 1))])
 
 
-def _obligations(document: Document) -> Iterator[tuple[str, str]]:
+def _obligations(document: Document, timeout_ms: int) -> Iterator[tuple[str, str]]:
     """The SMT-LIB 2 text of each obligation, by the name of its file: verdict, number of the claim, obligation."""
+    from firable.analysis.deadline import Deadline
     from firable.analysis.evidence.obligations import Evidence, obligations, sums_text
+    from firable.analysis.evidence.refusal import TimeIsOverError
     from firable.nets.bundle import file_stem
 
     for record in document.records:
         for number, (claim, certificate) in enumerate(record.shown, start=1):
             evidence = Evidence(document.net, document.discipline, claim, certificate)
             name = file_stem(record.name or "evidence") + (f".{number}" if len(record.shown) > 1 else "")
-            for obligation in obligations(evidence):
+            try:
+                written = obligations(evidence, Deadline.after(timeout_ms / 1000))
+            except TimeIsOverError:
+                continue  # what takes so long is not shown either, as its verdict says
+            for obligation in written:
                 yield f"{name}.{obligation.name}.smt2", obligation.text(evidence)
             if (sums := sums_text(evidence)) is not None:
                 yield f"{name}.sums.smt2", sums

@@ -70,8 +70,18 @@ def compared(algebra: BooleanAlgebra[B], net: Net, comparison: Compare, holds: V
     return differ if comparison.sign is Sign.UNEQUAL else algebra.negation(differ)
 
 
-def at_most(algebra: BooleanAlgebra[B], terms: Sequence[tuple[B, int]], bound: int) -> B:
-    """Where the (positive) weights of the terms that are true sum up to at most the bound."""
+class TableTooLargeError(Exception):
+    """The table of a comparison would have more entries than are allowed."""
+
+
+def at_most(
+    algebra: BooleanAlgebra[B], terms: Sequence[tuple[B, int]], bound: int, entries_max: int | None = None
+) -> B:
+    """Where the (positive) weights of the terms that are true sum up to at most the bound.
+
+    Weights that are no counts may make a table that doubles with each term: raises `TableTooLargeError` where it would
+    have more than `entries_max` entries.
+    """
     total = sum(weight for _, weight in terms)
     if bound < 0:
         return algebra.disjunction([])
@@ -82,9 +92,12 @@ def at_most(algebra: BooleanAlgebra[B], terms: Sequence[tuple[B, int]], bound: i
         return counted
     # Which remaining bounds are met before each term, first to last; then their values, last to first.
     met: list[set[int]] = [{bound}]
-    left = total
+    left, entries = total, 0
     for _, weight in terms:
         left -= weight
+        entries += len(met[-1])
+        if entries_max is not None and entries > entries_max:
+            raise TableTooLargeError
         after = met[-1] | {remaining - weight for remaining in met[-1]}
         met.append({remaining for remaining in after if 0 <= remaining < left})
     values: dict[int, B] = {}

@@ -42,6 +42,7 @@ from firable.analysis.evidence.meaning import suffices
 from firable.analysis.evidence.obligations import (
     Evidence,
     Obligation,
+    TimedTerms,
     contact_free,
     continued,
     diagram_term,
@@ -54,7 +55,7 @@ from firable.analysis.evidence.refusal import TimeIsOverError, refuse
 from firable.analysis.evidence.runs import check_refuting_run, check_unanswered_run, holds
 from firable.analysis.evidence.theorems import check_premises
 from firable.analysis.evidence.unfolding import Unfolding
-from firable.analysis.induction.smt import Answer, Terms, decide
+from firable.analysis.induction.smt import Answer, decide
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import format_formula
 from firable.nets.net import Net
@@ -143,7 +144,11 @@ def _checked(checker: _Checker, document: Document, record: Record) -> CheckedRe
         return CheckedRecord(record, shown=bool(checked), methods=methods)
     claims = [claim for claim, _ in record.shown]
     query = parse_query(record.query, record.name.partition(".")[2]) if record.query else None
-    if suffices(net, discipline, record.name, record.proved, claims, query):
+    try:
+        enough = suffices(net, discipline, record.name, record.proved, claims, query, checker.deadline)
+    except TimeIsOverError as error:
+        return CheckedRecord(record, shown=False, methods=methods, only_claimed=str(error))
+    if enough:
         return CheckedRecord(
             record, shown=True, methods=methods or (_BY_DEFINITION.get(record.name, "read off the net"),)
         )
@@ -165,8 +170,8 @@ class _Checker:
             refuse(f"evidence of this kind cannot show '{claim}'")
         try:
             return self._check(evidence, certificate)
-        except TimeIsOverError:
-            return Checked(None, "not all was gone through", "the time was over")
+        except TimeIsOverError as error:
+            return Checked(None, "not all was gone through", str(error))
 
     def _check(self, evidence: Evidence, certificate: Certificate) -> Checked:
         net, discipline, claim = evidence.net, evidence.discipline, evidence.claim
@@ -187,7 +192,9 @@ class _Checker:
             case Theorem(name, _, traps):
                 check_premises(net, discipline, claim, certificate)
                 premise = self.check(contact_free(evidence))
-                siphons = [one for one in obligations(evidence) if one.name == "siphons"] if traps else []
+                siphons = (
+                    [one for one in obligations(evidence, self.deadline) if one.name == "siphons"] if traps else []
+                )
                 if traps == () and name.value != "marked-graph":
                     refuse("the theorem wants a marked trap in every siphon")
                 late = self._unsolved(evidence, siphons)
@@ -197,12 +204,13 @@ class _Checker:
                 return Checked(shown=True, method=words)
             case Unfolded(space):
                 listed = self._listed(evidence, space)
-                unfolding = Unfolding(listed, claim.goal, self._deadline)
+                unfolding = Unfolding(listed, claim.goal, self.deadline)
                 unfolding.check()
                 return Checked(shown=True, method=f"{listed.method}, {unfolding.nodes:,} nodes of a tableau on them")
 
     @property
-    def _deadline(self) -> Deadline:
+    def deadline(self) -> Deadline:
+        """The end of what begins now."""
         return Deadline.after(self.timeout_ms / 1000)
 
     def _space(self, evidence: Evidence, of: Markings | Diagram) -> Listed | Diagrams:
@@ -214,9 +222,9 @@ class _Checker:
         if isinstance(of, Diagram):
             if evidence.discipline.value != "interleaving":
                 refuse("a decision diagram is checked under interleaving only")
-            made: Listed | Diagrams = Diagrams(evidence.net, of, self._deadline)
+            made: Listed | Diagrams = Diagrams(evidence.net, of, self.deadline)
         else:
-            made = Listed(evidence.net, evidence.discipline, of.markings, self._deadline)
+            made = Listed(evidence.net, evidence.discipline, of.markings, self.deadline)
         self._spaces.append((evidence.net, of, made))
         return made
 
@@ -229,7 +237,7 @@ class _Checker:
     def _labelled(self, evidence: Evidence, of: Markings | Diagram, labels: tuple[Label, ...]) -> Checked:
         space, claim = self._space(evidence, of), evidence.claim
         if isinstance(space, Diagrams):
-            space.deadline = self._deadline
+            space.deadline = self.deadline
         if claim.kind is ClaimKind.NEVER and not labels:
             if isinstance(space, Diagrams) and isinstance(of, Diagram) and not space.is_cube(claim.state_goal):
                 return self._excluded(evidence, of, space)
@@ -244,7 +252,7 @@ class _Checker:
 
     def _excluded(self, evidence: Evidence, of: Diagram, space: Diagrams) -> Checked:
         """That a goal of many parts holds in no marking of a diagram is a question to the solver."""
-        terms, net = Terms(), evidence.net
+        terms, net = TimedTerms(deadline=self.deadline), evidence.net
         holds_at = [terms.variable(place.name) for place in net.places]
         among = diagram_term(terms, net, of, holds_at.__getitem__)
         goal = evaluate(terms, net, evidence.claim.state_goal, holds_at.__getitem__)
@@ -255,7 +263,7 @@ class _Checker:
     def _discharged(self, evidence: Evidence) -> Checked:
         for wrong in wrong_sums(evidence.net, evidence.certificate):
             refuse(str(wrong))
-        todo = obligations(evidence)
+        todo = obligations(evidence, self.deadline)
         late = self._unsolved(evidence, todo)
         method = f"{len(todo)} obligations discharged by z3, and the sums multiplied out"
         return Checked(None if late else True, method, late)

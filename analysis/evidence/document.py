@@ -195,10 +195,15 @@ def _document(record: EvidenceRecord) -> Document:
     net = net_from_json(record.net)
     if net_digest(net) != record.digest:
         raise ValueError("the digest is not that of the net")
+    names = [verdict.name for verdict in record.verdicts if verdict.name]
+    if len(set(names)) != len(names):
+        raise ValueError("a verdict stands twice")
     sets = [one.space(net) for one in record.sets]
     records = []
     for verdict in record.verdicts:
         if verdict.query:
+            if not verdict.name.startswith("query."):
+                raise ValueError(f"'{verdict.name}' is no query, and comes with the text of one")
             parse_query(verdict.query)
         shown = tuple((one.claim.of(net), one.certificate.of(net, sets)) for one in verdict.shown)
         records.append(Record(verdict.name, verdict.status == "proved", shown, verdict.lacking, verdict.query))

@@ -18,8 +18,10 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 from itertools import combinations, permutations
 
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.claims import Claim, ClaimKind, marking_of, negation_in_ctl
 from firable.analysis.evidence.read_off import eager_cycle, read_off
+from firable.analysis.evidence.refusal import in_time
 from firable.nets.formula import (
     And,
     Compare,
@@ -72,23 +74,26 @@ def competing(net: Net) -> Formula | None:
     return _some(And((Firable(names[t]), Firable(names[u]))) for t, u in pairs)
 
 
-def commands_clash(net: Net) -> Formula:
+def commands_clash(net: Net, deadline: Deadline = NEVER) -> Formula:
     """Two places that send different commands to one machine hold a token."""
     sending = [(place.name, place.command) for place in net.places if place.command is not None]
     groups: dict[str, list[int]] = {}
     for i, (_, command) in enumerate(sending):
         groups.setdefault(command.machine, []).append(i)
     pairs = ((i, k) for group in groups.values() for i, k in combinations(group, 2))
-    return _together((sending[i][0], sending[k][0]) for i, k in pairs if sending[i][1] != sending[k][1])
+    return _together(
+        (sending[i][0], sending[k][0]) for i, k in in_time(pairs, deadline) if sending[i][1] != sending[k][1]
+    )
 
 
-def completions_clash(net: Net) -> Formula:
+def completions_clash(net: Net, deadline: Deadline = NEVER) -> Formula:
     """Two places that wait for one completion signal hold a token."""
     waiting: dict[str, list[str]] = {}
     for place in net.places:
         if place.completion is not None:
             waiting.setdefault(place.completion, []).append(place.name)
-    return _together(pair for group in waiting.values() for pair in combinations(group, 2))
+    pairs = (pair for group in waiting.values() for pair in combinations(group, 2))
+    return _together(in_time(pairs, deadline))
 
 
 def _together(pairs: Iterable[tuple[str, str]]) -> Formula:
@@ -126,8 +131,8 @@ def tokens_at_least(places: tuple[str, ...], bound: int) -> Formula:
 class Shown:
     """The claims that are shown, asked for what they say together."""
 
-    def __init__(self, net: Net, claims: Collection[Claim]) -> None:
-        self.net = net
+    def __init__(self, net: Net, claims: Collection[Claim], deadline: Deadline = NEVER) -> None:
+        self.net, self.deadline = net, deadline
         self.claims = frozenset(claims)
         homes = (c.state_goal for c in claims if c.kind is ClaimKind.ALWAYS_POSSIBLE)
         self.homes = {home for home in homes if marking_of(net, home) is not None}
@@ -170,16 +175,24 @@ class Shown:
 
 
 def suffices(
-    net: Net, discipline: Discipline, name: str, proved: bool, claims: Collection[Claim], query: Query | None
+    net: Net,
+    discipline: Discipline,
+    name: str,
+    proved: bool,
+    claims: Collection[Claim],
+    query: Query | None,
+    deadline: Deadline = NEVER,
 ) -> bool:
     """Whether these claims say that a verdict is proved, or that it is violated; `query` is that of a `query.NAME`.
+
+    Raises `TimeIsOverError`.
 
     >>> from firable.nets.catalogue.families import family_net
     >>> net, free = family_net("token_ring-3"), Claim(ClaimKind.NEVER, Deadlock())
     >>> suffices(net, Discipline.INTERLEAVING, "deadlock-free", True, [free], None)
     True
     """
-    shown, every = Shown(net, claims), [t.name for t in net.transitions]
+    shown, every = Shown(net, claims, deadline), [t.name for t in net.transitions]
     match name:
         case "contact-free":
             return _never(shown, contact(net), proved)
@@ -194,9 +207,9 @@ def suffices(
         case "home-markings":
             return shown.home() if proved else shown.homeless()
         case "conflicting-commands":
-            return _never(shown, commands_clash(net), proved)
+            return _never(shown, commands_clash(net, deadline), proved)
         case "shared-completions":
-            return _never(shown, completions_clash(net), proved)
+            return _never(shown, completions_clash(net, deadline), proved)
         case "effective-conflicts":
             goal = competing(net)
             return goal is not None and Claim(ClaimKind.NEVER, goal) in shown if proved else _compete(shown)
@@ -205,10 +218,10 @@ def suffices(
         case "starvation":
             return _served(shown, proved)
         case "self-loops" | "structural-conflicts" | "gate-races" | "output-signals-in-M0":
-            return read_off(net, discipline, name) is proved
+            return read_off(net, discipline, name, deadline) is proved
         case "steps-serialisable" if discipline is Discipline.STEP:  # no verdict of single firings
             said = Claim(ClaimKind.ORDERED if proved else ClaimKind.UNORDERED) in shown
-            return said or read_off(net, discipline, name) is proved
+            return said or read_off(net, discipline, name, deadline) is proved
     kind, _, of = name.partition(".")
     if kind == "property":
         return any(_property(shown, one, proved) for one in net.properties if one.name == of)
@@ -278,7 +291,7 @@ def _never_stopped(shown: Shown) -> bool:
 
 
 def _served(shown: Shown, proved: bool) -> bool:
-    again = eager_cycle(shown.net)
+    again = eager_cycle(shown.net, shown.deadline)
     if again is None:
         return False
     waiting = [t.name for t in shown.net.transitions if t.name not in again]
@@ -342,7 +355,7 @@ def _stable(shown: Shown, place: str, proved: bool) -> bool:
 
 def bound_shown(shown: Shown, places: tuple[str, ...]) -> int | None:
     """The greatest number of tokens on places that the claims show; None where they show none."""
-    for bound in range(len(places) + 1):
+    for bound in in_time(range(len(places) + 1), shown.deadline):
         reached = not bound or Claim(ClaimKind.REACHABLE, tokens_at_least(places, bound)) in shown
         if reached and (bound == len(places) or Claim(ClaimKind.NEVER, tokens_at_least(places, bound + 1)) in shown):
             return bound

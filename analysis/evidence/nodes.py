@@ -72,10 +72,10 @@ class Nodes:
         todo = [root]
         while todo:
             key = todo[-1]
+            self.tick()
             if key in known:
                 todo.pop()
                 continue
-            self.tick()
             made = parts(key)
             if isinstance(made, int):
                 known[key] = made

@@ -25,9 +25,11 @@ integers and only multiplied out: their file is in linear arithmetic without a v
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import count
 from typing import Final
 
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import (
     Certificate,
     Clause,
@@ -42,17 +44,19 @@ from firable.analysis.evidence.certificate import (
 )
 from firable.analysis.evidence.claims import Claim, ClaimKind, without_start
 from firable.analysis.evidence.meaning import contact
-from firable.analysis.evidence.refusal import refuse
+from firable.analysis.evidence.refusal import TimeIsOverError, refuse
 from firable.analysis.induction.encoding import Relation, interleaving_relation, step_relation
 from firable.analysis.induction.smt import Operator, Term, Terms, smtlib, subterms
 from firable.nets.net import Marking, Net
-from firable.semantics.counting import at_most
+from firable.semantics.counting import TableTooLargeError, at_most
 from firable.semantics.firing import Valuation
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import NotFirableError, Player
 from firable.semantics.trace import Discipline
 
 LITERALS_MAX: Final = 20_000  # of a set of markings that is written as a formula
+ENTRIES_MAX: Final = 200_000  # of the table of a sum
+_CLOCK_EVERY: Final = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,18 +90,34 @@ def _comments(evidence: Evidence, statement: str) -> list[str]:
     ]
 
 
-def obligations(evidence: Evidence) -> tuple[Obligation, ...]:
-    """All obligations in propositional logic; none for what is played, and for a large set."""
+@dataclass(frozen=True)
+class TimedTerms(Terms):
+    """Terms for as long as there is time; raises `TimeIsOverError` then."""
+
+    deadline: Deadline = NEVER
+    _made: Iterator[int] = field(default_factory=count, repr=False, compare=False)
+
+    def _term(self, operator: Operator, operands: tuple[Term, ...] = (), name: str = "") -> Term:
+        if next(self._made) % _CLOCK_EVERY == 0 and self.deadline.over:
+            raise TimeIsOverError
+        return super()._term(operator, operands, name)
+
+
+def obligations(evidence: Evidence, deadline: Deadline = NEVER) -> tuple[Obligation, ...]:
+    """All obligations in propositional logic; none for what is played, and for a large set.
+
+    Raises `TimeIsOverError` where writing them takes too long, or a sum has too many values to be written at all.
+    """
     match evidence.certificate:
         case InductiveInvariant() as invariant:
-            return tuple(_of_invariant(evidence, invariant))
+            return tuple(_of_invariant(evidence, invariant, TimedTerms(deadline=deadline)))
         case Labelling(space) if _size(evidence.net, space) <= LITERALS_MAX:
-            return tuple(_of_set(evidence, space))
+            return tuple(_of_set(evidence, space, TimedTerms(deadline=deadline)))
         case Continuation():
-            return obligations(continued(evidence))
+            return obligations(continued(evidence), deadline)
         case Theorem(_, _, traps):
-            siphons = (_of_siphons(evidence.net, traps),) if traps else ()
-            return (*obligations(contact_free(evidence)), *siphons)
+            siphons = (_of_siphons(evidence.net, traps, TimedTerms(deadline=deadline)),) if traps else ()
+            return (*obligations(contact_free(evidence), deadline), *siphons)
         case _:
             return ()
 
@@ -143,14 +163,13 @@ def _size(net: Net, space: Markings | Diagram) -> int:
     return len(space.markings) * len(net.places) if isinstance(space, Markings) else 3 * len(space.rows)
 
 
-def _relation(evidence: Evidence) -> Relation:
+def _relation(evidence: Evidence, terms: Terms) -> Relation:
     encode = interleaving_relation if evidence.discipline is Discipline.INTERLEAVING else step_relation
-    return encode(evidence.net, Terms())
+    return encode(evidence.net, terms)
 
 
-def _of_invariant(evidence: Evidence, invariant: InductiveInvariant) -> Iterator[Obligation]:
-    net, relation = evidence.net, _relation(evidence)
-    terms = relation.terms
+def _of_invariant(evidence: Evidence, invariant: InductiveInvariant, terms: Terms) -> Iterator[Obligation]:
+    net, relation = evidence.net, _relation(evidence, terms)
 
     def known(holds: Valuation[Term]) -> list[Term]:
         sums = (sum_term(terms, net, one, holds) for one in stated_sums(invariant))
@@ -181,9 +200,8 @@ def _of_invariant(evidence: Evidence, invariant: InductiveInvariant) -> Iterator
     yield Obligation("goal", f"the invariant{after_so_many} excludes the goal", (*run, *last))
 
 
-def _of_set(evidence: Evidence, space: Markings | Diagram) -> Iterator[Obligation]:
-    net, relation = evidence.net, _relation(evidence)
-    terms = relation.terms
+def _of_set(evidence: Evidence, space: Markings | Diagram, terms: Terms) -> Iterator[Obligation]:
+    net, relation = evidence.net, _relation(evidence, terms)
     if isinstance(space, Diagram):
         among = diagram_term(terms, net, space, relation.before.__getitem__)
         outside = terms.negation(diagram_term(terms, net, space, relation.after.__getitem__))
@@ -216,9 +234,8 @@ def diagram_term(terms: Terms, net: Net, of: Diagram, holds: Valuation[Term]) ->
     return below(of.roots[0], len(places) + 1)
 
 
-def _of_siphons(net: Net, traps: Iterable[Iterable[str]]) -> Obligation:
+def _of_siphons(net: Net, traps: Iterable[Iterable[str]], terms: Terms) -> Obligation:
     """That there is no siphon without one of the traps; a place of the net stands for "it is in the siphon"."""
-    terms = Terms()
     joined = dict.fromkeys(name for t in net.transitions for name in (*t.inputs, *t.outputs, *t.permissive))
     asserted = [terms.disjunction(map(terms.variable, joined))]
     for t in net.transitions:
@@ -236,7 +253,10 @@ def _clause(terms: Terms, net: Net, clause: Clause, holds: Valuation[Term]) -> T
 
 
 def sum_term(terms: Terms, net: Net, of: Equation | Inequality, holds: Valuation[Term]) -> Term:
-    """The equation or inequality as a Boolean term over the places."""
+    """The equation or inequality as a Boolean term over the places.
+
+    Raises `TimeIsOverError` for one whose weights make so many different sums that nobody could write it.
+    """
 
     def at_least(weights: list[tuple[str, int]], tokens: int) -> Term:
         # sum w p >= c, with q for "not p": sum over positive w of w q + sum over negative w of -w p <= sum w+ - c
@@ -245,7 +265,11 @@ def sum_term(terms: Terms, net: Net, of: Equation | Inequality, holds: Valuation
             for name, weight in weights
             if weight
         ]
-        return at_most(terms, counted, sum(weight for _, weight in weights if weight > 0) - tokens)
+        bound = sum(weight for _, weight in weights if weight > 0) - tokens
+        try:
+            return at_most(terms, counted, bound, ENTRIES_MAX)
+        except TableTooLargeError:
+            raise TimeIsOverError("only claimed: the weights of a sum make too many different values") from None
 
     weights = list(of.weights)
     lower = at_least(weights, of.tokens)

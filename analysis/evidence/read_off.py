@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.evidence.refusal import in_time
 from firable.nets.net import Net
 from firable.semantics.arbitration import Arbitration
 from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts
@@ -18,8 +20,11 @@ STEPS_MAX: Final = 100_000
 """How many steps of the arbitrated run are played."""
 
 
-def read_off(net: Net, discipline: Discipline, name: str) -> bool | None:
-    """What the net itself says of a verdict, without a look at its markings; None where it does not."""
+def read_off(net: Net, discipline: Discipline, name: str, deadline: Deadline = NEVER) -> bool | None:
+    """What the net itself says of a verdict, without a look at its markings; None where it does not.
+
+    Raises `TimeIsOverError`.
+    """
     match name:
         case "self-loops":
             return not any(t.self_loops for t in net.transitions)
@@ -29,31 +34,40 @@ def read_off(net: Net, discipline: Discipline, name: str) -> bool | None:
             return next(gate_races(net), None) is None
         case "output-signals-in-M0":
             return not any(place.marked and place.command is not None for place in net.places)
-        case "steps-serialisable" if discipline is Discipline.STEP and _races_have_an_order(net):
+        case "steps-serialisable" if discipline is Discipline.STEP and _races_have_an_order(net, deadline):
             return True
     return None
 
 
-def _races_have_an_order(net: Net) -> bool:
+def _races_have_an_order(net: Net, deadline: Deadline) -> bool:
     """Whether the gate races among transitions that may fire together are acyclic."""
     rivals = conflicts(net).rivals
-    races = [(t, u) for t, u in gate_races(net) if u not in rivals[t] and jointly_openable(net, (t, u))]
-    left = {t for t, _ in races}
-    while left and (free := left - {t for t, u in races if u in left}):
-        left -= free
-    return not left
+    races = in_time(gate_races(net), deadline)
+    closed_by: dict[int, list[int]] = {}
+    waiting: dict[int, int] = {}  # for each transition, the gates that it closes of those that are not in order yet
+    for t, u in races:
+        if u not in rivals[t] and jointly_openable(net, (t, u)):
+            closed_by.setdefault(u, []).append(t)
+            waiting[t] = waiting.get(t, 0) + 1
+    ready = [u for u in closed_by if u not in waiting]
+    while ready:
+        for t in in_time(closed_by.get(ready.pop(), ()), deadline):
+            waiting[t] -= 1
+            if not waiting[t]:
+                ready.append(t)
+    return not any(waiting.values())
 
 
-def eager_cycle(net: Net) -> frozenset[str] | None:
+def eager_cycle(net: Net, deadline: Deadline = NEVER) -> frozenset[str] | None:
     """What fires for ever in the arbitrated run with all gates open; None where there is none, or it takes too long.
 
-    Raises `InputError` F2013 where the arbiters do not fit the conflicts.
+    Raises `InputError` F2013 where the arbiters do not fit the conflicts, and `TimeIsOverError`.
     """
     player, arbitration = Player(net), Arbitration.of(net)
     marking, turns = net.initial_marking, arbitration.first_turns
     seen = {(marking, turns): 0}
     fired: list[tuple[int, ...]] = []
-    while len(fired) < STEPS_MAX:
+    for _ in in_time(range(STEPS_MAX), deadline):
         enabled = player.may_fire(marking)
         if not enabled:
             return frozenset()

@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
+from collections.abc import Iterable, Iterator
+from typing import NoReturn, TypeVar
 
+from firable.analysis.deadline import Deadline
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
+
+T = TypeVar("T")
 
 
 class TimeIsOverError(Exception):
     """The time for a check ended before it did: nothing is known."""
+
+    def __init__(self, reason: str = "the time was over") -> None:
+        super().__init__(reason)
+
+
+def in_time(of: Iterable[T], deadline: Deadline) -> Iterator[T]:
+    """The same, one by one, for as long as there is time; raises `TimeIsOverError` then."""
+    for one in of:
+        if deadline.over:
+            raise TimeIsOverError
+        yield one
 
 
 def refuse(reason: str) -> NoReturn:

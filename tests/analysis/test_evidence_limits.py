@@ -1,0 +1,84 @@
+"""What a document may ask of its checker: it ends in time, and says one thing of each verdict."""
+
+import random
+from dataclasses import replace
+
+import pytest
+from support.evidence_examples import LOOP, RACING
+
+from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.evidence.certificate import Certificate, Equation, InductiveInvariant, Inequality
+from firable.analysis.evidence.checker import check_document, check_evidence
+from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.document import Document, Record, document_from_text
+from firable.analysis.evidence.meaning import suffices
+from firable.analysis.evidence.obligations import Evidence, obligations
+from firable.analysis.evidence.refusal import TimeIsOverError
+from firable.nets.diagnostics import InputError
+from firable.nets.formula import And, Holds
+from firable.nets.net import Command, Net, Place
+from firable.semantics.trace import Discipline
+
+STILL = Net("still", tuple(Place(f"p{i}", marked=i % 2 == 0) for i in range(60)))
+TOGETHER = And((Holds("p0"), Holds("p1")))
+
+
+def of_sums(*sums: Equation | Inequality, net: Net = STILL, depth: int = 0) -> Evidence:
+    equations = tuple(one for one in sums if isinstance(one, Equation))
+    certificate: Certificate = InductiveInvariant(
+        equations, (), depth, tuple(one for one in sums if isinstance(one, Inequality))
+    )
+    return Evidence(net, Discipline.INTERLEAVING, Claim(ClaimKind.NEVER, TOGETHER), certificate)
+
+
+def test_a_sum_with_too_many_values_shows_nothing() -> None:
+    draw = random.Random(0)
+    weights = tuple((place.name, draw.getrandbits(64)) for place in STILL.places)
+    tokens = sum(weight for place, (_, weight) in zip(STILL.places, weights, strict=True) if place.marked)
+    for one in (Equation(weights, tokens), Inequality(weights, tokens)):
+        found = check_evidence(of_sums(one))
+        assert found.shown is None
+        assert "different values" in found.bound
+
+
+def test_weights_as_large_as_they_like_are_read_where_they_make_few_values() -> None:
+    pair = (("p0", 10**30), ("p1", 10**30))
+    net = Net("still", (Place("p0", marked=True), Place("p1")))
+    assert check_evidence(of_sums(Equation(pair, 10**30), net=net)).shown
+
+
+def test_obligations_of_many_firings_are_written_in_time() -> None:
+    with pytest.raises(TimeIsOverError):
+        obligations(of_sums(depth=1_000), Deadline.after(0))
+
+
+@pytest.mark.parametrize("name", ["starvation", "steps-serialisable", "conflicting-commands"])
+def test_what_is_read_off_the_net_is_read_in_time(name: str) -> None:
+    places = tuple(replace(p, command=Command("m", p.name)) for p in RACING.places)
+    net, discipline = replace(RACING, places=places), Discipline.STEP
+    suffices(net, discipline, name, proved=True, claims=[], query=None, deadline=NEVER)
+    with pytest.raises(TimeIsOverError):
+        suffices(net, discipline, name, proved=True, claims=[], query=None, deadline=Deadline.after(0))
+    (checked,) = check_document(Document(net, discipline, (Record(name, True, ()),)), timeout_ms=0)
+    assert (checked.shown, checked.only_claimed) == (False, "the time was over")
+
+
+@pytest.mark.parametrize(
+    ("records", "reason"),
+    [
+        ([Record("self-loops", True, (), query="ctl AG a")], "is no query"),
+        ([Record("", True, (), query="ctl AG a")], "is no query"),
+        ([Record("self-loops", True, ()), Record("self-loops", False, ())], "stands twice"),
+        ([Record("query.q", True, (), query="ctl AG a"), Record("query.q", True, (), query="AG b")], "stands twice"),
+    ],
+)
+def test_a_document_says_one_thing_of_each_verdict(records: list[Record], reason: str) -> None:
+    text = Document(LOOP, Discipline.INTERLEAVING, tuple(records)).to_text()
+    with pytest.raises(InputError, match=reason) as caught:
+        document_from_text(text)
+    assert [found.code for found in caught.value.diagnostics] == ["F6001"]
+
+
+def test_claims_of_no_verdict_may_stand_beside_each_other() -> None:
+    text = Document(LOOP, Discipline.INTERLEAVING, (Record("", True, ()), Record("", True, ()))).to_text()
+    assert len(document_from_text(text).records) == 2
