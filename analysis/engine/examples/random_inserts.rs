@@ -18,11 +18,27 @@ fn mixed(counter: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// The number of the key that an operation asks for: each key once, in order, and between them earlier ones at random.
-fn asked(operation: u64, keys: u64, operations: u64) -> u64 {
-    let known = (u128::from(operation) * u128::from(keys) / u128::from(operations)) as u64;
-    let is_new = (u128::from(operation + 1) * u128::from(keys) / u128::from(operations)) as u64 > known;
-    if is_new || known == 0 { known } else { mixed(operation ^ 0x5bd1_e995) % known }
+/// The number of the key that each operation asks for: each key once, in order, spread evenly over the operations, and
+/// between them earlier ones at random. Without a division, which would cost as much as the table.
+struct Asked {
+    keys: u64,
+    operations: u64,
+    operation: u64,
+    known: u64,
+    due: u64,
+}
+
+impl Asked {
+    fn next(&mut self) -> u64 {
+        self.operation += 1;
+        self.due += self.keys;
+        if self.due >= self.operations || self.known == 0 {
+            self.due = self.due.saturating_sub(self.operations);
+            self.known += 1;
+            return self.known - 1;
+        }
+        ((u128::from(mixed(self.operation)) * u128::from(self.known)) >> 64) as u64
+    }
 }
 
 fn key<const W: usize>(number: u64) -> [u64; W] {
@@ -38,12 +54,13 @@ fn inline<const W: usize>(keys: u64, operations: u64) -> u64 {
     let mut table = vec![[0u64; W]; slots(keys)];
     let mask = table.len() - 1;
     let mut found = 0;
+    let mut asked = Asked { keys, operations, operation: 0, known: 0, due: 0 };
     let mut operation = 0;
     while operation < operations {
         let count = BATCH.min((operations - operation) as usize);
         let mut batch = [([0u64; W], 0usize); BATCH];
-        for (i, slot) in batch.iter_mut().enumerate().take(count) {
-            let key = key::<W>(asked(operation + i as u64, keys, operations));
+        for slot in &mut batch[..count] {
+            let key = key::<W>(asked.next());
             *slot = (key, mixed(key[0]) as usize & mask);
         }
         for &(key, home) in &batch[..count] {
@@ -66,12 +83,13 @@ fn indexed<const W: usize>(keys: u64, operations: u64) -> u64 {
     let mut table = vec![0u32; slots(keys)];
     let mask = table.len() - 1;
     let mut array: Vec<[u64; W]> = Vec::with_capacity(keys as usize);
+    let mut asked = Asked { keys, operations, operation: 0, known: 0, due: 0 };
     let mut operation = 0;
     while operation < operations {
         let count = BATCH.min((operations - operation) as usize);
         let mut batch = [([0u64; W], 0usize); BATCH];
-        for (i, slot) in batch.iter_mut().enumerate().take(count) {
-            let key = key::<W>(asked(operation + i as u64, keys, operations));
+        for slot in &mut batch[..count] {
+            let key = key::<W>(asked.next());
             *slot = (key, mixed(key[0]) as usize & mask);
         }
         for &(key, home) in &batch[..count] {
