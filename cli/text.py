@@ -7,7 +7,7 @@ NO_COLOR; the words say everything that the colours say.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from firable.nets.net import Net
     from firable.nets.verdict import Cost, Verdict, Witness
 
+WORDS: Mapping[str, str] = {"proved": "proved", "unknown": "unknown"}
+"""What is said of a verdict that is proved, and of one that is unknown."""
 _HEADINGS = {"required": "must hold", "warning": "warnings", "information": "for information"}
 
 
@@ -52,7 +54,9 @@ def counted(n: int, word: str) -> str:
     return f"{spelled(n)} {word}{'' if n == 1 else 's'}"
 
 
-def show_verdicts(net: Net, verdicts: Sequence[Verdict], *, verbose: bool = False) -> None:
+def show_verdicts(
+    net: Net, verdicts: Sequence[Verdict], *, verbose: bool = False, words: Mapping[str, str] = WORDS
+) -> None:
     """Print all verdicts, those that must hold first, with the witnesses of what is violated.
 
     Method and cost, and the witnesses of warnings and of what is reachable and shall be, are told only if `verbose`.
@@ -64,23 +68,23 @@ def show_verdicts(net: Net, verdicts: Sequence[Verdict], *, verbose: bool = Fals
         if some:
             click.echo(f"\n{click.style(title, bold=True)}")
         for verdict in some:
-            click.echo(verdict_line(verdict, width))
+            click.echo(verdict_line(verdict, width, words))
             for line in _reasons(net, verdict, told, verbose):
                 click.echo(f"      {line}")
 
 
-def verdict_line(verdict: Verdict, width: int = 0) -> str:
+def verdict_line(verdict: Verdict, width: int = 0, words: Mapping[str, str] = WORDS) -> str:
     """The line of a verdict: symbol, word, name, statement."""
-    symbol, word, colour = _mark(verdict)
+    symbol, word, colour = _mark(verdict, words)
     return f"  {click.style(f'{symbol} {word:<8}', fg=colour)}  {verdict.name:<{width}}  {verdict.statement}"
 
 
-def _mark(verdict: Verdict) -> tuple[str, str, str | None]:
+def _mark(verdict: Verdict, words: Mapping[str, str]) -> tuple[str, str, str | None]:
     weight, status = verdict.weight.value, verdict.status.value
     if status == "proved":
-        return "✓", "yes" if weight == "information" else "proved", "green"
+        return "✓", "yes" if weight == "information" else words["proved"], "green"
     if status == "unknown":
-        return "?", "unknown", "yellow"
+        return "?", words["unknown"], "yellow"
     match weight:
         case "required":
             return "✗", "violated", "red"

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
+_WORDS = {"proved": "shown", "unknown": "claimed"}
 _CLAIMS_MAX = 3  # told of one verdict
 _CLAIM_MAX = 100  # characters told of one claim
 
@@ -41,8 +42,8 @@ def verify(evidence: tuple[str, ...], of: str | None, smt_dir: str | None, timeo
 
     Each verdict of a document is shown again, from the firing rule alone: firing sequences are played, listed markings
     fired through, decision diagrams found closed, the obligations of invariants derived anew from the net and decided
-    by z3. Of each it is told how. "proved" means here that the evidence shows it, whether it says that something holds
-    or that it is violated; a verdict that nothing shows is unknown, and told why: it is only claimed.
+    by z3. Of each it is told how. "shown", or "proved" in JSON, means that the evidence shows it, whether it says that
+    something holds or that it is violated; a verdict that nothing shows is "claimed", or "unknown", and told why.
 
     Exit codes: 0 all verdicts of the documents are shown, 3 some are only claimed, or the time was over, 2 evidence was
     damaged or edited, is about another net, or does not show what it claims.
@@ -134,7 +135,7 @@ def _show(report: Report) -> None:
     text.heading(report.net, report.input)
     words = {"interleaving": "interleaving", "step": "synchronous steps"}[report.discipline]
     click.echo(f"  {words}, external gates free")
-    text.show_verdicts(report.net, report.verdicts, verbose=True)
+    text.show_verdicts(report.net, report.verdicts, verbose=True, words=_WORDS)
     _summary(report)
     if report.files:
         click.echo(f"\n  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")

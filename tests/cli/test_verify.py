@@ -42,7 +42,7 @@ def invariant(tmp_path: Path) -> Path:
 def test_evidence_that_shows_its_claim_is_told_so(invariant: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", str(invariant)]) == 0
     told = capsys.readouterr().out
-    assert "✓ proved    deadlock-free  it holds: never (deadlock)" in told
+    assert "✓ shown     deadlock-free  it holds: never (deadlock)" in told
     assert "discharged by z3" in told
 
 
@@ -142,6 +142,8 @@ def test_a_verdict_that_nothing_shows_is_only_claimed(tmp_path: Path, capsys: py
     path.write_text(Document(net, Discipline.INTERLEAVING, records).to_text())
     assert main(["verify", str(path)]) == 3
     told = capsys.readouterr().out
+    assert "? claimed   live        it holds" in told
+    assert "✓ shown     self-loops" in told
     assert "only claimed: nobody has looked" in told
     assert "1 shown, 1 not shown" in told
 
