@@ -1,20 +1,21 @@
 //! The set of markings by exact keys: 4 or 8 bytes a slot, no look at a marking to know that it is there.
 //!
 //! A key (`span.rs`) tells the reachable markings apart by so few bits that a table can hold it whole, by *quotienting*
-//! (Knuth, TAOCP 3, exercise 6.4-13; Cleary, "Compact hash tables using bidirectional linear probing", 1984): a bijection
-//! mixes the key, the high part of the product with the number of buckets says where it belongs, and only what is then
-//! missing, the *tag*, is stored there. A slot that compares equal is the marking: a look-up is one cache miss, not one
-//! for the table and one for the array of markings, and half as many instructions. What is found is dropped at once;
-//! only for the rest does anybody ask which marking it was.
+//! (Knuth, TAOCP 3, exercise 6.4-13; Cleary, "Compact hash tables using bidirectional linear probing", 1984): a
+//! bijection mixes the key, the high part of the product with the number of buckets says where it belongs, and only
+//! what is then missing, the *tag*, is stored there. A slot that compares equal is the marking: a look-up is one cache
+//! miss, not one for the table and one for the array of markings, and half as many instructions. What is found is
+//! dropped at once; only for the rest does anybody ask which marking it was.
 //!
-//! A bucket is eight slots, filled from the first on and compared by vector instructions; at four fifths full, five keys
-//! of six stand in the bucket where they belong. The others stand in a following one, and a slot says how far it has
-//! moved (its low bits; 0 is an empty slot), so that its key can still be told. There are 2^k or 3 * 2^k buckets, so
-//! the table grows by a third or by half, never by two, and is never less than half full. Buckets are in the order of
-//! the mixed keys; so growing reads one table and writes the other from end to end, and needs neither the markings nor
-//! their hashes.
+//! A bucket is eight slots, filled from the first on and compared by vector instructions; at four fifths full, five
+//! keys of six stand in the bucket where they belong. The others stand in a following one, and a slot says how far it
+//! has moved (its low bits; 0 is an empty slot), so that its key can still be told. There are 2^k or 3 * 2^k buckets,
+//! so the table grows by a third or by half, never by two, and is never less than half full. Buckets are in the order
+//! of the mixed keys; so growing reads one table and writes the other from end to end, and needs neither the markings
+//! nor their hashes.
 //!
-//! The index of a marking is not needed while exploring; `indexes.rs` puts it beside the slots when somebody asks for it.
+//! The index of a marking is not needed while exploring; `indexes.rs` puts it beside the slots when somebody asks for
+//! it.
 //!
 //! Rejected: tags of 16 bits with a look at the array on a match (two misses an edge again); a slot for each key with
 //! plain linear probing (a third of the look-ups enter a loop, whose exit the processor guesses wrong); a second hash
@@ -79,8 +80,8 @@ fn touch<S: Slot>(buckets: &[[S; LANES]], asked: &Asked<S>) {
     black_box(read);
 }
 
-/// Looks at the one bucket where each key belongs; how many keys were not found there (`open`). Loops over numbers, here
-/// and above: compilers make a fifth fewer instructions of them than of iterators joined together.
+/// Looks at the one bucket where each key belongs; how many keys were not found there (`open`). Loops over numbers,
+/// here and above: compilers make a fifth fewer instructions of them than of iterators joined together.
 #[inline(always)]
 fn look<S: Slot>(buckets: &[[S; LANES]], asked: &mut Asked<S>) -> usize {
     touch(buckets, asked);
@@ -103,8 +104,9 @@ pub struct Exact<S> {
 
 impl<S: Slot> Exact<S> {
     /// The bytes that the least table for keys of so many bits takes: the fewer slots, the longer their tags.
+    /// More than there are where its buckets could not be numbered.
     pub fn least_bytes(bits: u32) -> usize {
-        Self::bytes(Self::least(bits))
+        Self::least(bits).numbered().map_or(usize::MAX, Self::bytes)
     }
 
     fn least(bits: u32) -> Shape {
@@ -117,7 +119,7 @@ impl<S: Slot> Exact<S> {
 
     /// No keys of so many bits.
     pub fn new(bits: u32, memory: &Memory) -> Result<Self, Stop> {
-        let shape = Self::least(bits);
+        let shape = Self::least(bits).numbered()?;
         Ok(Exact { slots: Self::room(shape, memory)?, shape, len: 0 })
     }
 
@@ -205,8 +207,8 @@ impl<S: Slot> Exact<S> {
         self.place_of(home, wanted) == Place::Known
     }
 
-    /// Puts the key asked for as number `c` into the set, if it is new, after `append`, which may refuse it. There must be
-    /// room for it.
+    /// Puts the key asked for as number `c` into the set, if it is new, after `append`, which may refuse it. There must
+    /// be room for it.
     #[inline(always)]
     pub fn insert(
         &mut self,
@@ -234,8 +236,8 @@ impl<S: Slot> Exact<S> {
         }
     }
 
-    /// Empties what was asked, and takes more buckets if as many new keys again would make the table more than four fifths
-    /// full.
+    /// Empties what was asked, and takes more buckets if as many new keys again would make the table more than four
+    /// fifths full.
     #[inline(always)]
     pub fn answered(&mut self, asked: &mut Asked<S>, memory: &Memory) -> Result<(), Stop> {
         asked.count = 0;
@@ -250,7 +252,7 @@ impl<S: Slot> Exact<S> {
     pub fn grow(&mut self, memory: &Memory) -> Result<(), Stop> {
         let mut shape = self.shape;
         loop {
-            shape = shape.larger();
+            shape = shape.larger()?;
             let mut room = Self::room(shape, memory)?;
             if self.refill(shape, room.all_mut().as_chunks_mut().0) {
                 memory.release(Self::bytes(self.shape));
@@ -358,6 +360,15 @@ mod tests {
             assert_eq!(insert(&mut table, key, &memory), Ok(true));
         }
         assert!(keys.iter().all(|&key| table.has(key)));
+    }
+
+    #[test]
+    fn keys_too_long_for_narrow_slots_of_buckets_with_numbers_have_no_narrow_table() {
+        let memory = Memory::new(usize::MAX);
+        assert_eq!(Exact::<u32>::least_bytes(60), usize::MAX);
+        assert_eq!(Exact::<u32>::new(60, &memory).err(), Some(Stop::Memory));
+        assert_eq!(Exact::<u32>::reserving(60, &memory).err(), Some(Stop::Memory));
+        assert_eq!(memory.used(), 0);
     }
 
     #[test]

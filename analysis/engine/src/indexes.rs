@@ -1,13 +1,13 @@
 //! The indexes of markings beside their keys: what the methods that go along edges ask for.
 //!
 //! Exploring needs no index, so the table of keys (`exact.rs`) has none. Whoever asks first has the table copied, each
-//! bucket followed by the indexes of its eight keys. Key and index then stand in one line of the cache, and a look-up is
-//! one miss, as while exploring. It costs 8 bytes a slot (16 where slots have 64 bits), held for as long as the graph.
+//! bucket followed by the indexes of its eight keys. Key and index then stand in one line of the cache, and a look-up
+//! is one miss, as while exploring. It costs 8 bytes a slot (16 where slots have 64 bits), held for as long as the
+//! graph.
 //!
 //! Rejected: indexes in an array of their own beside the table (half the memory, but a second miss: storing all edges
-//! then takes a third longer); to
-//! build them while exploring (each growth would move them, and most questions never ask); a table of hashes and indexes
-//! with a look at the marking itself (no further memory, and two misses too).
+//! then takes a third longer); to build them while exploring (each growth would move them, and most questions never
+//! ask); a table of hashes and indexes with a look at the marking itself (no further memory, and two misses too).
 
 use std::hint::black_box;
 
@@ -82,7 +82,10 @@ impl<S: Slot> Indexes<S> {
             self.places(&batch.hashes[..batch.count], &mut places);
             let lines = self.lines.all_mut().as_chunks_mut::<LINE>().0;
             for (index, &(line, lane)) in (first as u64..).zip(&places[..batch.count]) {
-                lines[line][LANES + lane % LANES] = S::new(index);
+                // No key is ever lost. Were one, its marking would be unknown, and take no other index than its own.
+                if lane < LANES {
+                    lines[line][LANES + lane] = S::new(index);
+                }
             }
             watch.tick(64)?;
         }

@@ -1,15 +1,17 @@
 //! Where a key belongs in a table of buckets, and what is left of it there: the arithmetic of `exact.rs`.
 //!
-//! A key of r bits is mixed by an odd factor modulo 2^r. With n buckets, the mixed key times n has the number of its bucket
-//! above bit r. Keys of one bucket differ below it by multiples of n, so of the low part those bits can be left off that
-//! the power of two below n spans: what remains, the tag, tells them apart. For n = 2^k or 3 * 2^k, the mixed key comes
-//! back from both by a division by 2 or 3.
+//! A key of r bits is mixed by an odd factor modulo 2^r. With n buckets, the mixed key times n has the number of its
+//! bucket above bit r. Keys of one bucket differ below it by multiples of n, so of the low part those bits can be left
+//! off that the power of two below n spans: what remains, the tag, tells them apart. For n = 2^k or 3 * 2^k, the mixed
+//! key comes back from both by a division by 2 or 3.
 //!
-//! Rejected: powers of two alone (a table then doubles, and is three eighths full afterwards); any n (growth would divide
-//! by a variable).
+//! Rejected: powers of two alone (a table then doubles, and is three eighths full afterwards); any n (growth would
+//! divide by a variable).
 
 use bytemuck::Pod;
 use wide::{CmpEq, i32x8};
+
+use crate::budget::Stop;
 
 /// Slots of a bucket.
 pub const LANES: usize = 8;
@@ -17,6 +19,9 @@ pub const LANES: usize = 8;
 pub(crate) const MOVED_BITS: u32 = 6;
 /// Buckets that are tried for a key.
 pub(crate) const REACH: usize = (1 << MOVED_BITS) - 1;
+/// Most buckets: their numbers are kept in 32 bits (`exact.rs`, `halves.rs`), and one cut short would take two keys for
+/// one.
+const BUCKETS_MAX: u64 = 1 << 32;
 /// Odd, so that the product is a bijection (the golden ratio).
 pub(crate) const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -75,7 +80,8 @@ pub(crate) struct Shape {
     /// There are 2 or 3 times 2^log2 buckets.
     times: u64,
     log2: u32,
-    /// The same as a number, the factor of keys, and how far tags are shifted: at hand, since it is all asked for each edge.
+    /// The same as a number, the factor of keys, and how far tags are shifted: at hand, since it is all asked for each
+    /// edge.
     pub(crate) buckets: u64,
     factor: u64,
     shift: u32,
@@ -91,10 +97,15 @@ impl Shape {
         Shape { bits, times, log2, buckets: times << log2, factor: FACTOR << (64 - bits), shift: 64 + log2 + 1 - bits }
     }
 
-    /// The next larger.
-    pub(crate) fn larger(self) -> Self {
+    /// The next larger, if its buckets can be numbered.
+    pub(crate) fn larger(self) -> Result<Self, Stop> {
         let (times, log2) = if self.times == 2 { (3, self.log2) } else { (2, self.log2 + 1) };
-        Shape::new(self.bits, times, log2)
+        Shape::new(self.bits, times, log2).numbered()
+    }
+
+    /// The same; an end of memory where its buckets are too many to be numbered.
+    pub(crate) fn numbered(self) -> Result<Self, Stop> {
+        if self.buckets <= BUCKETS_MAX { Ok(self) } else { Err(Stop::Memory) }
     }
 
     /// The mixed key, in the high bits of a word.
@@ -135,8 +146,25 @@ mod tests {
                     assert!((home as u64) < shape.buckets && slot >> (bits - shape.log2 - 1 + MOVED_BITS) == 0);
                     assert_eq!(shape.mixed(home, slot), mixed);
                 }
-                shape = shape.larger();
+                shape = shape.larger().expect("few buckets");
             }
+        }
+    }
+
+    #[test]
+    fn buckets_that_32_bits_cannot_number_are_an_end_of_memory_and_the_last_that_they_can_are_told_apart() {
+        let last = Shape::new(60, 2, 31);
+        assert_eq!(last.buckets, 1 << 32);
+        assert!(last.numbered().is_ok());
+        assert_eq!(last.larger().err(), Some(Stop::Memory));
+        let before = Shape::new(60, 3, 30);
+        assert_eq!(before.larger().map(|shape| shape.buckets), Ok(1 << 32));
+        assert_eq!(Shape::least(60, 26).numbered().err(), Some(Stop::Memory));
+        for shape in [before, last] {
+            let highest = u64::MAX << 4;
+            let (home, slot) = shape.seat::<u64>(highest);
+            assert_eq!(home as u64, shape.buckets - 1);
+            assert_eq!(shape.mixed(home as u32 as usize, slot), highest);
         }
     }
 

@@ -1,11 +1,13 @@
 //! The table of keys in two halves, by the highest bit of the mixed key, each in the hands of one thread.
 //!
-//! Buckets are in the order of the mixed keys, so a half is the buckets of one side. What would have to move past the end
-//! of the lower half belongs to neither thread: it is given back, and put into the whole table when nobody works on it.
+//! Buckets are in the order of the mixed keys, so a half is the buckets of one side. What would have to move past the
+//! end of the lower half belongs to neither thread: it is given back, and put into the whole table when nobody works on
+//! it.
 
-use super::{Asked, Exact, ROOM};
+use super::{Asked, Exact, Place, ROOM};
 use crate::seat::{FACTOR, LANES, REACH, Shape, Slot};
 use std::hint::black_box;
+use std::mem;
 use std::panic::resume_unwind;
 use std::thread;
 
@@ -63,11 +65,10 @@ impl<S: Slot> Exact<S> {
         self.len += more;
     }
 
-    /// Takes more buckets, which two threads fill; false where there is no memory for them. An error leaves the set without
-    /// some of its keys.
-    pub(crate) fn grow_by_two(&mut self, asked: &mut Asked<S>, memory: &Memory) -> Result<bool, Stop> {
-        let shape = self.shape.larger();
-        let Ok(mut room) = Self::room(shape, memory) else { return Ok(false) };
+    /// Takes more buckets, which two threads fill; false where there is no memory for them. No key is lost by that.
+    pub(crate) fn grow_by_two(&mut self, memory: &Memory) -> bool {
+        let Ok(shape) = self.shape.larger() else { return false };
+        let Ok(mut room) = Self::room(shape, memory) else { return false };
         let [mut low, mut high] = halves(shape, room.all_mut());
         let past = thread::scope(|scope| {
             let work = || high.refill(self);
@@ -77,16 +78,29 @@ impl<S: Slot> Exact<S> {
             Some([past, other.join().unwrap_or_else(|panic| resume_unwind(panic))])
         });
         let Some(past) = past else {
+            drop(room);
             memory.release(Self::bytes(shape));
-            return Ok(self.grow(memory).is_ok());
+            return self.grow(memory).is_ok();
         };
-        memory.release(Self::bytes(self.shape));
-        (self.slots, self.shape) = (room, shape);
-        for key in past.into_iter().flatten() {
-            self.len -= 1; // it is counted already
-            self.put(asked, key, memory, || Ok(()))?;
+        let old = (mem::replace(&mut self.slots, room), mem::replace(&mut self.shape, shape));
+        if !past.into_iter().flatten().all(|key| self.place(key)) {
+            // The old table still has all keys.
+            (self.slots, self.shape) = old;
+            memory.release(Self::bytes(shape));
+            return self.grow(memory).is_ok();
         }
-        Ok(true)
+        memory.release(Self::bytes(old.1));
+        true
+    }
+
+    /// Puts a key, which is counted already, where it belongs; false where all buckets that would be tried are full.
+    fn place(&mut self, key: u64) -> bool {
+        let (home, wanted) = self.shape.seat::<S>(self.shape.mix(key));
+        let place = self.place_of(home, wanted);
+        if let Place::Free(slot) = place {
+            self.slots.all_mut()[slot] = S::new(wanted.get() + (slot / LANES - home) as u64);
+        }
+        place != Place::Full
     }
 
     /// Puts a key into the set; calls `new` before, if it is new.
@@ -112,8 +126,8 @@ impl Shape {
 }
 
 impl<S: Slot> HalfExact<'_, S> {
-    /// Writes the record of the key of each bit of `members` at the end of `mine` or of `theirs`, of which so many words are
-    /// used: to both, and counts it in the one where it belongs, because which, no processor guesses.
+    /// Writes the record of the key of each bit of `members` at the end of `mine` or of `theirs`, of which so many
+    /// words are used: to both, and counts it in the one where it belongs, because which, no processor guesses.
     #[inline(always)]
     pub(crate) fn ask(
         &self,
@@ -265,12 +279,34 @@ mod tests {
                 };
                 table.put(&mut asked, key, &memory, count).expect("fits");
                 if i % 10_000 == 5000 {
-                    table.grow_by_two(&mut asked, &memory).expect("fits");
+                    assert!(table.grow_by_two(&memory));
                 }
             }
             assert_eq!(table.len, distinct);
             assert!(keys().all(|key| table.has(key)));
             assert_eq!(memory.used(), Exact::<u64>::bytes(table.shape));
+        }
+    }
+
+    #[test]
+    fn keys_that_crowd_the_middle_are_all_there_after_any_growth_whether_or_not_there_was_memory() {
+        for limit in [1 << 14, 1 << 16, 1 << 18, 1 << 24] {
+            let memory = Memory::new(limit);
+            let mut table = Exact::<u64>::new(20, &memory).expect("fits");
+            let mut asked = Asked::new();
+            let shape = table.shape;
+            // Neighbours in the order of the mixed keys, most of them before the middle.
+            let keys: Vec<u64> = ((1 << 19) - 900..(1 << 19) + 100).map(|mixed: u64| shape.key(mixed << 44)).collect();
+            let put = |table: &mut Exact<u64>, key: u64| table.put(&mut asked, key, &memory, || Ok(()));
+            let mut put = put;
+            let kept = keys.iter().take_while(|&&key| put(&mut table, key).is_ok()).count();
+            for _ in 0..12 {
+                let before = table.shape.buckets;
+                let grown = table.grow_by_two(&memory);
+                assert_eq!(grown, table.shape.buckets > before);
+                assert!(keys[..kept].iter().all(|&key| table.has(key)));
+                assert!(memory.used() == Exact::<u64>::bytes(table.shape) && memory.used() <= limit);
+            }
         }
     }
 

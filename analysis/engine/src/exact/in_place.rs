@@ -1,24 +1,26 @@
 //! Growth without a second table: keys move to later buckets of the same region, the last first.
 //!
-//! The region reserves at once all that the budget allows, which takes no memory where nothing was written. Buckets are in
-//! the order of the mixed keys, and a larger table has each of them a third or a half further on; so from the end
+//! The region reserves at once all that the budget allows, which takes no memory where nothing was written. Buckets are
+//! in the order of the mixed keys, and a larger table has each of them a third or a half further on; so from the end
 //! backwards every key finds its bucket among those that were emptied before it. Only the first buckets, where a third
 //! is less than a key may have moved, are taken out together.
 //!
-//! Such a table may also be filled further than one that is copied, to nine tenths: it is for those who have no memory left.
+//! Such a table may also be filled further than one that is copied, to nine tenths: it is for those who have no memory
+//! left.
 
 use super::{Asked, Exact, Place, ROOM};
 use crate::budget::{Memory, Stop, Watch};
 use crate::region::Region;
 use crate::seat::{LANES, REACH, Shape, Slot};
 
-/// Buckets from which the next larger table has each of their keys in a later bucket: a third of it is more than `REACH`.
+/// Buckets from which the next larger table has each of their keys in a later bucket: a third of it is more than
+/// `REACH`.
 const FIRST: usize = 4 * (REACH + 1);
 
 impl<S: Slot> Exact<S> {
     /// No keys of so many bits, and room to grow into.
     pub(crate) fn reserving(bits: u32, memory: &Memory) -> Result<Self, Stop> {
-        let shape = Self::least(bits);
+        let shape = Self::least(bits).numbered()?;
         memory.claim(Self::bytes(shape))?;
         let mut bytes = memory.limit().max(Self::bytes(shape));
         loop {
@@ -79,7 +81,7 @@ impl<S: Slot> Exact<S> {
     fn grow_in_place(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
         let mut homeless = Vec::new();
         loop {
-            let (old, shape) = (self.shape, self.shape.larger());
+            let (old, shape) = (self.shape, self.shape.larger()?);
             if Self::bytes(shape) > size_of_val(self.slots.all()) {
                 return Err(Stop::Memory);
             }

@@ -121,7 +121,7 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
     }
 
     fn grow(&mut self, _: W, space: &mut Space) -> Result<bool, Stop> {
-        self.keyed.parts().2.grow_by_two(&mut self.asked, &space.memory)
+        Ok(self.keyed.parts().2.grow_by_two(&space.memory))
     }
 
     fn insert_left(&mut self, width: W, space: &mut Space, records: &[u64], max: usize) -> Result<(), Stop> {
