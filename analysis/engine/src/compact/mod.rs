@@ -1,16 +1,16 @@
 //! All markings in 5 to 8 bytes each, without their array and without indexes: for nets that no memory holds otherwise.
 //!
-//! The set is the table of exact keys (`exact.rs`, `span.rs`), which says of a key whether it is there and nothing else; so
-//! it is exact, however many bits it saves. It grows in place, and is filled to nine tenths. The search goes breadth
-//! first, and of the markings only the keys of two levels are kept beside the set, from which the markings are made again
-//! (`spread.rs`). Nothing has a number, so there may be more than 2^32 markings.
+//! The set is the table of exact keys (`exact.rs`, `span.rs`), which says of a key whether it is there and nothing
+//! else; so it is exact, however many bits it saves. It grows in place, and is filled to nine tenths. The search goes
+//! breadth first, and of the markings only the keys of two levels are kept beside the set, from which the markings are
+//! made again (`spread.rs`). Nothing has a number, so there may be more than 2^32 markings.
 //!
-//! What needs no graph is answered on the way: how many markings and edges there are, what fires, contact, deadlock, and
-//! at which level a state formula holds first. How a marking is reached is found afterwards, by searching again
+//! What needs no graph is answered on the way: how many markings and edges there are, what fires, contact, deadlock,
+//! and at which level a state formula holds first. How a marking is reached is found afterwards, by searching again
 //! (`way.rs`). What asks for a way back from markings (liveness, say) is not answered.
 //!
-//! Rejected: hashes in the place of keys (bit-state hashing, hash compaction), which take two markings for one now and then:
-//! a net would be proved safe by a search that has left something out.
+//! Rejected: hashes in the place of keys (bit-state hashing, hash compaction), which take two markings for one now and
+//! then: a net would be proved safe by a search that has left something out.
 
 mod goal;
 mod queue;
@@ -212,7 +212,9 @@ impl<S: Slot> Sweep<S> {
             swept.outcome.levels += 1;
             kept += now.len();
             if kept <= plan.keep {
-                swept.levels.push(Vec::with_capacity(now.len()));
+                let mut level = self.memory.filled(0, now.len())?;
+                level.clear();
+                swept.levels.push(level);
             }
             while now.len() > 0 {
                 now.take(&mut keys, &mut self.spare);

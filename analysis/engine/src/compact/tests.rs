@@ -96,3 +96,44 @@ fn an_end_of_memory_or_of_patience_is_no_answer() {
     assert_eq!(large.search(true, None, &mut |_| Err(Stop::Cancelled)).stop, Some(Stop::Cancelled));
     assert_eq!(large.search(true, Some(Duration::ZERO), &mut unwatched).stop, Some(Stop::Time));
 }
+
+#[test]
+fn levels_that_are_kept_are_counted_as_memory() {
+    let net = machines(10, 0);
+    let from = Span::new(&net).expect("few places").key(&net.initial);
+    let mut compact = Compact::new(net, Vec::new(), 1 << 26).expect("few places");
+    let mut bytes = |keep| {
+        let plan = Plan { from, all: true, target: None, mark: None, keep };
+        let mut poll = unwatched;
+        let swept = compact.sweep(plan, &mut Watch::new(None, &mut poll));
+        assert_eq!(swept.outcome.found.markings, 1024);
+        (swept.outcome.bytes, swept.levels.iter().map(Vec::len).sum::<usize>())
+    };
+    let ((few, none), (many, all)) = (bytes(0), bytes(usize::MAX));
+    assert_eq!((none, all, many - few), (0, 1024, 8 * 1024));
+}
+
+#[test]
+fn a_way_is_found_in_the_memory_of_its_search_where_levels_do_not_fit_beside_it() {
+    let net = machines(12, 0);
+    let from = Span::new(&net).expect("few places").key(&net.initial);
+    // All machines are busy: as far as can be.
+    let mut nodes: Vec<Node> = (0..12).map(|i| Node::Literal(literal(2 * i + 1, true))).collect();
+    nodes.push(Node::All((0..12).collect()));
+    let busy = Formula::new(nodes, net.places).expect("well formed");
+    let mut too_much = 0;
+    for memory_bytes in (40_000..140_000).step_by(1_500) {
+        let mut compact = Compact::new(net.clone(), vec![busy.clone()], memory_bytes).expect("few places");
+        let Some(hit) = compact.search(false, None, &mut unwatched).goals[0] else { continue };
+        let mut fits = |keep| {
+            let plan = Plan { from, all: false, target: Some(hit.key), mark: Some(hit.level / 2), keep };
+            let mut poll = unwatched;
+            compact.sweep(plan, &mut Watch::new(None, &mut poll)).target.is_some()
+        };
+        if fits(1) {
+            too_much += usize::from(!fits(memory_bytes / 64));
+            assert_eq!(way(&mut compact, &hit).len(), hit.level);
+        }
+    }
+    assert!(too_much > 0);
+}

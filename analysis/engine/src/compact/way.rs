@@ -1,11 +1,11 @@
 //! A shortest firing sequence to what a search met, by searching again: divide and conquer (Korf, Zhang, Thayer and
 //! Hohwald, "Frontier search", 2005).
 //!
-//! A search that keeps two levels knows at which level it met a marking and not how it came there. A second search carries
-//! with each marking the one that it came through at half the way. That halves the question, and each half is searched
-//! for alone, to half the depth; what is so near that all its levels can be kept is read off them backwards. The depth
-//! halves each time, and most nets have by far the most markings at the greatest depths; so all of it takes about as long
-//! as the first search.
+//! A search that keeps two levels knows at which level it met a marking and not how it came there. A second search
+//! carries with each marking the one that it came through at half the way. That halves the question, and each half is
+//! searched for alone, to half the depth; what is so near that all its levels can be kept is read off them backwards.
+//! The depth halves each time, and most nets have by far the most markings at the greatest depths; so all of it takes
+//! about as long as the first search.
 
 use std::collections::HashMap;
 
@@ -15,6 +15,8 @@ use crate::marking::holds;
 
 /// Keys that are kept of a search near enough, as a part of the memory.
 const KEPT_PART: usize = 8;
+/// Keys that are always kept: a way of one firing is read off where it begins.
+const LEAST_KEPT: usize = 1;
 
 impl Compact {
     /// The transitions that fire on a shortest way from M0 to what a search has met.
@@ -25,10 +27,15 @@ impl Compact {
             if length == 0 {
                 continue;
             }
-            let keep = self.memory_bytes / KEPT_PART / 8;
+            let keep = (self.memory_bytes / KEPT_PART / 8).max(LEAST_KEPT);
             let mark = Some(length / 2).filter(|&mark| mark > 0);
             let plan = Plan { from, all: false, target: Some(to), mark, keep };
-            let swept = self.sweep(plan, watch);
+            let mut swept = self.sweep(plan, watch);
+            if swept.target.is_none() && swept.outcome.stop == Some(Stop::Memory) && keep > LEAST_KEPT {
+                // The levels that were kept may be what was too much.
+                drop(swept);
+                swept = self.sweep(Plan { keep: LEAST_KEPT, ..plan }, watch);
+            }
             let Some(target) = swept.target else {
                 return Err(swept.outcome.stop.expect("what was met is met again"));
             };
