@@ -4,9 +4,9 @@
 //! literals of F are together satisfiable, and (c) some valuation that satisfies them closes every firable transition
 //! outside F that conflicts with none of F. Valuations are so never enumerated (a gate of ten signals would cost 1,024
 //! for two different outcomes): F is built by deciding one transition after the other, in or out, each F once; and (c)
-//! is a small satisfiability question over the signals that (b) left free, asked as soon as a transition that is out can no longer
-//! be excused by a conflict, so that hopeless branches end early. The sets are the maximal independent sets of the conflict
-//! graph where there are no gates (Tsukiyama, Ide, Ariyoshi and Shirakawa, 1977).
+//! is a small satisfiability question over the signals that (b) left free, asked as soon as a transition that is out
+//! can no longer be excused by a conflict, so that hopeless branches end early. The sets are the maximal independent
+//! sets of the conflict graph where there are no gates (Tsukiyama, Ide, Ariyoshi and Shirakawa, 1977).
 //!
 //! Firable transitions fall into components joined by conflict or by a common signal. A step is any combination of
 //! one choice from each component, so components are solved alone, remembered by their set of firable transitions (the
@@ -14,7 +14,8 @@
 //!
 //! Why exclusive or: all of F are firable at M, so every input of F is full and every output of F is empty; an input
 //! of one can therefore not be an output of another, nor of itself. No input and no output is shared within F. So every
-//! place is touched at most once, full to empty or empty to full, and (M minus inputs of F) plus outputs of F is M ^ flip(F), whatever the order.
+//! place is touched at most once, full to empty or empty to full, and (M minus inputs of F) plus outputs of F is M ^
+//! flip(F), whatever the order.
 
 mod choices;
 

@@ -1,8 +1,8 @@
 //! The choices of one component of a step: which of its firable transitions may fire together.
 //!
-//! Each transition is decided in turn, in or out, depth first and without recursion. A branch ends where a transition that
-//! is out can neither be excused by a conflict any more nor be closed by the signals that are still free; the latter is
-//! asked of a small search by clauses. Why that gives the steps, each once, is said in `step.rs`.
+//! Each transition is decided in turn, in or out, depth first and without recursion. A branch ends where a transition
+//! that is out can neither be excused by a conflict any more nor be closed by the signals that are still free; the
+//! latter is asked of a small search by clauses. Why that gives the steps, each once, is said in `step.rs`.
 //!
 //! Rejected: to try all valuations of the signals (ten of them cost 1,024 for two different outcomes).
 

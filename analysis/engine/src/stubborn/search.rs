@@ -249,8 +249,8 @@ impl<'a> Chooser<'a> {
         }
     }
 
-    /// Makes the best set of the closure a small stubborn set at a marking outside of the goal; false where the goal, the
-    /// firing of some transitions, is reached by what has been `firable` so far.
+    /// Makes the best set of the closure a small stubborn set at a marking outside of the goal; false where the goal,
+    /// the firing of some transitions, is reached by what has been `firable` so far.
     fn choose(&mut self, goal: &mut Goal, marking: &[u64], firable: &[u32]) -> bool {
         match goal {
             Goal::Firing(wanted) => {

@@ -1,17 +1,18 @@
-//! Walks: firings drawn at random from M0, with restarts, until a goal is met. They find what is too far for a search to
-//! reach and never conclude that a goal cannot be reached.
+//! Walks: firings drawn at random from M0, with restarts, until a goal is met. They find what is too far for a search
+//! to reach and never conclude that a goal cannot be reached.
 //!
 //! A walk takes about twenty nanoseconds for each transition that a firing touches: how many conditions of a transition
 //! are false is counted, and only the needers of what was flipped are looked at, whatever the size of the net. Every
 //! fourth walk is blind; every fourth draws a few transitions and fires the one that was fired least; every fourth
 //! the one after which the goal is nearest (literals that still have to become true; firable transitions, for a
-//! deadlock); and every fourth follows relaxed plans, which see what has to happen long before. The lengths follow the sequence of Luby, Sinclair and Zuckerman ("Optimal speedup of Las Vegas algorithms",
-//! 1993), which is within a logarithm of the best choice of restarts, whatever that is.
+//! deadlock); and every fourth follows relaxed plans, which see what has to happen long before. The lengths follow the
+//! sequence of Luby, Sinclair and Zuckerman ("Optimal speedup of Las Vegas algorithms", 1993), which is within a
+//! logarithm of the best choice of restarts, whatever that is.
 //!
 //! What was found is cut down before it is shown: from the end backwards, a firing is kept if it makes a literal true
 //! that the goal or a kept firing later needs. What is kept can be fired without the rest, because a literal that is
-//! needed is not made false between the firing that makes it and the one that needs it. Then what leads back to a marking
-//! is left out.
+//! needed is not made false between the firing that makes it and the one that needs it. Then what leads back to a
+//! marking is left out.
 
 use std::cmp::Reverse;
 use std::collections::HashMap;
@@ -158,8 +159,8 @@ pub(super) fn luby(i: u64) -> u64 {
     if i + 1 == 1 << bits { 1 << (bits - 1) } else { luby(i + 1 - (1 << (bits - 1))) }
 }
 
-/// Walks from M0 until the target is met: the firings that lead there, cut down, or none after `max_steps` firings. Also
-/// the number of firings done.
+/// Walks from M0 until the target is met: the firings that lead there, cut down, or none after `max_steps` firings.
+/// Also the number of firings done.
 pub fn walk(
     net: &Net,
     dependencies: &Dependencies,

@@ -4,21 +4,20 @@
 //! transition joins, so that little has to be remembered from one level to the next. Finding the best is intractable;
 //! what works on nets (Rudell's sifting costs more than the search itself) is to make the arcs short:
 //!
-//! - *Sloan* numbers the graph of places and transitions from one end to the other, holding the front small (Sloan 1986);
-//!   *reverse Cuthill-McKee* does so by distance from one end alone, and wins on some nets.
+//! - *Sloan* numbers the graph of places and transitions from one end to the other, holding the front small (Sloan
+//!   1986); *reverse Cuthill-McKee* does so by distance from one end alone, and wins on some nets.
 //! - *FORCE* then moves each place to the middle of its transitions, again and again (Aloul, Markov, Sakallah 2003), as
-//!   long as the sum of the spans falls and some tens of times at most: it converges slowly and at its end hardly at all.
+//!   long as the sum of the spans falls and some tens of times at most: it converges slowly and at its end hardly.
 //! - Last, each place *slides* along the order to where the spans are least: FORCE ends with places that have changed
 //!   sides with their neighbours, and a ring whose nodes are in such disorder takes four times the time. It is left
 //!   out of nets so long that it would take longer than it saves.
 //!
-//! Beside them, a resource and all who may hold it are kept together as one *hub*, and the hubs alone are put in order: each
-//! hub then remembers who holds it in the same way, which no sum of spans sees and which matters more than the spans.
+//! Beside them, a resource and all who may hold it are kept together as one *hub*, and the hubs alone are put in order:
+//! each hub then remembers who holds it in the same way, which matters more than spans, and which no sum of them sees.
 //!
 //! The order that the net came in is a candidate too, since who wrote or generated a net often kept together what
-//! belongs together, even
-//! where its arcs are three times as long as the best. Every order has two directions, which cost the same by any measure of spans and differ by orders
-//! of magnitude in the search; so both are given, and the search races them.
+//! belongs together, even where its arcs are three times as long as the best. Every order has two directions, which
+//! cost the same by any measure of spans and differ by orders of magnitude in the search; so both are given, and raced.
 
 use std::collections::{BinaryHeap, VecDeque};
 
