@@ -32,7 +32,7 @@ class Finding:
     """Whether the goal is reachable (None: not decided), by which method, with its evidence.
 
     `witness` is a firing sequence into the goal, replayed by the reference player; `certificate` shows that there is
-    none, to `firable.analysis.evidence.checker`; `bound` says how far an undecided search went.
+    none, to `firable.analysis.evidence.checking.checker`; `bound` says how far an undecided search went.
     """
 
     reachable: bool | None

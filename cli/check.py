@@ -223,7 +223,7 @@ def _traces(net: Net, verdicts: Iterable[Verdict], discipline: str) -> dict[str,
 def _evidence(found: CheckReport, queries: Sequence[Query], asked: _Asked) -> dict[str, bytes]:
     """The document of evidence on all that was decided, by the name of its file."""
     from firable.analysis.deadline import Deadline
-    from firable.analysis.evidence.producing import evidence_of_report
+    from firable.analysis.evidence.producing.producer import evidence_of_report
     from firable.analysis.goal import Limits
     from firable.nets.bundle import file_stem
 

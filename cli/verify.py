@@ -14,7 +14,7 @@ from firable.cli.options import answer_all, format_option, load_net, write_folde
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
-    from firable.analysis.evidence.checker import CheckedRecord
+    from firable.analysis.evidence.checking.checker import CheckedRecord
     from firable.analysis.evidence.document import Document
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
@@ -56,7 +56,7 @@ def verify(evidence: tuple[str, ...], of: str | None, smt_dir: str | None, timeo
 
 
 def _report(file: str, of: Net | None, smt_dir: str | None, timeout_ms: int, *, many: bool) -> Report:
-    from firable.analysis.evidence.checker import check_document
+    from firable.analysis.evidence.checking.checker import check_document
     from firable.analysis.evidence.document import read_document
     from firable.nets.bundle import file_stem
 
@@ -113,7 +113,7 @@ def _refuse_another_net(file: str, document: Document, of: Net) -> None:
 def _obligations(document: Document, timeout_ms: int) -> Iterator[tuple[str, str]]:
     """The SMT-LIB 2 text of each obligation, by the name of its file: verdict, number of the claim, obligation."""
     from firable.analysis.deadline import Deadline
-    from firable.analysis.evidence.obligations import Evidence, obligations, sums_text
+    from firable.analysis.evidence.checking.obligations import Evidence, obligations, sums_text
     from firable.analysis.evidence.refusal import TimeIsOverError
     from firable.nets.bundle import file_stem
 

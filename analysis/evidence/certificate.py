@@ -145,7 +145,7 @@ class Labelling:
     """M0 is in the set, no firing leads out of it, and the claim holds of it.
 
     The labels are those of the fixpoints of the claim in negation normal form, inner ones first
-    (`firable.analysis.evidence.labelling`).
+    (`firable.analysis.evidence.checking.labelling`).
     """
 
     space: Markings | Diagram
@@ -165,7 +165,7 @@ class Progress:
     """A response: `ranks` gives each of the listed markings its place on the way to the answer, none where none is due.
 
     A place on the way is a sequence of numbers, compared from the left; `helpful` names, for a beginning of such a
-    sequence, the transition that fairness makes fire at last (`firable.analysis.evidence.progress`).
+    sequence, the transition that fairness makes fire at last (`firable.analysis.evidence.checking.progress`).
     """
 
     space: Markings

@@ -3,8 +3,8 @@
 It holds all that a check needs, so that it can be checked years later and far away. Three things tie it together. The
 *seal* is the SHA-256 of all the rest: a byte that was damaged on the way is seen before anything is computed. The
 *digest* is that of the net without descriptions, the same that verdicts and bundles carry, so that one sees at a glance
-which net it speaks of. And the *check* (`firable.analysis.evidence.checker`) trusts neither: whoever edits the document
-and seals it anew has either made another proof, or none.
+which net it speaks of. And the *check* (`firable.analysis.evidence.checking.checker`) trusts neither: whoever edits
+the document and seals it anew has either made another proof, or none.
 
     firable_evidence  2
     seal              SHA-256 of the canonical JSON of the other keys

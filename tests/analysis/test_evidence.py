@@ -29,13 +29,13 @@ from firable.analysis.evidence.certificate import (
     Ranks,
     Whole,
 )
-from firable.analysis.evidence.checker import check_document, check_evidence
+from firable.analysis.evidence.checking.checker import check_document, check_evidence
+from firable.analysis.evidence.checking.obligations import Evidence, obligations, sums_text
 from firable.analysis.evidence.claims import STATE_GOALS, Claim, ClaimKind
 from firable.analysis.evidence.document import document_from_text, seal
 from firable.analysis.evidence.meaning import contact
-from firable.analysis.evidence.obligations import Evidence, obligations, sums_text
-from firable.analysis.evidence.producing_claims import Certifier
-from firable.analysis.evidence.producing_labels import listed
+from firable.analysis.evidence.producing.claims import Certifier
+from firable.analysis.evidence.producing.labels import listed
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import explore
 from firable.analysis.spaces.symbolic import explore_symbolically

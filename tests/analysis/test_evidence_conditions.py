@@ -42,11 +42,11 @@ from firable.analysis.evidence.certificate import (
     Unfolded,
     Whole,
 )
-from firable.analysis.evidence.checker import check_evidence
+from firable.analysis.evidence.checking.checker import check_evidence
+from firable.analysis.evidence.checking.nodes import EMPTY, UNIT, Nodes
+from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import document_from_text
-from firable.analysis.evidence.nodes import EMPTY, UNIT, Nodes
-from firable.analysis.evidence.obligations import Evidence
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Constant, Holds, Not, Start, parse_formula

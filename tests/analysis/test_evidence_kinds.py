@@ -22,13 +22,13 @@ from support.whole_nets import formulas
 
 from firable.analysis.check import check
 from firable.analysis.evidence.certificate import FiringSequence
-from firable.analysis.evidence.checker import check_document, check_evidence
+from firable.analysis.evidence.checking.checker import check_document, check_evidence
+from firable.analysis.evidence.checking.obligations import Evidence, obligations
 from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking, marking_of, without_start
 from firable.analysis.evidence.document import Document, document_from_text, seal
 from firable.analysis.evidence.meaning import commands_clash, completions_clash, contact, tidy
-from firable.analysis.evidence.obligations import Evidence, obligations
-from firable.analysis.evidence.producing import evidence_of_report
-from firable.analysis.evidence.producing_claims import Certifier, LackingError
+from firable.analysis.evidence.producing.claims import Certifier, LackingError
+from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import explore
 from firable.analysis.temporal.queries import answer

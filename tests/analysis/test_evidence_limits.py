@@ -8,11 +8,11 @@ from support.evidence_examples import LOOP, RACING
 
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import Certificate, Equation, InductiveInvariant, Inequality
-from firable.analysis.evidence.checker import check_document, check_evidence
+from firable.analysis.evidence.checking.checker import check_document, check_evidence
+from firable.analysis.evidence.checking.obligations import Evidence, obligations
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record, document_from_text
 from firable.analysis.evidence.meaning import suffices
-from firable.analysis.evidence.obligations import Evidence, obligations
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Holds

@@ -11,6 +11,7 @@ from support.naive_space import NaiveSpace
 from support.true_claims import true
 
 from firable.analysis.evidence.certificate import FiringSequence
+from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking
 from firable.analysis.evidence.meaning import (
     commands_clash,
@@ -21,7 +22,6 @@ from firable.analysis.evidence.meaning import (
     suffices,
     tidy,
 )
-from firable.analysis.evidence.obligations import Evidence
 from firable.analysis.report import report_on
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
 from firable.nets.net import Command, Net, Place, Transition

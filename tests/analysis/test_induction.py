@@ -15,8 +15,8 @@ from support.whole_nets import formulas
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Clause, InductiveInvariant
-from firable.analysis.evidence.checker import check_evidence
-from firable.analysis.evidence.obligations import obligations
+from firable.analysis.evidence.checking.checker import check_evidence
+from firable.analysis.evidence.checking.obligations import obligations
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.bounded import decide_by_bounded_search, shortened
 from firable.analysis.induction.encoding import parallel_relation

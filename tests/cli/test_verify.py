@@ -12,10 +12,10 @@ from support.pigeons import pigeon_evidence
 from support.second_solver import by_cvc5
 
 from firable.analysis.evidence.certificate import Labelling
+from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record, seal
-from firable.analysis.evidence.obligations import Evidence
-from firable.analysis.evidence.producing_labels import listed
+from firable.analysis.evidence.producing.labels import listed
 from firable.analysis.goal import Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.spaces.reachability import explore

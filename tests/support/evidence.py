@@ -1,10 +1,10 @@
 """Evidence as the tests of the techniques need it: of one finding, of one claim, and as a document."""
 
 from firable.analysis.evidence.certificate import FiringSequence
+from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record
-from firable.analysis.evidence.obligations import Evidence
-from firable.analysis.evidence.producing_claims import Certifier, LackingError
+from firable.analysis.evidence.producing.claims import Certifier, LackingError
 from firable.analysis.goal import Finding, Limits
 from firable.nets.formula import Formula
 from firable.nets.net import Net

@@ -7,10 +7,10 @@ from support.evidence import certified, evidence_of_finding
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Certificate, FiringSequence
+from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
-from firable.analysis.evidence.obligations import Evidence
-from firable.analysis.evidence.producing_claims import Certifier
-from firable.analysis.evidence.producing_labels import drawn, labelling
+from firable.analysis.evidence.producing.claims import Certifier
+from firable.analysis.evidence.producing.labels import drawn, labelling
 from firable.analysis.goal import Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.spaces.symbolic import explore_symbolically

@@ -1,8 +1,8 @@
 """A claim that is true and that no solver shows in a moment: the pigeonhole principle."""
 
 from firable.analysis.evidence.certificate import InductiveInvariant
+from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
-from firable.analysis.evidence.obligations import Evidence
 from firable.nets.formula import And, Compare, Count, Holds, Or, Sign
 from firable.nets.net import Net, Place
 from firable.semantics.trace import Discipline

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from support.naive_space import Markings, NaiveSpace
 
+from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
-from firable.analysis.evidence.obligations import Evidence
 from firable.analysis.temporal.ltl import refuting
 from firable.analysis.temporal.sets import Sets
 from firable.analysis.verdicts.leads_to import leads_to

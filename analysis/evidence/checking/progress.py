@@ -18,8 +18,8 @@ lowers the rank. Enabled means firable and openable, as in the verdict: external
 from __future__ import annotations
 
 from firable.analysis.evidence.certificate import Progress
+from firable.analysis.evidence.checking.listed import Listed
 from firable.analysis.evidence.claims import Claim
-from firable.analysis.evidence.listed import Listed
 from firable.analysis.evidence.refusal import refuse, shown
 from firable.nets.net import Fairness
 from firable.semantics.player import FiringSet

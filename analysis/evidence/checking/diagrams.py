@@ -20,7 +20,7 @@ from functools import cached_property
 
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import Back, Diagram, Label, Root, Rounds, Whole
-from firable.analysis.evidence.nodes import EMPTY, UNIT, Key, Made, Nodes
+from firable.analysis.evidence.checking.nodes import EMPTY, UNIT, Key, Made, Nodes
 from firable.analysis.evidence.refusal import refuse
 from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Or, Start
 from firable.nets.net import Net

@@ -4,7 +4,7 @@ A net of one of these classes is understood without a look at its markings, and 
 hold. What the checker reads off the arcs again: that no transition contradicts itself, that there are no inhibitive
 gates, that the net is of the class. What it is given: an invariant that excludes contact (so that the net behaves as an
 ordinary one and is 1-safe), and traps that are marked, of which every siphon contains one. That no siphon lacks all of
-them is one question to a solver (`firable.analysis.evidence.obligations`), instead of a list of siphons, which may be
+them is one question to a solver (`firable.analysis.evidence.checking.obligations`), instead of a list of siphons, which may be
 exponential. Permissive gates are reads: the place counts as taken and put back.
 
 | class | shows | source |

@@ -13,6 +13,8 @@ from itertools import combinations
 from typing import Final
 
 from firable.analysis.evidence.certificate import Certificate, FiringSequence
+from firable.analysis.evidence.checking.obligations import played
+from firable.analysis.evidence.checking.runs import holds
 from firable.analysis.evidence.claims import TRUE, Claim, ClaimKind, is_marking
 from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.meaning import (
@@ -29,10 +31,8 @@ from firable.analysis.evidence.meaning import (
     tidy,
     tokens_at_least,
 )
-from firable.analysis.evidence.obligations import played
-from firable.analysis.evidence.producing_claims import Certifier, LackingError
+from firable.analysis.evidence.producing.claims import Certifier, LackingError
 from firable.analysis.evidence.read_off import eager_cycle, read_off
-from firable.analysis.evidence.runs import holds
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE

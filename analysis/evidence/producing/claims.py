@@ -28,11 +28,12 @@ from firable.analysis.evidence.certificate import (
     TheoremName,
     Unfolded,
 )
+from firable.analysis.evidence.checking.theorems import check_premises
 from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl, is_marking, without_start
 from firable.analysis.evidence.meaning import contact, tidy
-from firable.analysis.evidence.producing_labels import TooLargeError, drawn, labelling, listed
-from firable.analysis.evidence.producing_ranks import progress
-from firable.analysis.evidence.producing_runs import (
+from firable.analysis.evidence.producing.labels import TooLargeError, drawn, labelling, listed
+from firable.analysis.evidence.producing.ranks import progress
+from firable.analysis.evidence.producing.runs import (
     InOrder,
     NotFoundError,
     maximal,
@@ -41,7 +42,6 @@ from firable.analysis.evidence.producing_runs import (
     runs_by_search,
     runs_on_graph,
 )
-from firable.analysis.evidence.theorems import check_premises
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.induction.pdr import decide_by_pdr

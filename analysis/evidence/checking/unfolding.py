@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.evidence.listed import Listed
+from firable.analysis.evidence.checking.listed import Listed
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse, shown
 from firable.nets.formula import Constant, Formula, Not
 from firable.nets.temporal import (

@@ -4,7 +4,7 @@ The markings that wait are those that are reached from a question without an ans
 no component of them holds a fair run, for a reason that names a transition (`firable.analysis.verdicts.leads_to`): one
 that is enabled and never fires in it. Numbering components from the last to the first gives the first number of each
 rank; under strong fairness the markings of a component that do not enable its transition are decomposed again, and give
-the next number (`firable.analysis.evidence.progress`). Nothing here is trusted.
+the next number (`firable.analysis.evidence.checking.progress`). Nothing here is trusted.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from firable.analysis.evidence.certificate import FiringSequence
+from firable.analysis.evidence.checking.obligations import played
 from firable.analysis.evidence.claims import Claim
-from firable.analysis.evidence.obligations import played
 from firable.analysis.evidence.refusal import refuse
 from firable.nets.formula import Formula
 from firable.nets.net import Fairness, Marking, Net

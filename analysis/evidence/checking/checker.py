@@ -33,13 +33,10 @@ from firable.analysis.evidence.certificate import (
     Theorem,
     Unfolded,
 )
-from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
-from firable.analysis.evidence.diagrams import Diagrams
-from firable.analysis.evidence.document import Document, Record
-from firable.analysis.evidence.labelling import LabelledSpace, labelled
-from firable.analysis.evidence.listed import Listed
-from firable.analysis.evidence.meaning import suffices
-from firable.analysis.evidence.obligations import (
+from firable.analysis.evidence.checking.diagrams import Diagrams
+from firable.analysis.evidence.checking.labelling import LabelledSpace, labelled
+from firable.analysis.evidence.checking.listed import Listed
+from firable.analysis.evidence.checking.obligations import (
     Evidence,
     Obligation,
     TimedTerms,
@@ -50,11 +47,14 @@ from firable.analysis.evidence.obligations import (
     played,
     wrong_sums,
 )
-from firable.analysis.evidence.progress import check_progress
+from firable.analysis.evidence.checking.progress import check_progress
+from firable.analysis.evidence.checking.runs import check_refuting_run, check_unanswered_run, holds
+from firable.analysis.evidence.checking.theorems import check_premises
+from firable.analysis.evidence.checking.unfolding import Unfolding
+from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
+from firable.analysis.evidence.document import Document, Record
+from firable.analysis.evidence.meaning import suffices
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse
-from firable.analysis.evidence.runs import check_refuting_run, check_unanswered_run, holds
-from firable.analysis.evidence.theorems import check_premises
-from firable.analysis.evidence.unfolding import Unfolding
 from firable.analysis.induction.smt import Answer, decide
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import format_formula

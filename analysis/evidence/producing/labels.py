@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from firable.analysis.evidence.certificate import Back, Diagram, Label, Labelling, Markings, Ranks, Root, Rounds, Whole
-from firable.analysis.evidence.labelling import (
+from firable.analysis.evidence.checking.labelling import (
     All,
     Greatest,
     Least,
