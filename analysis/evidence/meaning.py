@@ -291,10 +291,11 @@ def _never_stopped(shown: Shown) -> bool:
 
 
 def _served(shown: Shown, proved: bool) -> bool:
+    """A transition that does not fire for ever is not live; where there is no arbitrated run, that is all of them."""
     again = eager_cycle(shown.net, shown.deadline)
-    if again is None:
+    if again is None and not proved:
         return False
-    waiting = [t.name for t in shown.net.transitions if t.name not in again]
+    waiting = [t.name for t in shown.net.transitions if t.name not in (again or ())]
     return all(map(shown.nonlive, waiting)) if proved else any(map(shown.live, waiting))
 
 

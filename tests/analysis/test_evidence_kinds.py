@@ -35,7 +35,7 @@ from firable.analysis.temporal.queries import answer
 from firable.analysis.verdicts.goals import goals_of
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or
-from firable.nets.net import Fairness, Net, Place, Property, PropertyKind, Transition
+from firable.nets.net import ExternalGate, Fairness, Net, Place, Property, PropertyKind, Signal, Transition
 from firable.nets.queries import Query, QueryKind
 from firable.nets.temporal import Temporal, parse_temporal
 from firable.semantics.trace import Discipline
@@ -184,6 +184,19 @@ def test_whatever_is_decided_of_a_small_net_is_shown(
     for one in check_document(read):
         assert one.shown or one.record.name in UNSHOWN, one
         assert one.shown is not bool(one.only_claimed)
+
+
+def test_none_starves_is_shown_by_no_transition_being_live_where_there_is_no_arbitrated_run() -> None:
+    ways = (
+        Transition("t", ("p",), ("q",), external=(ExternalGate("s"),)),
+        Transition("u", ("p",), ("q",), external=(ExternalGate("s", wanted=False),)),
+    )
+    once = Net("n", (Place("p", marked=True), Place("q")), ways, (Signal("s"),))
+    again = replace(once, transitions=(*ways, Transition("back", ("q",), ("p",))))
+    for net, decided in ((once, True), (again, False)):
+        records = {one.record.name: one for one in check_document(evidence_of_report(check(net)))}
+        assert ("starvation" in records) is decided
+        assert all(one.shown for one in records.values())
 
 
 @given(net=ring_nets(signals=True, commands=True))

@@ -282,8 +282,8 @@ class _Verdicts:
         raise LackingError("that no other command follows in any run is not certified")
 
     def _served(self, proved: bool) -> Iterator[tuple[Claim, Certificate]]:
-        again = eager_cycle(self.net)
-        waiting = [t.name for t in self.net.transitions if again is not None and t.name not in again]
+        again = eager_cycle(self.net) or ()
+        waiting = [t.name for t in self.net.transitions if t.name not in again]
         if not proved:
             for name in waiting:
                 try:
