@@ -4,18 +4,18 @@ A net of one of these classes is understood without a look at its markings, and 
 hold. What the checker reads off the arcs again: that no transition contradicts itself, that there are no inhibitive
 gates, that the net is of the class. What it is given: an invariant that excludes contact (so that the net behaves as an
 ordinary one and is 1-safe), and traps that are marked, of which every siphon contains one. That no siphon lacks all of
-them is one question to a solver (`firable.analysis.evidence.checking.obligations`), instead of a list of siphons, which may be
-exponential. Permissive gates are reads: the place counts as taken and put back.
+them is one question to a solver (`firable.analysis.evidence.checking.obligations`), instead of a list of siphons, which
+may be exponential. Permissive gates are reads: the place counts as taken and put back.
 
-| class | shows | source |
-|---|---|---|
-| marked graph: each place has one producer and one consumer; every circuit holds a token | live, reversible, home markings | Commoner, Holt, Even, Pnueli 1971; Genrich and Lautenbach 1973 |
-| extended free choice, every siphon contains a marked trap | live, home markings; reversible if no trap is empty in M0 | Commoner 1972, Hack 1972; Best and Voss 1984; Desel and Esparza 1995, theorems 4.21, 4.27, 8.11 |
-| asymmetric choice, every siphon contains a marked trap | live | Murata 1989, theorem 12 |
+- *Marked graph*, each place with one producer and one consumer, in which every circuit holds a token: live, reversible,
+  so with home markings (Commoner, Holt, Even, Pnueli 1971; Genrich and Lautenbach 1973).
+- *Extended free choice*, in which every siphon contains a marked trap: live, with home markings; reversible if no trap
+  is empty in M0 (Commoner 1972, Hack 1972; Best and Voss 1984; Desel and Esparza 1995, theorems 4.21, 4.27, 8.11).
+- *Asymmetric choice*, in which every siphon contains a marked trap: live (Murata 1989, theorem 12).
 
-For deadlock alone no theorem is needed: marked traps are clauses of an inductive invariant that excludes it. Interleaving
-only: in a step a token may be taken while it is read.
-"""  # noqa: E501 - a table's row is a line
+For deadlock alone no theorem is needed: marked traps are clauses of an inductive invariant that excludes it.
+Interleaving only: in a step a token may be taken while it is read.
+"""
 
 from __future__ import annotations
 
