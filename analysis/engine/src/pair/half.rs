@@ -108,7 +108,8 @@ pub(crate) trait Shared<W: Width>: Arrivals<W> {
     /// of each thread, as many turns as there are `even` blocks of both, then what one and the other have more.
     fn renumber(&mut self, width: W, space: &mut Space, finds: [&Finds; 2], even: usize) -> Result<(), Stop>;
 
-    /// Makes room for more; false where there is no memory for that. After an error the set cannot be used any more.
+    /// Makes room for more; false where there is no memory for that. After an error a set of hashes cannot be used any
+    /// more; one of keys has lost none.
     fn grow(&mut self, width: W, space: &mut Space) -> Result<bool, Stop>;
 
     /// Puts what found no place in its half into the whole set: keys, or records of markings.
