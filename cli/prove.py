@@ -59,9 +59,9 @@ def show_obligations(net_verdicts: Sequence[Verdict]) -> None:
 
 
 def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
-    from firable.decompose.assumptions import assumptions
-    from firable.decompose.proving import prove as prove_split
-    from firable.decompose.splitting import split
+    from firable.decompose.proofs.assumptions import assumptions
+    from firable.decompose.proofs.proving import prove as prove_split
+    from firable.decompose.splitting.cut import split
 
     loaded = load_net(argument)
     with loaded.placing():
@@ -81,7 +81,7 @@ def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
 
 
 def _show(report: Report) -> None:
-    from firable.decompose.table import table_text
+    from firable.decompose.splitting.table import table_text
 
     for note in report.notes:
         text.show_diagnostic(note)

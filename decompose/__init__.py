@@ -12,14 +12,14 @@ and says in a `ProtocolVerdict` whether it does what the central net does.
 
     write_bundle("cell.bundle", make_bundle(check(read_net("cell.firable.yaml"))))
 
-The functions `assumptions` and `nonpersistent` are imported from the modules `assumptions` and `persistence`.
+The rooms within: `splitting`, `proofs`, `protocol`; what is not named here is imported from their modules.
 """
 
 from firable.decompose.bundling import make_bundle
-from firable.decompose.protocol import ProtocolVerdict, Variant, Votes, explore_protocol
-from firable.decompose.proving import ProofReport, prove
-from firable.decompose.splitting import split
-from firable.decompose.table import table_text
+from firable.decompose.proofs.proving import ProofReport, prove
+from firable.decompose.protocol.exploring import ProtocolVerdict, Variant, Votes, explore_protocol
+from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.table import table_text
 
 __all__ = [
     "ProofReport",

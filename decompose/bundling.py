@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from firable.analysis.report import CheckReport
-from firable.decompose.proving import TIMEOUT_MS, prove
-from firable.decompose.splitting import split
+from firable.decompose.proofs.proving import TIMEOUT_MS, prove
+from firable.decompose.splitting.cut import split
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.right_to_run import unproved

@@ -19,10 +19,10 @@ from firable.analysis.verdicts.behaviour import Behaviour
 from firable.analysis.verdicts.commands import entries
 from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pair, Steps
 from firable.analysis.verdicts.starvation import eager_run, scan, starved
-from firable.decompose.persistence import nonpersistent
-from firable.decompose.protocol import explore_protocol
-from firable.decompose.protocol_model import Variant
-from firable.decompose.splitting import split, unowned
+from firable.decompose.protocol.exploring import explore_protocol
+from firable.decompose.protocol.model import Variant
+from firable.decompose.splitting.cut import split, unowned
+from firable.decompose.splitting.persistence import nonpersistent
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Arbiter, ArbitrationRule, Marking, Net
 from firable.nets.verdict import Status

@@ -1,7 +1,7 @@
 """What no promise can hold is named as an assumption (O4)."""
 
-from firable.decompose.assumptions import Assumption, assumptions
-from firable.decompose.splitting import split
+from firable.decompose.proofs.assumptions import Assumption, assumptions
+from firable.decompose.splitting.cut import split
 from firable.nets.catalogue import catalogue_net
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 

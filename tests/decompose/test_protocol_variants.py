@@ -3,9 +3,9 @@
 import pytest
 from support.reference import Case, cases, load_net, local
 
-from firable.decompose.persistence import nonpersistent
-from firable.decompose.protocol import ProtocolVerdict, Variant, Votes, explore_protocol
-from firable.decompose.splitting import split
+from firable.decompose.protocol.exploring import ProtocolVerdict, Variant, Votes, explore_protocol
+from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.persistence import nonpersistent
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.verdict import Status
 

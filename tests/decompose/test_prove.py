@@ -16,9 +16,9 @@ from firable.analysis.check import check
 from firable.analysis.induction.smt import Terms, value
 from firable.analysis.report import CheckReport
 from firable.decompose.bundling import make_bundle
-from firable.decompose.obligations import greedy
-from firable.decompose.proving import ProofReport, prove
-from firable.decompose.splitting import split
+from firable.decompose.proofs.obligations import greedy
+from firable.decompose.proofs.proving import ProofReport, prove
+from firable.decompose.splitting.cut import split
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.decomposition import Decomposition, Part
@@ -312,7 +312,9 @@ def test_refutation_shows_the_differing_assignment_in_the_names_of_the_net() -> 
 def test_out_of_time_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     from firable.analysis.induction.smt import Answer, Decision
 
-    monkeypatch.setattr("firable.decompose.proving.decide", lambda *_, **__: Decision(Answer.UNKNOWN, {}, "timeout"))
+    monkeypatch.setattr(
+        "firable.decompose.proofs.proving.decide", lambda *_, **__: Decision(Answer.UNKNOWN, {}, "timeout")
+    )
     report = prove(split(load_net("ring")))
     assert {verdict.status for verdict in report.verdicts} == {Status.UNKNOWN}
     assert all("timeout" in verdict.bound for verdict in report.verdicts)

@@ -6,8 +6,8 @@ import pytest
 from support.published import COORDINATOR_TABLE
 from support.reference import Case, cases, load_net
 
-from firable.decompose.splitting import participants, split, unowned
-from firable.decompose.table import table_text
+from firable.decompose.splitting.cut import participants, split, unowned
+from firable.decompose.splitting.table import table_text
 from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.decomposition import Decomposition, Part
 from firable.nets.diagnostics import InputError

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from support.owned_nets import owned_net
 
-from firable.decompose.splitting import split
+from firable.decompose.splitting.cut import split
 from firable.executor.drivers import SimulatedDriver
 from firable.executor.execution import Execution
 from firable.executor.messages import ProtocolError

@@ -11,7 +11,7 @@ from support.examples import examples, seeds
 from support.owned_nets import owned_net, owned_nets
 from support.reference import load_net
 
-from firable.decompose.splitting import split
+from firable.decompose.splitting.cut import split
 from firable.executor.controller import LocalController, Promise
 from firable.executor.coordinator import Coordinator, Round
 from firable.executor.messages import (

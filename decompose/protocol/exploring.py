@@ -1,7 +1,7 @@
 """Does a distributed protocol do what the central net does? All its runs, explored.
 
 Eq. (7)-(10) hold at one instant; a protocol takes its votes and applies its orders at many. So each variant is explored
-against the central net, configuration by configuration (`protocol_model` says what happens in one), and three questions
+against the central net, configuration by configuration (`model` says what happens in one), and three questions
 are asked:
 
 - *refines*: the firings of every run are a run of the central net, and whenever no message is on its way, the
@@ -24,8 +24,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from firable.decompose.protocol_model import LEFT, Configuration, Event, Model, Variant, Votes
-from firable.decompose.splitting import split
+from firable.decompose.protocol.model import LEFT, Configuration, Event, Model, Variant, Votes
+from firable.decompose.splitting.cut import split
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Status

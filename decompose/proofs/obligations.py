@@ -32,7 +32,7 @@ from functools import cached_property
 from typing import TypeVar
 
 from firable.analysis.induction.smt import Term, Terms
-from firable.decompose.splitting import participants
+from firable.decompose.splitting.cut import participants
 from firable.nets.decomposition import ArbitrationGroup, Decomposition
 from firable.nets.formula import Start
 from firable.nets.net import ArbitrationRule, Net, Place, Signal, Transition

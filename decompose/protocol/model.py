@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, NamedTuple
 
-from firable.decompose.persistence import nonpersistent
+from firable.decompose.splitting.persistence import nonpersistent
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Marking, Net
 from firable.semantics.algebra import BOOL

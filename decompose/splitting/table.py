@@ -16,7 +16,7 @@ _GAP = 3
 def table_text(table: Sequence[Coordinated]) -> str:
     """The coordinator table `Decomposition.table`, a line with its line end for each row; empty where there is none.
 
-    >>> from firable.decompose.splitting import split
+    >>> from firable.decompose.splitting.cut import split
     >>> from firable.nets.net import Controller, Net, Place, Transition
     >>> places = (Place("a.p", "a", marked=True), Place("b.q", "b"))
     >>> hand_over = Transition("G1", ("a.p",), ("b.q",), number=1, description="hand over")

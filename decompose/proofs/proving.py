@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from firable.analysis.induction.smt import Answer, Decision, Operator, decide, smtlib, value, variables
-from firable.decompose.obligations import Obligation, obligations
+from firable.decompose.proofs.obligations import Obligation, obligations
 from firable.nets.bundle import file_stem
 from firable.nets.decomposition import Decomposition
 from firable.nets.verdict import Status, Verdict, Witness

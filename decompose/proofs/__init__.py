@@ -1,0 +1,1 @@
+"""What has to be proved of a decomposition, and proving it."""
