@@ -9,7 +9,9 @@ owns. So Eq. (1) of a part is the factor of Eq. (7), and Eq. (2) the factor of E
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from firable.nets.net import ArbitrationRule, Net
 
@@ -72,7 +74,9 @@ class Decomposition:
 
     def subnet(self, controller: str) -> Net:
         """The subnet of a controller; `KeyError` where there is none."""
-        for subnet in self.subnets:
-            if subnet.name == controller:
-                return subnet
-        raise KeyError(controller)
+        return self._subnet_of[controller]
+
+    @cached_property
+    def _subnet_of(self) -> Mapping[str, Net]:
+        # Of two with the same name, which no split makes, the first.
+        return {subnet.name: subnet for subnet in reversed(self.subnets)}

@@ -236,6 +236,11 @@ class Net:
         return {signal.name: i for i, signal in enumerate(self.signals)}
 
     @cached_property
+    def controller_index(self) -> Mapping[str, int]:
+        """The index of each controller."""
+        return {controller.name: i for i, controller in enumerate(self.controllers)}
+
+    @cached_property
     def masks(self) -> tuple[Masks, ...]:
         """The masks of each transition, by its index."""
         return tuple(

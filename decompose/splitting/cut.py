@@ -15,19 +15,19 @@ Decided by the coordinator are the global transitions and every local one in the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
 
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.net import Controller, Net, Place, Signal, Transition
+from firable.nets.net import Net, Place, Signal, Transition
 from firable.semantics.arbitration import Arbitration
 
 
 def participants(net: Net, transition: Transition) -> tuple[str, ...]:
     """The controllers that take part in a transition, in the order of the net; those of unowned things are left out.
 
-    >>> from firable.nets.net import Controller, Net, Place, Transition
+    >>> from firable.nets.net import Net, Place, Transition
     >>> places = (Place("a.p", "a", marked=True), Place("b.q", "b"))
     >>> net = Net("n", places, (Transition("t", ("a.p",), ("b.q",)),), controllers=(Controller("a"), Controller("b")))
     >>> participants(net, net.transition("t"))
@@ -36,7 +36,7 @@ def participants(net: Net, transition: Transition) -> tuple[str, ...]:
     places = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
     owners = {net.place(place).owner for place in places}
     owners |= {net.signal(gate.signal).owner for gate in transition.external}
-    return tuple(controller.name for controller in net.controllers if controller.name in owners)
+    return tuple(sorted((owner for owner in owners if owner is not None), key=net.controller_index.__getitem__))
 
 
 def unowned(net: Net) -> tuple[str, ...]:
@@ -113,8 +113,7 @@ def split(net: Net) -> Decomposition:
         for t in net.transitions
         if t.name in decided
     )
-    subnets = tuple(_subnet(net, controller, parts) for controller in net.controllers)
-    return Decomposition(net, subnets, coordinated, tuple(groups))
+    return Decomposition(net, _subnets(net, parts), coordinated, tuple(groups))
 
 
 def _problems(net: Net) -> Iterator[Diagnostic]:
@@ -193,33 +192,45 @@ def _clashes(parts: dict[str, tuple[Part, ...]]) -> Iterator[Diagnostic]:
             )
 
 
-def _subnet(net: Net, controller: Controller, parts: dict[str, tuple[Part, ...]]) -> Net:
-    owner = controller.name
-    places = {place.name for place in net.places if place.owner == owner}
-    signals = {signal.name for signal in net.signals if signal.owner == owner}
-    names = {name: part.name for name, its in parts.items() for part in its if part.controller == owner}
+def _subnets(net: Net, parts: Mapping[str, tuple[Part, ...]]) -> tuple[Net, ...]:
+    """The subnet of each controller; every place, signal and part is looked at once, whatever the number of them."""
+    places: dict[str | None, list[Place]] = {}
+    signals: dict[str | None, list[Signal]] = {}
+    transitions: dict[str, list[Transition]] = {}
+    for place in net.places:
+        places.setdefault(place.owner, []).append(place)
+    for signal in net.signals:
+        signals.setdefault(signal.owner, []).append(signal)
+    for t in net.transitions:
+        for part in parts[t.name]:
+            number = t.number if len(parts[t.name]) == 1 else None
+            transitions.setdefault(part.controller, []).append(_part(net, t, part, number))
+    return tuple(
+        Net(
+            controller.name,
+            tuple(places.get(controller.name, ())),
+            tuple(transitions.get(controller.name, ())),
+            tuple(signals.get(controller.name, ())),
+            (controller,),
+            description=controller.description,
+        )
+        for controller in net.controllers
+    )
+
+
+def _part(net: Net, t: Transition, part: Part, number: int | None) -> Transition:
+    """What of a transition is the part's controller's own."""
 
     def own(names: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(name for name in names if name in places)
+        return tuple(name for name in names if net.place(name).owner == part.controller)
 
-    return Net(
-        owner,
-        tuple(place for place in net.places if place.name in places),
-        tuple(
-            Transition(
-                names[t.name],
-                own(t.inputs),
-                own(t.outputs),
-                own(t.permissive),
-                own(t.inhibitive),
-                tuple(gate for gate in t.external if gate.signal in signals),
-                t.number if len(parts[t.name]) == 1 else None,
-                t.description,
-            )
-            for t in net.transitions
-            if t.name in names
-        ),
-        tuple(signal for signal in net.signals if signal.name in signals),
-        (controller,),
-        description=controller.description,
+    return Transition(
+        part.name,
+        own(t.inputs),
+        own(t.outputs),
+        own(t.permissive),
+        own(t.inhibitive),
+        tuple(gate for gate in t.external if net.signal(gate.signal).owner == part.controller),
+        number,
+        t.description,
     )

@@ -69,6 +69,7 @@ FAMILIES: Final[Mapping[str, Family]] = MappingProxyType(
             Family(
                 "manufacturing_cells", plants.manufacturing_cells, 1, 200_000, lambda n: 13 ** (n // 2) * 4 ** (n % 2)
             ),
+            Family("workshop", plants.workshop, 1, 20_000, plants.workshop_markings),
             Family("vehicles", plants.vehicles, 1, 1_000, lambda n, zones=32: perm(zones, n), 2),
         )
     }

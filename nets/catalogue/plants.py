@@ -8,8 +8,14 @@ the collisions that the rule prevents.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import prod
+
 from firable.nets.catalogue.processes import controllers, never_both
 from firable.nets.net import (
+    Arbiter,
+    ArbitrationRule,
     Command,
     Controller,
     ExternalGate,
@@ -22,6 +28,8 @@ from firable.nets.net import (
 
 FLOOR_WIDTH_ZONES = 4
 """How many zones of `vehicles` stand side by side."""
+MACHINES_OF_A_ROBOT = 4
+"""How many machines of `workshop` share a robot."""
 
 
 def pipeline(n: int) -> Net:
@@ -122,6 +130,103 @@ def manufacturing_cells(n: int) -> Net:
         properties=(never_both("one_part_in_a_station", "s1.reserved", "s1.working"),),
         description="A line of stations, loaded by robots that serve two each",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Cell:
+    places: tuple[Place, ...]
+    transitions: tuple[Transition, ...]
+    signals: tuple[Signal, ...]
+
+
+def workshop_markings(n: int) -> int:
+    """The number of markings of `workshop`, as its docstring explains it."""
+    cells, rest = divmod(n, MACHINES_OF_A_ROBOT)
+    return prod((4 + 6 * k) << 2 * k for k in (*[MACHINES_OF_A_ROBOT] * cells, *([rest] if rest else [])))
+
+
+@dataclass(frozen=True, slots=True)
+def workshop(n: int) -> Net:
+    """Machines in cells of four, each cell with a robot and two conveyors that its machines share.
+
+    Ten transitions for each machine and two for each cell, most of them of two or three controllers: the family by
+    which splitting and proving are measured. The loads and unloads of a cell are one conflict, decided in rotation;
+    what gives back the robot is another one, of the robot alone. A conveyor takes a part away only while the arm is
+    not above it, which inhibitive gates of the robot say.
+
+    A cell of k machines has 4^k (4 + 6 k) markings, and cells multiply, since they have nothing to do with one another:
+    while the robot is free each machine is free, clamping, working or done, and each conveyor empty or not; a machine
+    for which the robot is on its way leaves 24 for itself and the conveyors. No deadlock.
+    """
+    machines = [f"m{i}" for i in range(1, n + 1)]
+    cells = [machines[i : i + MACHINES_OF_A_ROBOT] for i in range(0, n, MACHINES_OF_A_ROBOT)]
+    made = [_workshop_cell(j, its) for j, its in enumerate(cells, 1)]
+    served = [name for j in range(1, len(cells) + 1) for name in (f"r{j}", f"in{j}", f"out{j}")]
+    # As a file would have them: what one controller owns stands together.
+    order = {name: i for i, name in enumerate((*machines, *served))}
+    return Net(
+        f"workshop-{n}",
+        tuple(sorted((place for cell in made for place in cell.places), key=lambda place: order[place.owner or ""])),
+        tuple(transition for cell in made for transition in cell.transitions),
+        tuple(sorted((signal for cell in made for signal in cell.signals), key=lambda s: order[s.owner or ""])),
+        (*controllers(machines, "a machine"), *controllers(served, "a robot or a conveyor of four machines")),
+        tuple(
+            Arbiter(
+                f"jobs{j}", tuple(f"{m}_{job}" for m in its for job in ("load", "unload")), ArbitrationRule.ROTATION
+            )
+            for j, its in enumerate(cells, 1)
+        ),
+        properties=(never_both("one_part_in_a_machine", "m1.clamping", "m1.working"),),
+        description="Machines in cells of four, each with a robot and two conveyors",
+    )
+
+
+def _workshop_cell(j: int, machines: Sequence[str]) -> _Cell:
+    r, entry, leaving = f"r{j}", f"in{j}", f"out{j}"
+    places = [Place(f"{r}.free", r, marked=True)]
+    for conveyor in (entry, leaving):
+        places += [Place(f"{conveyor}.free", conveyor, marked=True), Place(f"{conveyor}.part", conveyor)]
+    signals: list[Signal] = []
+    transitions = [
+        Transition(f"{entry}_brings", (f"{entry}.free",), (f"{entry}.part",)),
+        Transition(
+            f"{leaving}_takes_away",
+            (f"{leaving}.part",),
+            (f"{leaving}.free",),
+            inhibitive=tuple(f"{r}.leaving_{m}" for m in machines),
+        ),
+    ]
+    for m in machines:
+        places.append(Place(f"{m}.free", m, marked=True))
+        places += [Place(f"{m}.{name}", m) for name in ("waiting", "done", "giving")]
+        works = [(m, "clamping", "CLAMP"), (m, "working", "WORK")]
+        moves = ("fetching", "carrying", "retreating", "reaching", "bringing", "leaving")
+        works += [(r, f"{move}_{m}", f"{move.upper()}_{m.upper()}") for move in moves]
+        for owner, name, command in works:
+            signals.append(Signal(f"{owner}.{name}_ended", owner, SignalKind.COMPLETION))
+            places.append(
+                Place(f"{owner}.{name}", owner, command=Command(owner.upper(), command), completion=signals[-1].name)
+            )
+        places += [Place(f"{entry}.for_{m}", entry), Place(f"{leaving}.for_{m}", leaving)]
+        to = {move: f"{r}.{move}_{m}" for move in moves}
+        from_entry, to_leaving = f"{entry}.for_{m}", f"{leaving}.for_{m}"
+        chain: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
+            ("load", (f"{r}.free", f"{m}.free", f"{entry}.part"), (to["fetching"], f"{m}.waiting", from_entry)),
+            ("grasp", (to["fetching"], from_entry), (to["carrying"], f"{entry}.free")),
+            ("put", (to["carrying"], f"{m}.waiting"), (to["retreating"], f"{m}.clamping")),
+            ("left", (to["retreating"],), (f"{r}.free",)),
+            ("clamped", (f"{m}.clamping",), (f"{m}.working",)),
+            ("worked", (f"{m}.working",), (f"{m}.done",)),
+            ("unload", (f"{r}.free", f"{m}.done", f"{leaving}.free"), (to["reaching"], f"{m}.giving", to_leaving)),
+            ("take", (to["reaching"], f"{m}.giving"), (to["bringing"], f"{m}.free")),
+            ("set_down", (to["bringing"], to_leaving), (to["leaving"], f"{leaving}.part")),
+            ("back", (to["leaving"],), (f"{r}.free",)),
+        )
+        ends = {place.name: ExternalGate(place.completion) for place in places if place.completion is not None}
+        for name, inputs, outputs in chain:
+            gates = tuple(ends[place] for place in inputs if place in ends)
+            transitions.append(Transition(f"{m}_{name}", inputs, outputs, external=gates))
+    return _Cell(tuple(places), tuple(transitions), tuple(signals))
 
 
 def vehicles(n: int, zones: int = 32) -> Net:
