@@ -145,7 +145,6 @@ def workshop_markings(n: int) -> int:
     return prod((4 + 6 * k) << 2 * k for k in (*[MACHINES_OF_A_ROBOT] * cells, *([rest] if rest else [])))
 
 
-@dataclass(frozen=True, slots=True)
 def workshop(n: int) -> Net:
     """Machines in cells of four, each cell with a robot and two conveyors that its machines share.
 
