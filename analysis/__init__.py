@@ -3,9 +3,9 @@
 What a program imports from here: `explore` gives the `ReachabilityGraph` of a net within a `Budget`,
 `explore_symbolically` its `SymbolicSpace`, and `report_on` the `CheckReport` of either, with every verdict and with the
 `Figures` behind them. `p_invariants`, `t_invariants`, `minimal_siphons`, `minimal_traps` and `deadlock_trap` read the
-arcs alone, and may be given a `Deadline`. `eager_run` is the run under the arbiters with all gates open; `isomorphic`
-and `weakly_bisimilar` compare two graphs. What needs the whole graph raises `IncompleteGraph`, and `BudgetExceeded`
-where memory or time ends.
+arcs alone, and may be given a `Deadline`. `eager_run` is the run under the arbiters with all gates open; `isomorphic`,
+`weakly_bisimilar` and `branching_bisimilar` compare two graphs. What needs the whole graph raises `IncompleteGraph`,
+and `BudgetExceeded` where memory or time ends.
 
     from firable.analysis import Budget, explore, report_on
 
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from firable.analysis.deadline import Deadline
     from firable.analysis.report import CheckReport, Figures, report_on
-    from firable.analysis.spaces.equivalence import isomorphic, weakly_bisimilar
+    from firable.analysis.spaces.equivalence import branching_bisimilar, isomorphic, weakly_bisimilar
     from firable.analysis.spaces.reachability import Budget, BudgetExceeded, IncompleteGraph, ReachabilityGraph, explore
     from firable.analysis.spaces.symbolic import SymbolicSpace, explore_symbolically
     from firable.analysis.structure.commoner import deadlock_trap
@@ -40,6 +40,7 @@ __all__ = [
     "IncompleteGraph",
     "ReachabilityGraph",
     "SymbolicSpace",
+    "branching_bisimilar",
     "deadlock_trap",
     "eager_run",
     "explore",
@@ -56,7 +57,7 @@ __all__ = [
 _MODULES: Final = {
     "report": ("CheckReport", "Figures", "report_on"),
     "deadline": ("Deadline",),
-    "spaces.equivalence": ("isomorphic", "weakly_bisimilar"),
+    "spaces.equivalence": ("branching_bisimilar", "isomorphic", "weakly_bisimilar"),
     "structure.commoner": ("deadlock_trap",),
     "structure.invariants": ("p_invariants", "t_invariants"),
     "spaces.reachability": ("Budget", "BudgetExceeded", "IncompleteGraph", "ReachabilityGraph", "explore"),
