@@ -1,50 +1,324 @@
-"""Non-persistent parts: yes votes that another firing can falsify.
+"""Persistent parts: yes votes that no other transition can take back.
 
-The vote of a part is *persistent* if, once true, it stays true until its own transition fires. A vote that is
-persistent may be as old as it likes; a stale yes of any other is how the paper's own cell gives its robot a second
-task while it carries a part. The test is on the reachable markings of the central net, for structure alone would accuse
-parts whose places other transitions touch only when the part is not firable anyway.
+The vote of a part is *persistent* if, once true, it stays true until its own transition fires: in no reachable marking
+of the central net, external gates free, does the yes stand while another transition that would falsify it is firable.
+A stale yes of any other part is how the paper's own cell gives its robot a second task while it carries a part.
+
+The arcs and the units of the net decide most parts (`firable.decompose.splitting.votes`). What is left is a goal for
+each part, "the yes stands and one of these is firable", and goes to the analysis: all markings where they are few, or
+where a decision diagram holds them; else the techniques that decide one goal (`firable.analysis.methods`). PROVED is
+persistent, VIOLATED comes with a firing sequence whose last firing takes the yes back, UNKNOWN says how far was looked.
+
+What a persistent part may leave out
+------------------------------------
+Its yes may be as old as it likes *within its round*. To leave out the promise as well, that is to block nothing at its
+controller between yes and order, asks for more than persistence, because the promise (O1) protects two sides: the yes
+from the others, and the others from the order that comes late. `is_free_of_promise` says which parts may:
+
+1. It is PROVED persistent, against every other transition of the central net: local or global, at whatever controller.
+2. By the arcs alone, it can take no yes back at its own controller: no other transition there takes from its inputs or
+   reads them by a permissive gate, none puts on its outputs or reads them by an inhibitive gate. While the order is on
+   its way the controller still shows the marking before it; then what votes there votes no more often than it may.
+   Reachability is not enough here: the marking that the controller shows meanwhile, behind in one order and ahead in
+   another that overtook it, need not be the part of any reachable marking.
+3. It asks no external gate but completions of commands on its own input places, which nothing at its controller can
+   send anew while the yes stands: a promise would hold these back (O4).
+4. It belongs to a transition of its own: an order names its round, a round is asked anew only when the one before it
+   has been acknowledged by all, and a vote of another round is not counted. The firing of the transition itself takes
+   every yes of it back, and persistence says nothing of that.
+
+Then: a yes is given on the marking that the controller shows; by 2, for all orders that are still on their way to it,
+the yes holds of the central marking too, and by 1 it goes on to hold there until the transition is decided. By 2 no one
+at the controller has touched inputs or outputs when the order arrives, so it can be applied, once (O5). Two transitions
+of one arbitration group: if they meet in a place of this controller, 2 fails for both; if they meet elsewhere, the yes
+of the loser is dropped and there is nothing to release. An order of abort, lost or not, releases nothing. Doubles are
+told by the round. Where messages bear no round, or a controller answers one round with the yes of another, or another
+controller reads a copy of the places instead of asking (O3), none of this holds. A part that is not free of the promise
+may still be asked early where it is persistent, but must promise.
+
+Rejected: the reference player over all markings, which is quick to write, has no bound, and gives no evidence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from threading import Event
+from typing import Any, Final
 
+from firable.analysis._engine import BudgetExceeded
+from firable.analysis.check import FIRST_MARKINGS
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import Certificate, FiringSequence, InductiveInvariant
+from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.document import Document, Record
+from firable.analysis.evidence.meaning import tidy
+from firable.analysis.evidence.producing.claims import Certifier, LackingError
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.methods import GOAL_LANES
+from firable.analysis.question import Answer, Question, listed, no, unknown, yes
+from firable.analysis.settling import Settling
+from firable.analysis.spaces.reachability import Budget, explore
+from firable.analysis.spaces.space import StateSpace, Witnesses
+from firable.analysis.spaces.symbolic import explore_symbolically
+from firable.decompose.splitting.votes import Vote, needs, votes
 from firable.nets.decomposition import Decomposition
-from firable.nets.net import Marking, Net
-from firable.semantics.algebra import BOOL
-from firable.semantics.firing import firable
-from firable.semantics.player import Player
+from firable.nets.formula import Formula, Not
+from firable.nets.net import Net, Transition
+from firable.nets.queries import Query
+from firable.nets.temporal import ForAll, Globally
+from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
+from firable.semantics.trace import Discipline
+
+PREFIX: Final = "persistent."
+SECONDS: Final = 20.0
+_DIAGRAM_SHARE: Final = 0.4  # of the time, for all markings in a diagram
+_ARCS: Final = "arcs: no other transition can take it back"
+_UNITS: Final = "arcs and P-invariants with one token"
+
+
+@dataclass(frozen=True)
+class Persistence:
+    """The votes of a decomposition, and the verdict `persistent.PART` on each; `findings` are what evidence is made of.
+
+    A verdict's subjects are the transitions that falsify the yes, or may where it is UNKNOWN.
+    """
+
+    decomposition: Decomposition
+    votes: tuple[Vote, ...]
+    verdicts: tuple[Verdict, ...]
+    space: StateSpace[Any] | None = None
+    findings: Mapping[str, Sequence[tuple[Formula, Finding]]] = field(default_factory=dict)
+
+    def of(self, part: str) -> Verdict:
+        """The verdict on a part; `KeyError` where there is none."""
+        for vote, verdict in zip(self.votes, self.verdicts, strict=True):
+            if vote.part == part:
+                return verdict
+        raise KeyError(part)
+
+    @property
+    def free_of_promise(self) -> tuple[str, ...]:
+        """The parts that may leave out the promise, as this module's essay says."""
+        persistent = (v.part for v, verdict in zip(self.votes, self.verdicts, strict=True) if verdict.holds)
+        may = set(undisturbing(self.decomposition))
+        return tuple(part for part in persistent if part in may)
+
+    def evidence(self, limits: Limits | None = None) -> Document:
+        """The document on every verdict that some marking could refute; the other ones need no more than the arcs.
+
+        A record for each, without a name, in the order of the votes: that the goal of the vote is never reached, or is.
+        """
+        limits = limits or Limits(Deadline.after(SECONDS))
+        flat = [finding for of in self.findings.values() for finding in of]
+        certifier = Certifier(self.decomposition.net, Discipline.INTERLEAVING, limits, self.space, flat)
+        shown = (
+            _record(vote, verdict, certifier)
+            for vote, verdict in zip(self.votes, self.verdicts, strict=True)
+            if vote.accused and verdict.status is not Status.UNKNOWN
+        )
+        return Document(self.decomposition.net, Discipline.INTERLEAVING, tuple(shown))
+
+
+def persistence(
+    decomposition: Decomposition, space: StateSpace[Any] | None = None, limits: Limits | None = None
+) -> Persistence:
+    """Decide of each part of a transition that the coordinator decides whether its yes is persistent.
+
+    `space` are the reachable markings under interleaving, where somebody has them already. Default limits: 20 seconds.
+
+    >>> from firable.decompose.splitting.cut import split
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> found = persistence(split(catalogue_net("one_robot")))
+    >>> [(verdict.name, verdict.subjects) for verdict in found.verdicts if not verdict.holds]
+    [('persistent.t1-21', ('G6',)), ('persistent.t1-41', ('G2',))]
+    """
+    limits = limits or Limits(Deadline.after(SECONDS))
+    cast = votes(decomposition, limits.deadline.within(_share(limits.deadline, 0.5)))
+    one = _Deciding(decomposition.net, limits, space)
+    open_ = [vote for vote in cast if vote.falsifiers]
+    one.decide(open_)
+    verdicts = tuple(one.found.get(vote.part) or _by_structure(vote) for vote in cast)
+    return Persistence(decomposition, cast, verdicts, one.space, one.findings)
 
 
 def nonpersistent(decomposition: Decomposition) -> dict[str, list[str]]:
-    """The parts of global transitions whose yes can be falsified, each with the transitions that do so.
+    """The parts of global transitions whose yes is not proved persistent, each with what falsifies it, or may."""
+    table = {row.name for row in decomposition.table}
+    found = persistence(decomposition)
+    return {
+        vote.part: list(verdict.subjects)
+        for vote, verdict in zip(found.votes, found.verdicts, strict=True)
+        if not verdict.holds and vote.transition in table
+    }
 
-    External gates are free. Explores the reachable markings of the central net by the reference player: for nets of the
-    size of a cell.
+
+def undisturbing(decomposition: Decomposition) -> tuple[str, ...]:
+    """The parts that, by the arcs alone, take no other yes back and ask for no gate that may close meanwhile.
+
+    These are the conditions 2 and 3 of this module's essay: what a checker derives anew. Linear in the arcs.
     """
-    net = decomposition.net
-    graph = Player(net).reachable()
-    found: dict[str, list[str]] = {}
-    for row in decomposition.table:
-        own = net.transition_index[row.name]
-        for part in row.parts:
-            subnet = decomposition.subnet(part.controller)
-            t = subnet.transition_index[part.name]
-            places = [net.place_index[place.name] for place in subnet.places]
-            yes = {marking: _votes_yes(subnet, t, places, marking) for marking in graph}
-            against = {
-                fired[0]
-                for marking, edges in graph.items()
-                if yes[marking]
-                for fired, after in edges
-                if fired[0] != own and not yes[after]
-            }
-            if against:
-                found[part.name] = [net.transitions[u].name for u in sorted(against)]
-    return found
+    rows = {(part.controller, part.name) for row in decomposition.coordinated for part in row.parts}
+    return tuple(
+        transition.name
+        for subnet in decomposition.subnets
+        for keeps in [_keeping(subnet)]
+        for transition in subnet.transitions
+        if (subnet.name, transition.name) in rows and keeps(transition)
+    )
 
 
-def _votes_yes(subnet: Net, t: int, places: Sequence[int], marking: Marking) -> bool:
-    """Whether the part is firable in a marking of the central net, where `places` are those of the subnet."""
-    return firable(BOOL, subnet, t, lambda p: bool(marking >> places[p] & 1))
+def _keeping(subnet: Net) -> Callable[[Transition], bool]:
+    """Whether a part of the subnet keeps every other yes there, and its own gates."""
+    required = [needs(transition) for transition in subnet.transitions]
+    takers = Counter(place for full, _ in required for place in full)
+    putters = Counter(place for _, empty in required for place in empty)
+    senders: dict[str, set[str]] = {}
+    for place in subnet.places:
+        if place.completion is not None:
+            senders.setdefault(place.completion, set()).add(place.name)
+
+    def keeps(part: Transition) -> bool:
+        alone = all(takers[p] == 1 for p in part.inputs) and all(putters[p] == 1 for p in part.outputs)
+        inputs = set(part.inputs)
+        return alone and all(
+            gate.wanted and gate.signal in senders and senders[gate.signal] <= inputs for gate in part.external
+        )
+
+    return keeps
+
+
+def _share(deadline: Deadline, share: float) -> float:
+    left = deadline.left_seconds
+    return SECONDS if left is None else left * share
+
+
+def _name(vote: Vote) -> str:
+    return f"{PREFIX}{vote.part}"
+
+
+def _question(vote: Vote) -> Question:
+    statement = f"once '{vote.part}' votes yes, no transition but '{vote.transition}' takes the yes back"
+    return Question(_name(vote), statement, Weight.INFORMATION)
+
+
+def _settled(vote: Vote, answer: Answer, method: str, cost: Cost | None = None) -> Verdict:
+    return _question(vote).settle(answer, method, Discipline.INTERLEAVING, cost or Cost())
+
+
+def _by_structure(vote: Vote) -> Verdict:
+    """The verdict on a vote that needs no look at markings; UNKNOWN where none was taken."""
+    if vote.others:
+        bound = f"{vote.others:,} arcs of others at its places are more than are looked at"
+        return _settled(vote, unknown(bound, "it promises, as every part may"), "arcs")
+    if vote.falsifiers:
+        answer = unknown("not looked at within the time", "give it more time", "F3004")
+        return _settled(vote, Answer(None, vote.falsifiers, None, answer.hint, answer.bound, answer.code), "arcs")
+    return _settled(vote, yes(), _UNITS if vote.units else _ARCS)
+
+
+class _Deciding:
+    """The votes of one net that markings decide."""
+
+    def __init__(self, net: Net, limits: Limits, space: StateSpace[Any] | None) -> None:
+        self.net, self.limits = net, limits
+        self.space = space if space is not None and space.complete else None
+        self.witnesses = Witnesses(net, Discipline.INTERLEAVING)
+        self.found: dict[str, Verdict] = {}
+        self.findings: dict[str, Sequence[tuple[Formula, Finding]]] = {}
+
+    def decide(self, open_: Sequence[Vote]) -> None:
+        """Find a verdict on each vote, as far as there is time."""
+        if open_ and self.space is None:
+            self.space = self._held()
+        for vote in open_:
+            if self.limits.deadline.over:
+                return
+            if self.space is not None:
+                self._ask(vote, self.space.until(self.limits.deadline))
+        for left, vote in zip(range(len(open_), 0, -1), open_, strict=True):
+            if vote.part not in self.found and not self.limits.deadline.over:
+                self._race(vote, self.limits.deadline.within(_share(self.limits.deadline, 1 / left)))
+
+    def _held(self) -> StateSpace[Any] | None:
+        """All markings, where a moment finds them or a diagram holds them."""
+        budget = Budget(FIRST_MARKINGS, self.limits.memory_bytes)
+        graph = explore(self.net, Discipline.INTERLEAVING, budget, deadline=self.limits.deadline)
+        if graph.complete:
+            return graph
+        deadline = self.limits.deadline.within(_share(self.limits.deadline, _DIAGRAM_SHARE))
+        try:
+            return explore_symbolically(self.net, Limits(deadline, self.limits.memory_bytes)).until(
+                self.limits.deadline
+            )
+        except BudgetExceeded:
+            return None
+
+    def _ask(self, vote: Vote, space: StateSpace[Any]) -> None:
+        def find() -> Answer:
+            standing = space.satisfying(vote.goal(vote.falsifiers))
+            witness = space.witness(standing)
+            if witness is None:
+                return yes()
+            firable = (space.may_fire(self.net.transition_index[name]) for name in vote.falsifiers)
+            both = (space.count(space.algebra.conjunction([standing, may])) for may in firable)
+            return self._taken_back(vote, witness, [name for name, n in zip(vote.falsifiers, both, strict=True) if n])
+
+        verdict = _question(vote).ask(space, find)
+        if verdict.status is not Status.UNKNOWN:
+            self.found[vote.part] = verdict
+
+    def _race(self, vote: Vote, deadline: Deadline) -> None:
+        query = Query.of(vote.part, ForAll(Globally(Not(vote.goal()))))
+        settling = Settling(self.net, (query,), self.limits.memory_bytes, Event())
+        asked = _settled(vote, unknown("not asked yet", ""), "")
+        name = f"query.{query.name}"
+        settling.ask(replace(asked, name=name), (), GOAL_LANES, deadline)
+        verdict = settling.found.get(name)
+        if verdict is None:
+            return
+        self.findings[_name(vote)] = settling.findings[name]
+        if verdict.holds:
+            answer = yes()
+        else:
+            ((_, finding),) = settling.findings[name]
+            if finding.witness is None:
+                raise AssertionError(f"{finding.method} says that a goal is reachable and does not show how")
+            marking = self.net.marking(finding.witness.marking)
+            may = {self.net.transitions[t].name for t in self.witnesses.player.may_fire(marking)}
+            answer = self._taken_back(vote, finding.witness, [name for name in vote.falsifiers if name in may])
+        self.found[vote.part] = _settled(vote, answer, verdict.method, verdict.cost)
+
+    def _taken_back(self, vote: Vote, witness: Witness, by: Sequence[str]) -> Answer:
+        """The yes is taken back: the way to where it stands, and the firing that does it, replayed."""
+        marking = self.net.marking(witness.marking)
+        may = {self.net.transitions[t].name for t in self.witnesses.player.may_fire(marking)}
+        last = next(name for name in by if name in may)
+        index = self.net.transition_index
+        firings = [*(tuple(index[name] for name in fired) for fired in witness.firings), (index[last],)]
+        after = self.witnesses.play(self.net.initial_marking, firings)
+        full, empty = self.net.marking(vote.full), self.net.marking(vote.empty)
+        if marking & full != full or marking & empty or (after & full == full and not after & empty):
+            raise AssertionError(f"'{last}' does not take back the yes of '{vote.part}'")
+        note = f"before the last firing '{vote.part}' votes yes, after it no"
+        return no(tuple(by), self.witnesses.replayed(firings, after, note), f"taken back by {listed(by)}")
+
+
+def claim_of(vote: Vote, *, persistent: bool) -> Claim:
+    """The claim that the verdict on a vote comes down to: its goal is never reached, or is."""
+    return Claim(ClaimKind.NEVER if persistent else ClaimKind.REACHABLE, tidy(vote.goal()))
+
+
+def _record(vote: Vote, verdict: Verdict, certifier: Certifier) -> Record:
+    claim, lacking, shown = claim_of(vote, persistent=verdict.holds), "", list[tuple[Claim, Certificate]]()
+    if verdict.witness is not None:  # without its last firing it ends where the yes stands
+        shown.append((claim, FiringSequence(verdict.witness.firings[:-1])))
+    elif not vote.falsifiers:
+        shown.append((claim, InductiveInvariant(vote.units)))
+    else:
+        try:
+            shown.append((claim, certifier.certify(claim)))
+        except LackingError as error:
+            lacking = f"{vote.part}: {error}"
+    return Record("", verdict.holds, tuple(shown), lacking)

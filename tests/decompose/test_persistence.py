@@ -1,0 +1,196 @@
+"""Persistent parts: against all markings by the reference player, with evidence that the checker accepts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from support.examples import examples
+from support.owned_nets import owned_nets
+from support.reference import load_net
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.checking.checker import check_document
+from firable.analysis.evidence.document import document_from_text
+from firable.analysis.goal import Limits
+from firable.decompose.splitting import persistence as module
+from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.persistence import Persistence, persistence, undisturbing
+from firable.decompose.splitting.votes import FALSIFIERS_MAX, votes
+from firable.nets.catalogue import catalogue_net, family_net
+from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.nets.verdict import Status
+from firable.semantics.algebra import BOOL
+from firable.semantics.firing import firable
+from firable.semantics.player import Player, holds_in
+
+A, B = Controller("a"), Controller("b")
+
+
+def falsified(decomposition: Decomposition) -> dict[str, tuple[str, ...]]:
+    """Each part with all that takes its yes back, by looking at every firing in every reachable marking."""
+    net = decomposition.net
+    graph = Player(net).reachable()
+    found = {}
+    for row in decomposition.coordinated:
+        for part in row.parts:
+            subnet = decomposition.subnet(part.controller)
+            index = [net.place_index[place.name] for place in subnet.places]
+
+            def yes(marking: int, subnet: Net = subnet, name: str = part.name, index: list[int] = index) -> bool:
+                holds = holds_in(marking)
+                return firable(BOOL, subnet, subnet.transition_index[name], lambda p: holds(index[p]))
+
+            by = {
+                fired[0]
+                for marking, edges in graph.items()
+                for fired, after in edges
+                if net.transitions[fired[0]].name != row.name and yes(marking) and not yes(after)
+            }
+            found[part.name] = tuple(net.transitions[t].name for t in sorted(by))
+    return found
+
+
+def agree(decomposition: Decomposition, found: Persistence) -> None:
+    expected = falsified(decomposition)
+    assert {verdict.name.removeprefix("persistent.") for verdict in found.verdicts} == expected.keys()
+    for part, by in expected.items():
+        verdict = found.of(part)
+        assert verdict.status is (Status.VIOLATED if by else Status.PROVED)
+        assert verdict.subjects == by
+
+
+@given(owned_nets())
+@examples(60)
+def test_persistent_are_the_parts_whose_yes_no_firing_of_another_takes_back(net: Net) -> None:
+    try:
+        decomposition = split(net)
+    except InputError:
+        return
+    found = persistence(decomposition)
+    agree(decomposition, found)
+    document = found.evidence()
+    checked = list(check_document(document_from_text(document.to_text())))
+    assert all(one.shown for one in checked)
+    decided = [vote for vote in found.votes if vote.accused]
+    assert [claim for record in document.records for claim, _ in record.shown] == [
+        module.claim_of(vote, persistent=found.of(vote.part).holds) for vote in decided
+    ]
+
+
+@given(owned_nets())
+@examples(12)
+def test_a_race_of_techniques_finds_the_same_where_no_space_is_held(net: Net) -> None:
+    try:
+        decomposition = split(net)
+    except InputError:
+        return
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module._Deciding, "_held", lambda _: None)
+        found = persistence(decomposition)
+    for part, by in falsified(decomposition).items():
+        verdict = found.of(part)
+        assert verdict.status is (Status.VIOLATED if by else Status.PROVED)
+        assert set(verdict.subjects) <= set(by)
+    assert all(one.shown for one in check_document(found.evidence()))
+
+
+def test_arcs_and_units_of_the_cell_leave_two_parts_to_its_markings() -> None:
+    left = {vote.part: vote.falsifiers for vote in votes(split(load_net("cell1"))) if vote.falsifiers}
+    assert left == {"t1-21": ("G6",), "t1-41": ("G2",)}
+
+
+def test_firing_sequence_of_a_part_that_is_not_persistent_ends_with_the_firing_that_takes_its_yes_back() -> None:
+    decomposition = split(catalogue_net("one_robot"))
+    verdict = persistence(decomposition).of("t1-41")
+    assert verdict.witness is not None
+    assert verdict.witness.firings == (("G1",), ("G2",))
+    assert verdict.subjects == ("G2",)
+    assert verdict.discipline == "interleaving"
+
+
+def test_parts_of_a_large_line_are_decided_by_its_arcs_and_units_alone() -> None:
+    cast = votes(split(family_net("manufacturing_cells-200")))
+    left = [vote for vote in cast if vote.falsifiers]
+    # A robot is free for two stations: the start of one task takes the yes of the other back, and nothing else does.
+    assert len(left) == 200
+    assert {len(vote.falsifiers) for vote in left} == {1}
+
+
+def test_without_time_nothing_is_decided_that_needs_a_marking() -> None:
+    found = persistence(split(catalogue_net("one_robot")), limits=Limits(Deadline.after(0)))
+    unknown = {verdict.name: verdict for verdict in found.verdicts if verdict.status is Status.UNKNOWN}
+    assert {"persistent.t1-21", "persistent.t1-41"} <= unknown.keys()
+    assert unknown["persistent.t1-21"].subjects == ("G6",)
+    assert unknown["persistent.t1-21"].code == "F3004"
+    assert not any("t1-21" in record.lacking for record in found.evidence().records)
+
+
+def test_a_place_that_very_many_share_is_not_looked_at_pair_by_pair() -> None:
+    n = FALSIFIERS_MAX + 2
+    places = (Place("a.p", "a", marked=True), *(Place(f"b.q{i}", "b") for i in range(n)))
+    crossing = tuple(Transition(f"t{i}", ("a.p",), (f"b.q{i}",)) for i in range(n))
+    found = persistence(split(Net("n", places, crossing, controllers=(A, B))))
+    assert found.of("t1-11").status is Status.UNKNOWN
+    assert f"{n:,}" in found.of("t1-11").bound
+    assert found.of("t2-12").status is Status.PROVED  # its own place is shared by nobody
+
+
+def crossing_net(**changes: object) -> Net:
+    """One transition from `a` to `b`, at a place where a command waits for its completion."""
+    command = Command("A", "GO")
+    places = (
+        Place("a.p", "a", marked=True, command=command, completion="a.done"),
+        Place("a.r", "a"),
+        Place("b.q", "b"),
+    )
+    transition = Transition("t", ("a.p",), ("b.q",), external=(ExternalGate("a.done"),))
+    back = Transition("back", ("a.r",), ("a.p",))
+    signals = (Signal("a.done", "a", SignalKind.COMPLETION), Signal("a.s", "a"))
+    return replace(Net("n", places, (transition, back), signals, (A, B)), **changes)  # type: ignore[arg-type]
+
+
+def test_part_is_free_of_the_promise_where_it_takes_no_yes_back_and_its_gate_stays_open() -> None:
+    net = crossing_net()
+    assert undisturbing(split(net)) == ("t1-11", "t2-12")
+    assert persistence(split(net)).free_of_promise == ("t1-11", "t2-12")
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        Transition("u", ("a.p",), ("a.r",), external=(ExternalGate("a.done"),)),  # takes from the same place
+        Transition("u", ("a.r",), (), permissive=("a.p",)),  # reads it, and sees it too late
+    ],
+)
+def test_part_that_takes_another_yes_back_must_promise(other: Transition) -> None:
+    net = crossing_net()
+    assert undisturbing(split(replace(net, transitions=(*net.transitions, other)))) == ("t2-12",)
+
+
+@pytest.mark.parametrize("other", [Transition("u", ("a.p",), ("b.q",)), Transition("u", ("a.r",), (), (), ("b.q",))])
+def test_part_whose_output_another_fills_or_reads_as_empty_must_promise(other: Transition) -> None:
+    net = crossing_net()
+    places = tuple(replace(place, completion=None) for place in net.places)
+    bare = tuple(replace(transition, external=()) for transition in net.transitions)
+    net = Net("n", places, (*bare, other), controllers=(A, B))
+    assert "t2-12" not in undisturbing(split(net))
+
+
+@pytest.mark.parametrize("gate", [ExternalGate("a.s"), ExternalGate("a.done", wanted=False)])
+def test_part_with_a_gate_that_may_close_must_promise(gate: ExternalGate) -> None:
+    net = crossing_net()
+    places = tuple(replace(place, completion=None) for place in net.places)
+    crossing = replace(net.transitions[0], external=(gate,))
+    assert undisturbing(split(crossing_net(places=places, transitions=(crossing,)))) == ("t2-12",)
+
+
+def test_part_whose_completion_another_command_clears_must_promise() -> None:
+    net = crossing_net()
+    again = Place("a.r", "a", command=Command("A", "STOP"), completion="a.done")
+    places = (net.places[0], again, net.places[2])
+    back = replace(net.transitions[1], external=(ExternalGate("a.done"),))
+    assert undisturbing(split(crossing_net(places=places, transitions=(net.transitions[0], back)))) == ("t2-12",)
