@@ -27,7 +27,7 @@ from firable.semantics.arbitration import Arbitration
 def participants(net: Net, transition: Transition) -> tuple[str, ...]:
     """The controllers that take part in a transition, in the order of the net; those of unowned things are left out.
 
-    >>> from firable.nets.net import Net, Place, Transition
+    >>> from firable.nets.net import Controller, Net, Place, Transition
     >>> places = (Place("a.p", "a", marked=True), Place("b.q", "b"))
     >>> net = Net("n", places, (Transition("t", ("a.p",), ("b.q",)),), controllers=(Controller("a"), Controller("b")))
     >>> participants(net, net.transition("t"))
