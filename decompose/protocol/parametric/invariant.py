@@ -1,0 +1,114 @@
+"""What holds in every configuration that the protocol reaches, in any net: the inductive invariant.
+
+Each conjunct is one sentence, for all values of its variables. Together they hold at the start and each action
+keeps them (`theorem`), so they hold for ever. The names V1 to V5 and S are the ones by which the safety argument goes:
+
+- a vote that may still count rests on a promise (V1), and a promise keeps its part firable in the subnet (V2), because
+  whatever fires or is promised besides does not disturb it (V3);
+- so at a commit all parts are firable at once, though the votes were given at different instants; and what is
+  committed stays promised until its order is obeyed (V4), once in each round (V5);
+- where a committed part is not yet applied, the subnet holds the token that the part will move, and the shadow has
+  moved it; everywhere else they hold the same (S).
+
+The rest says what messages say: that of what was sent the cause is true, and that what has to be sent was sent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from firable.decompose.protocol.parametric.logic import Formula, closed, exists, same
+from firable.decompose.protocol.parametric.system import (
+    abort_order,
+    acknowledgement,
+    asked,
+    begun,
+    c,
+    closed_round,
+    commit_order,
+    committed,
+    coordinated,
+    decided,
+    disturb,
+    heard,
+    input_of,
+    marked,
+    noted,
+    obeyed,
+    openable_at,
+    output_of,
+    owner,
+    p,
+    part_firable,
+    promised,
+    r,
+    request,
+    s,
+    shadow,
+    t,
+    takes_part,
+    u,
+    vote,
+    writes,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Conjunct:
+    """One sentence of the invariant; `formula` is for all values of its free variables."""
+
+    name: str
+    words: str
+    formula: Formula
+
+    @property
+    def sentence(self) -> Formula:
+        """The formula with its quantifiers."""
+        return closed(self.formula)
+
+
+_underway = committed(r, t) & ~obeyed(r, t, owner(p)) & writes(t, p)
+"""A committed transition has moved this place in the shadow, and its part is not yet applied."""
+
+INVARIANT: Final = (
+    Conjunct("V1", "a part with a vote stays promised until its order is obeyed", (
+        vote(r, t, c) & ~obeyed(r, t, c)).implies(promised(r, t, c))),
+    Conjunct("V2", "a promised part that may still be applied is firable in its subnet", (
+        promised(r, t, c) & (~decided(r) | committed(r, t))).implies(part_firable(t, c))),
+    Conjunct("gates", "the external gates of a promised part can open", promised(r, t, c).implies(openable_at(t, c))),
+    Conjunct("V3", "promises of different rounds at one controller do not disturb each other", (
+        promised(r, t, c) & promised(s, u, c) & ~same(r, s) & same(owner(p), c)).implies(~disturb(t, u, p))),
+    Conjunct("V4", "a committed part stays promised until it is applied", (
+        committed(r, t) & takes_part(t, c) & ~obeyed(r, t, c)).implies(promised(r, t, c))),
+    Conjunct("V5", "a round commits one transition at most", (
+        committed(r, t) & committed(r, u)).implies(same(t, u))),
+    Conjunct("S1", "where a committed part is not yet applied, the shadow has moved the token", (
+        _underway).implies(shadow(p).iff(output_of(t, p)))),
+    Conjunct("S2", "and the subnet still holds it", (_underway).implies(marked(p).iff(input_of(t, p)))),
+    Conjunct("S3", "everywhere else the subnets hold what the shadow holds", (
+        ~exists(r, t)(_underway)).implies(marked(p).iff(shadow(p)))),
+    Conjunct("asked", "what is asked for is coordinated, in a round that is begun", (
+        asked(r, t)).implies(begun(r) & coordinated(t))),
+    Conjunct("decided", "a round that is decided was begun", decided(r).implies(begun(r))),
+    Conjunct("committed", "what is committed was asked for, in a round that is decided", (
+        committed(r, t)).implies(decided(r) & asked(r, t))),
+    Conjunct("request", "requests go to those who take part in what is asked for", (
+        request(r, t, c)).iff(asked(r, t) & takes_part(t, c))),
+    Conjunct("promised", "a promise was requested, is voted for, and no order of it has been obeyed", (
+        promised(r, t, c)).implies(request(r, t, c) & vote(r, t, c) & ~obeyed(r, t, c))),
+    Conjunct("heard", "what the coordinator has heard was voted", heard(r, t, c).implies(vote(r, t, c))),
+    Conjunct("commit-order", "orders to commit are those of the committed transition, to all who take part", (
+        commit_order(r, t, c)).iff(committed(r, t) & takes_part(t, c))),
+    Conjunct("abort-order", "orders to abort are those of whatever else was asked for in a decided round", (
+        abort_order(r, t, c)).iff(decided(r) & asked(r, t) & ~committed(r, t) & takes_part(t, c))),
+    Conjunct("obeyed", "orders are obeyed in rounds that are decided", obeyed(r, t, c).implies(decided(r))),
+    Conjunct("acknowledgement", "who takes part in what is asked for acknowledges what it has obeyed, and only that", (
+        acknowledgement(r, t, c)).iff(request(r, t, c) & obeyed(r, t, c))),
+    Conjunct("noted", "what the coordinator notes was acknowledged", (
+        noted(r, t, c)).implies(acknowledgement(r, t, c))),
+    Conjunct("closed", "a closed round is begun and decided", closed_round(r).implies(begun(r) & decided(r))),
+    Conjunct("closed-obeyed", "in a closed round all have obeyed", (
+        closed_round(r) & asked(r, t) & takes_part(t, c)).implies(obeyed(r, t, c))),
+)  # fmt: skip
+"""The invariant; the order is the one of the documentation."""
