@@ -16,17 +16,10 @@ if TYPE_CHECKING:
 
     from firable.nets.verdict import Verdict
 
-_FAMILIES = {
-    "eq7": "Eq. (7)          a transition is firable iff all its parts are",
-    "eq8": "Eq. (8)          its external gates are open iff those of all its parts are",
-    "eq9-10": "Eq. (9)-(10)     the next token of a place is the same in its subnet",
-    "arbitration": "arbitration      conflicts are decided as in the central net",
-}
-
 
 @click.command(short_help="Split a net over its controllers, and prove the parts equal to the whole.")
 @net_argument
-@click.option("--smt-dir", metavar="DIR", help="Write each obligation as an SMT-LIB 2 file, for another solver.")
+@click.option("--smt-dir", metavar="DIR", help="Write the obligations as SMT-LIB 2 files, for another solver.")
 @click.option(
     "--timeout",
     type=click.FloatRange(min=0.001),
@@ -39,28 +32,34 @@ _FAMILIES = {
 def prove(net: str, smt_dir: str | None, timeout: float, format_: str) -> int:
     """Split NET by ownership, print the coordinator table, and discharge every obligation with z3.
 
-    Eq. (7) and (8) for every transition, (9)-(10) for every place, ownership, initial marking, commands and
-    arbitration. A violated obligation shows the values of the net's own names that refute it.
+    Eq. (7) and (8) for every transition, (9)-(10) for every place, one decider for all that compete (O2), no gate read
+    from a copy (O3), ownership, initial marking, commands, and that the arbiters together choose as the central one
+    does. Of each of O1-O9 it is told whether it is proved, and where, or assumed. A violated obligation shows the
+    values of the net's own names that refute it.
     """
     return answer("prove", format_, lambda: _report(net, smt_dir, timeout), _show)
 
 
-def show_obligations(net_verdicts: Sequence[Verdict]) -> None:
+def show_obligations(verdicts: Sequence[Verdict]) -> None:
     """Print how many obligations of each family are proved."""
-    families: dict[str, list[Verdict]] = {}
-    for verdict in net_verdicts:
-        family = verdict.name.partition(".")[0]
-        families.setdefault(family if family in _FAMILIES else verdict.name, []).append(verdict)
-    for family, some in families.items():
+    from firable.decompose.proofs.families import FAMILIES
+    from firable.decompose.proofs.family import proved_of
+
+    of_each = [(family, proved_of(family, verdicts)) for family in FAMILIES]
+    width = max(3, *(len(str(len(some))) for _, some in of_each))
+    for family, some in of_each:
+        if not some:
+            continue
         proved = sum(verdict.holds for verdict in some)
         symbol, colour = ("✓", "green") if proved == len(some) else ("✗", "red")
-        words = _FAMILIES.get(family) or f"{family:<16} {some[0].statement}"
-        click.echo(f"  {click.style(symbol, fg=colour)} {proved:>3} of {len(some):<3} {words}")
+        count = f"{proved:>{width}} of {len(some):<{width}}"
+        click.echo(f"  {click.style(symbol, fg=colour)} {count} {family.title:<16} {family.says}")
 
 
 def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
     from firable.decompose.proofs.assumptions import assumptions
     from firable.decompose.proofs.proving import prove as prove_split
+    from firable.decompose.proofs.standing import standing
     from firable.decompose.splitting.cut import split
 
     loaded = load_net(argument)
@@ -76,6 +75,7 @@ def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
         notes=loaded.notes,
         table=decomposition.table,
         assumptions=tuple(map(str, assumptions(decomposition))),
+        standing=tuple(standing(decomposition, found.verdicts)),
         files=files,
     )
 
@@ -92,6 +92,10 @@ def _show(report: Report) -> None:
         click.echo("  no transition has more than one participant")
     click.echo(f"\n{click.style('obligations', bold=True)}")
     show_obligations(report.verdicts)
+    click.echo(f"\n{click.style('what the running system needs', bold=True)}")
+    for line in report.standing:
+        click.echo(f"  {line.name}  {line.says}")
+        click.echo(f"      {line.status}: {line.by}")
     if report.assumptions:
         click.echo(f"\n{click.style('assumed of the cell', bold=True)}")
         for assumption in report.assumptions:

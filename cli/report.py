@@ -8,11 +8,12 @@ gives the same bytes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from firable.decompose.proofs.standing import Standing
     from firable.nets.decomposition import Coordinated
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
@@ -48,6 +49,7 @@ class Report:
     notes: Sequence[Diagnostic] = ()
     table: Sequence[Coordinated] = ()
     assumptions: Sequence[str] = ()
+    standing: Sequence[Standing] = ()
     files: Sequence[str] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
     again: bool = False
@@ -80,6 +82,8 @@ class Report:
         for key in ("discipline", "course", "figures", "assumptions", "files", "run"):
             if value := getattr(self, key):
                 data[key] = list(value) if isinstance(value, tuple) else value
+        if self.standing:
+            data["standing"] = [asdict(line) for line in self.standing]
         if self.notes:
             data["notes"] = [diagnostic_to_json(note) for note in self.notes]
         data["verdicts"] = [verdict.to_json() for verdict in self.verdicts]

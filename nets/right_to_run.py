@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.joining import join
-from firable.nets.net import Net
+from firable.nets.net import Net, Transition
 from firable.nets.verdict import Verdict, Weight
 
 if TYPE_CHECKING:
@@ -35,15 +35,28 @@ CHECKED: Final = ("contact-free", "deadlock-free", "quasi-live", "conflicting-co
 def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
     """The names of the verdicts that must be PROVED before a net may run: derived from the net, not from what is there.
 
-    Of the net what `CHECKED` names and every property of the file; of the decomposition Eq. (7) and (8) for every
-    transition, Eq. (9)-(10) for every place, ownership, M0, commands, and arbitration.
+    Of the net what `CHECKED` names and every property of the file; of the decomposition Eq. (7), (8) and O3 for every
+    transition, Eq. (9)-(10) for every place, O2 for every global transition and wherever transitions compete,
+    ownership, M0, commands, and arbitration.
     """
     net = decomposition.net
     yield from _required_of_the_net(net)
-    yield from (f"{equation}.{t.name}" for t in net.transitions for equation in ("eq7", "eq8"))
+    yield from (f"{equation}.{t.name}" for t in net.transitions for equation in ("eq7", "eq8", "o3"))
     yield from (f"eq9-10.{place.name}" for place in net.places)
+    yield from (f"o2.{t.name}" for t in net.transitions if len(_owners(net, t)) > 1)
+    yield from (
+        f"o2.{place.name}"
+        for p, place in enumerate(net.places)
+        if len(net.consumers[p]) > 1 or len(net.producers[p]) > 1
+    )
     yield from ("ownership", "initial-marking", "commands", "arbitration")
     yield from (f"arbitration.{group.name}" for group in decomposition.groups)
+
+
+def _owners(net: Net, transition: Transition) -> set[str | None]:
+    """The owners of everything that a transition touches."""
+    places = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
+    return {net.place(name).owner for name in places} | {net.signal(g.signal).owner for g in transition.external}
 
 
 def _required_of_the_net(net: Net) -> Iterator[str]:

@@ -195,13 +195,18 @@ _LINE_MAX: Final = 110
 
 
 def symbol(name: str) -> str:
-    """A name as a quoted symbol; what may not stand between bars is written as `%` and hexadecimal digits.
+    """A name as a quoted symbol.
 
     >>> symbol("robot.free"), symbol("a|b"), symbol("é")
-    ('|robot.free|', '|a%7cb|', '|%e9|')
+    ('|robot.free|', '|a%7c.b|', '|%e9.|')
     """
-    # `%` is written so itself, and a net's names hold none: no two names become one symbol.
-    return "|" + "".join(c if " " <= c <= "~" and c not in "|\\%" else f"%{ord(c):x}" for c in name) + "|"
+    return f"|{in_ascii(name)}|"
+
+
+def in_ascii(name: str) -> str:
+    """A name with what may not stand between bars as `%`, its number in hexadecimal digits, and a point."""
+    # `%` is written so itself, and the point says where the number ends: no two names become one symbol.
+    return "".join(c if " " <= c <= "~" and c not in "|\\%" else f"%{ord(c):x}." for c in name)
 
 
 def smtlib_term(term: Term) -> str:
@@ -237,13 +242,18 @@ def smtlib(assertions: Sequence[Term], comments: Iterable[str] = ()) -> str:
     (assert (not |p|))
     (check-sat)
     """
+    lines = [f"; {printable(comment)}".rstrip() for comment in comments]
+    return "\n".join([*lines, "(set-logic QF_UF)", *smtlib_lines(assertions), "(check-sat)"]) + "\n"
+
+
+def smtlib_lines(assertions: Sequence[Term]) -> list[str]:
+    """The declarations, definitions and assertions that state the terms: what stands between a logic and a check."""
     names = variables(assertions)
     prefix = "shared"
     while any(name.startswith(prefix) for name in names):
         prefix += "_"
     uses = Counter(operand for term in subterms(assertions) for operand in term.operands)
-    lines = [f"; {printable(comment)}".rstrip() for comment in comments]
-    lines += ["(set-logic QF_UF)", *(f"(declare-const {symbol(name)} Bool)" for name in names)]
+    lines = [f"(declare-const {symbol(name)} Bool)" for name in names]
     texts: dict[Term, str] = {}
     depths: dict[Term, int] = {}
     definitions = 0
@@ -255,8 +265,7 @@ def smtlib(assertions: Sequence[Term], comments: Iterable[str] = ()) -> str:
             definitions += 1
             lines.append(f"(define-fun {prefix}{definitions} () Bool {texts[term]})")
             texts[term], depths[term] = f"{prefix}{definitions}", 1
-    lines += [f"(assert {texts[term]})" for term in assertions]
-    return "\n".join([*lines, "(check-sat)"]) + "\n"
+    return [*lines, *(f"(assert {texts[term]})" for term in assertions)]
 
 
 # --------------------------------------------------------------------------------------------------------------------

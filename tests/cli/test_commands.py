@@ -160,8 +160,10 @@ def test_obligations_are_written_as_smtlib(tmp_path: Path, capsys: pytest.Captur
     code, data = as_json(capsys, "prove", "catalogue:one_robot", "--smt-dir", str(tmp_path / "smt"))
     (report,) = data["reports"]
     assert code == 0
-    assert len(report["files"]) == len(report["verdicts"]) == len(list((tmp_path / "smt").iterdir()))
-    assert all("(check-sat)" in Path(file).read_text() for file in report["files"])
+    assert {Path(file) for file in report["files"]} == set((tmp_path / "smt").iterdir())
+    texts = {Path(file).name: Path(file).read_text() for file in report["files"]}
+    assert all(f'(echo "{v["name"]}")' in texts[file] for v in report["verdicts"] for file in v["evidence"])
+    assert [line["name"] for line in report["standing"]] == [f"O{n}" for n in range(1, 10)]
     assert len(report["table"]) == 9
 
 

@@ -5,19 +5,20 @@ from dataclasses import replace
 from itertools import combinations, product
 from typing import Any
 
-import cvc5
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
 from support.reference import load_net
+from support.second_solver import by_cvc5
 
 from firable.analysis.check import check
-from firable.analysis.induction.smt import Terms, value
+from firable.analysis.induction.smt import Answer, Decision, Terms, value
 from firable.analysis.report import CheckReport
 from firable.decompose.bundling import make_bundle
-from firable.decompose.proofs.obligations import greedy
+from firable.decompose.proofs.arbitration import Competition, choice
 from firable.decompose.proofs.proving import ProofReport, prove
+from firable.decompose.proofs.script import Reader, ScriptError
 from firable.decompose.splitting.cut import split
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_names, catalogue_net
@@ -86,16 +87,6 @@ def refuted(decomposition: Decomposition) -> dict[str, Verdict]:
     return {verdict.name: verdict for verdict in report.verdicts if verdict.status is Status.VIOLATED}
 
 
-def by_cvc5(text: str) -> str:
-    solver = cvc5.Solver()
-    parser = cvc5.InputParser(solver)
-    parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, text, "evidence.smt2")
-    answer = ""
-    while not (command := parser.nextCommand()).isNull():
-        answer += command.invoke(solver, parser.getSymbolManager())
-    return answer.strip()
-
-
 @pytest.fixture(scope="module", params=["reference", "catalogue"])
 def cell(request: pytest.FixtureRequest) -> ProofReport:
     return prove(split(load_net("cell1") if request.param == "reference" else catalogue_net("one_robot")))
@@ -113,22 +104,28 @@ def test_gated_net_is_proved() -> None:
     assert refuted(split(gated_net())) == {}
 
 
-def test_another_solver_confirms_every_file_of_the_cell(cell: ProofReport) -> None:
-    assert len(cell.files) == len(cell.verdicts) == 15 * 2 + 28 + 4 + 2
-    assert {name: by_cvc5(text) for name, text in cell.files.items()} == dict.fromkeys(cell.files, "unsat")
+def test_another_solver_confirms_every_obligation_of_the_cell(cell: ProofReport) -> None:
+    assert len(cell.verdicts) == 15 * 3 + 28 + 10 + 3 + 3
+    answers = [line.strip('"') for text in cell.files.values() for line in by_cvc5(text).splitlines()]
+    assert answers[::2] == [verdict.name for verdict in cell.verdicts]
+    assert set(answers[1::2]) == {"unsat"}
 
 
 def test_file_says_what_it_proves_in_the_names_of_the_net(cell: ProofReport) -> None:
-    text = cell.files["eq7-G2.smt2"]
+    text = cell.files["eq7.smt2"]
     head = [line for line in text.splitlines() if line.startswith(";")]
-    assert "'G2' is firable in the central net iff each of its parts is firable" in head[1]
-    assert "`unsat`" in head[2]
+    assert "a transition is firable iff all its parts are" in head[0]
+    assert "`unsat`" in head[1]
+    assert "; 'G2' is firable in the central net iff each of its parts is firable in its subnet" in head
     assert "(declare-const |c1.Robot| Bool)" in text or "(declare-const |robot.free| Bool)" in text
     assert "(set-logic QF_UF)" in text
 
 
 def test_verdict_names_its_evidence(cell: ProofReport) -> None:
-    assert {verdict.evidence for verdict in cell.verdicts} == {(name,) for name in cell.files}
+    for verdict in cell.verdicts:
+        (file,) = verdict.evidence
+        assert f'(echo "{verdict.name}")' in cell.files[file]
+    assert {file for verdict in cell.verdicts for file in verdict.evidence} == set(cell.files)
 
 
 # --------------------------------------------------------------------------------------------------------------------
@@ -142,13 +139,9 @@ def edited(decomposition: Decomposition, controller: str, edit: Callable[[Net], 
 
 def changed_transitions(transition: Transition, subnet: Net) -> Iterator[Transition]:
     """Every single arc or gate dropped, added or flipped."""
-    # A gate on an input or output place that only repeats what the arc demands changes nothing: no assignment differs.
-    repeats = {"permissive": transition.inputs, "inhibitive": transition.outputs}
     for kind in ("inputs", "outputs", "permissive", "inhibitive"):
         of_kind: tuple[str, ...] = getattr(transition, kind)
         for place in subnet.places:
-            if place.name in repeats.get(kind, ()):
-                continue
             now = tuple(p for p in of_kind if p != place.name)
             changes: dict[str, Any] = {kind: now if place.name in of_kind else (*of_kind, place.name)}
             yield replace(transition, **changes)
@@ -298,9 +291,7 @@ def test_refutation_shows_the_differing_assignment_in_the_names_of_the_net() -> 
     robot = decomposition.subnet("c1")
     dropped = tuple(replace(t, inputs=()) if t.name == "t1-21" else t for t in robot.transitions)
     found = refuted(edited(decomposition, "c1", lambda subnet: replace(subnet, transitions=dropped)))
-    assert set(found) == {"eq7.G2", "eq9-10.c1.Robot", "arbitration.conflict-1"} | {
-        name for name in found if name.startswith("arbitration.")
-    }
+    assert set(found) == {"eq7.G2", "eq9-10.c1.Robot", "o3.G2", "arbitration.conflict-1"}
     witness = found["eq7.G2"].witness
     assert witness is not None
     assert witness.note == "in the central net: 0, in the subnets: 1"
@@ -310,14 +301,24 @@ def test_refutation_shows_the_differing_assignment_in_the_names_of_the_net() -> 
 
 
 def test_out_of_time_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
-    from firable.analysis.induction.smt import Answer, Decision
-
-    monkeypatch.setattr(
-        "firable.decompose.proofs.proving.decide", lambda *_, **__: Decision(Answer.UNKNOWN, {}, "timeout")
-    )
+    monkeypatch.setattr("firable.decompose.proofs.script.Reader.answer", lambda *_: Answer.UNKNOWN)
     report = prove(split(load_net("ring")))
     assert {verdict.status for verdict in report.verdicts} == {Status.UNKNOWN}
-    assert all("timeout" in verdict.bound for verdict in report.verdicts)
+    assert all("gave up" in verdict.bound for verdict in report.verdicts)
+
+
+def test_no_model_in_time_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.decompose.proofs.script.Reader.answer", lambda *_: Answer.SAT)
+    monkeypatch.setattr(
+        "firable.decompose.proofs.discharging.decide", lambda *_, **__: Decision(Answer.UNKNOWN, {}, "timeout")
+    )
+    report = prove(split(load_net("ring")))
+    assert {verdict.bound for verdict in report.verdicts} == {"z3 gave up: timeout"}
+
+
+def test_what_z3_does_not_answer_is_no_proof() -> None:
+    with pytest.raises(ScriptError):
+        Reader(1000).answer('(echo "a")\n(echo "unsat")\n(assert false)\n(check-sat)\n')
 
 
 # --------------------------------------------------------------------------------------------------------------------
@@ -326,19 +327,61 @@ def test_out_of_time_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @given(st.data())
 @examples(100)
-def test_granted_term_is_what_the_arbiter_decides(data: st.DataObject) -> None:
+def test_choice_is_what_the_arbiter_decides_in_every_turn(data: st.DataObject) -> None:
     sets = st.frozensets(st.sampled_from("pqr"), min_size=1, max_size=2).map(sorted).map(tuple)
-    transitions = tuple(Transition(f"t{i}", data.draw(sets)) for i in range(4))
-    net = Net("n", tuple(Place(p) for p in "pqr"), transitions)
+    net = Net(
+        "n",
+        tuple(Place(p) for p in "pqrxyz"),
+        tuple(Transition(f"t{i}", data.draw(sets), (data.draw(st.sampled_from("xyz")),)) for i in range(4)),
+    )
+    by = data.draw(st.sampled_from(ArbitrationRule))
+    if components := Arbitration.of(net).conflicts.components:
+        among = data.draw(st.lists(st.sampled_from(components[0]), min_size=2, max_size=4))
+        among = among if by is ArbitrationRule.ORDER else list(dict.fromkeys(among))
+        if len(set(among)) > 1:
+            net = replace(net, arbiters=(Arbiter("next", tuple(f"t{t}" for t in among), by),))
     arbitration = Arbitration.of(net)
     enabled = data.draw(st.frozensets(st.sampled_from(range(4))))
-    terms = Terms()
-    variables = {t.name: terms.variable(t.name) for t in transitions}
-    rivals = {t.name: {f"t{u}" for u in arbitration.conflicts.rivals[i]} for i, t in enumerate(transitions)}
-    granted = greedy(terms, variables, [t.name for t in transitions], rivals)
-    assignment = {f"t{i}": i in enabled for i in range(4)}
-    decided, _ = arbitration.decide(enabled, arbitration.first_turns)
-    assert [value(granted[f"t{i}"], assignment) for i in range(4)] == [i in decided for i in range(4)]
+    rotating = [group.sequence and group.by is not ArbitrationRule.PRIORITY for group in arbitration.groups]
+    turns = tuple(
+        data.draw(st.integers(0, len(group.sequence) - 1)) if turn else 0
+        for group, turn in zip(arbitration.groups, rotating, strict=True)
+    )
+    decided, after = arbitration.decide(enabled, turns)
+    terms, competition = Terms(), Competition.of([(net, lambda t: f"t{t}")])
+    for group, turn, then in zip(arbitration.groups, turns, after, strict=True):
+        sequence, rest = ([f"t{t}" for t in part] for part in (group.sequence, group.rest))
+        turned = group.by is not ArbitrationRule.PRIORITY
+        chosen = choice(terms, sequence, rest, competition, turns=turned)
+        assignment = {f"enabled(t{t})": t in enabled for t in range(4)}
+        assignment |= {f"turn({i})": i == turn for i in range(len(sequence))}
+        for t in (*group.sequence, *group.rest):
+            assert value(chosen.granted[f"t{t}"], assignment) == (t in decided)
+        if turned:
+            winners = [t for t in group.preference(turn) if value(chosen.winning[f"t{t}"], assignment)]
+            assert then == (group.turn_after(winners[-1], turn) if winners else turn)
+
+
+def robot_with_jobs(n: int, by: ArbitrationRule) -> Net:
+    """A robot of its own controller, for which n machines compete."""
+    machines = [f"m{i}" for i in range(n)]
+    return Net(
+        "jobs",
+        (Place("r.free", "r", marked=True), *(Place(f"{m}.p", m, marked=True) for m in machines)),
+        tuple(Transition(f"{m}_job", ("r.free", f"{m}.p")) for m in machines),
+        controllers=(Controller("r"), *map(Controller, machines)),
+        arbiters=(Arbiter("next", tuple(f"{m}_job" for m in machines), by),),
+    )
+
+
+@pytest.mark.parametrize("by", ArbitrationRule)
+def test_arbiter_over_many_is_proved_at_a_size_linear_in_its_arcs(by: ArbitrationRule) -> None:
+    sizes = []
+    for n in (100, 200):
+        report = prove(split(robot_with_jobs(n, by)))
+        assert report.holds
+        sizes.append(len(report.files["arbitration.smt2"]))
+    assert sizes[1] < 2.2 * sizes[0]
 
 
 def test_cell_is_bundled_with_all_its_proofs() -> None:

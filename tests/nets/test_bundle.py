@@ -287,7 +287,8 @@ def test_required_verdicts_follow_from_the_net() -> None:
             "shared-completions",
             "property.apart",
         ),
-        *("eq7.G", "eq8.G", "eq7.l", "eq8.l", "eq9-10.a.p", "eq9-10.b.q", "eq9-10.a.r"),
+        *("eq7.G", "eq8.G", "o3.G", "eq7.l", "eq8.l", "o3.l", "eq9-10.a.p", "eq9-10.b.q", "eq9-10.a.r"),
+        *("o2.G", "o2.a.p"),
         *("ownership", "initial-marking", "commands", "arbitration", "arbitration.next"),
     ]
 

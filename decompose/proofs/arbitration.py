@@ -1,0 +1,185 @@
+"""Arbitration: the groups of the table are the conflict components, each decided as in the central net.
+
+Which transitions a group decides, in which order, by which rule and where are facts. What they amount to is the
+equivalence of the arbiters: for every set of firable transitions, coordinator and local arbiters together choose
+what the central arbiter chooses. The choice of the whole is the union of the choices of the groups, since a transition
+that shares a place stands in one group only (the facts, and O2), and whatever shares none is granted by both sides when
+it is enabled. So one obligation for each group is the whole statement, over every set of enabled members:
+
+- the group grants what the central arbiter grants, in every turn;
+- what wins an input conflict, and so turns a rotation, is the same, so that the turns stay the same for ever;
+- what is granted consumes and produces each place at most once, and leaves out nothing that could be added.
+
+The turn is a variable, not a case: the sequence is written twice in a row, and a preference begins where the first
+variable `turn(i)` is true, or with the second writing. What was refused at its first writing finds the same places
+taken at its second, so the order is that of every turn, at a size that is linear in the arcs of the group. The
+alternative, a copy of the choice for each turn and a rival for each pair, is cubic: minutes for a robot with a thousand
+jobs. The central side is told by the places of the net, the other one by those of the subnets.
+
+Assumed is that an arbiter sees its members at one instant: that is what promises are for (O1, the protocol).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from firable.analysis.induction.smt import Term, Terms
+from firable.decompose.proofs.obligation import Obligation, claimed, facts
+from firable.decompose.proofs.sides import Sides
+from firable.decompose.splitting.cut import participants
+from firable.nets.net import ArbitrationRule, Net
+
+
+def arbitration(sides: Sides) -> Iterator[Obligation]:
+    """The facts on all groups, and the equivalence of the arbiters of each."""
+    yield _groups(sides)
+    central = Competition.of([(sides.net, lambda t: sides.net.transitions[t].name)])
+    subnets = Competition.of((subnet, partial(sides.whole_of, subnet)) for subnet in sides.subnets)
+    for name in dict.fromkeys([*sides.central_groups, *sides.groups]):
+        yield _equivalence(sides, name, central, subnets)
+
+
+# --------------------------------------------------------------------------------------------------------------------
+# Facts
+
+
+def _groups(sides: Sides) -> Obligation:
+    net, relation = sides.net, sides.arbitration.conflicts
+    central: list[str] = []
+    coordinated = {t.name for t in net.transitions if len(participants(net, t)) > 1}
+    for group, members in zip(sides.central_groups.values(), relation.components, strict=True):
+        names = [net.transitions[t].name for t in members]
+        owner: str | None = None
+        if coordinated.isdisjoint(names):
+            owner = next(iter(participants(net, net.transitions[members[0]])), None)
+        else:
+            coordinated.update(names)
+        sequence, rest = ([net.transitions[t].name for t in part] for part in (group.sequence, group.rest))
+        central += _group_facts(group.name, sequence, rest, group.by, owner)
+    central += [f"the coordinator decides {t.name}" for t in net.transitions if t.name in coordinated]
+    made: list[str] = []
+    for its in sides.decomposition.groups:
+        made += _group_facts(its.name, its.sequence, its.rest, its.by, its.controller)
+    made += [f"the coordinator decides {row.name}" for row in sides.decomposition.coordinated]
+    statement = "each conflict component is one group, decided by the coordinator where a global transition is in it"
+    return facts("arbitration", statement, central, made)
+
+
+def _group_facts(
+    name: str, sequence: Iterable[str], rest: Iterable[str], by: ArbitrationRule, controller: str | None
+) -> Iterator[str]:
+    yield f"{name} decides by {by.value} at {json.dumps(controller, ensure_ascii=True)}"
+    yield from (f"{name} takes {t} in turn {i}" for i, t in enumerate(sequence))
+    yield from (f"{name} takes {t} last, in turn {i}" for i, t in enumerate(rest))
+
+
+# --------------------------------------------------------------------------------------------------------------------
+# The choice of one group
+
+
+@dataclass(frozen=True)
+class Competition:
+    """Who competes for what: for each transition its shared places, those of its inputs apart, and who is at each."""
+
+    inputs: Mapping[str, Sequence[Hashable]]
+    places: Mapping[str, Sequence[Hashable]]
+    at: Mapping[Hashable, Sequence[str]]
+
+    @classmethod
+    def of(cls, nets: Iterable[tuple[Net, Callable[[int], str]]]) -> Competition:
+        """The competition in these nets, each with the name in the central net of a transition by its index."""
+        inputs: dict[str, list[Hashable]] = {}
+        places: dict[str, list[Hashable]] = {}
+        at: dict[Hashable, list[str]] = {}
+        for n, (net, whole) in enumerate(nets):
+            for kind, table in (("from", net.consumers), ("to", net.producers)):
+                for p, adjacent in enumerate(table):
+                    if len(adjacent) < 2:
+                        continue
+                    key = (n, kind, p)
+                    at[key] = [whole(t) for t in adjacent]
+                    for name in at[key]:
+                        places.setdefault(name, []).append(key)
+                        if kind == "from":
+                            inputs.setdefault(name, []).append(key)
+        return cls(inputs, places, at)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What one side grants, and what wins an input conflict in it, each as a term over `enabled` and `turn`."""
+
+    granted: Mapping[str, Term]
+    winning: Mapping[str, Term]
+
+
+def choice(
+    terms: Terms,
+    sequence: Sequence[str],
+    rest: Sequence[str],
+    competition: Competition,
+    *,
+    turns: bool,
+) -> Choice:
+    """The choice of a group: in order of preference each enabled transition whose shared places nobody has taken."""
+    taken: dict[Hashable, Term] = {}
+    granted: dict[str, Term] = {}
+    begun = terms.false
+    considered: list[tuple[str, Term]] = []
+    if turns:
+        for i, t in enumerate(sequence):
+            begun = terms.disjunction([begun, terms.variable(f"turn({i})")])
+            considered.append((t, begun))
+    considered += [(t, terms.true) for t in (*sequence, *rest)]
+    for t, its_turn in considered:
+        before = terms.disjunction(taken.get(place, terms.false) for place in competition.places.get(t, ()))
+        now = terms.conjunction([terms.variable(f"enabled({t})"), its_turn, terms.negation(before)])
+        granted[t] = terms.disjunction([granted.get(t, terms.false), now])
+        for place in competition.places.get(t, ()):
+            taken[place] = terms.disjunction([taken.get(place, terms.false), now])
+    losing: dict[Hashable, Term] = {}
+    for place in dict.fromkeys(place for t in granted for place in competition.inputs.get(t, ())):
+        at = [t for t in competition.at[place] if t in granted]
+        losing[place] = terms.disjunction(
+            terms.conjunction([terms.variable(f"enabled({t})"), terms.negation(granted[t])]) for t in at
+        )
+    winning = {
+        t: terms.conjunction([its, terms.disjunction(losing[place] for place in competition.inputs.get(t, ()))])
+        for t, its in granted.items()
+    }
+    return Choice(granted, winning)
+
+
+def _equivalence(sides: Sides, name: str, competition: Competition, in_subnets: Competition) -> Obligation:
+    net, terms = sides.net, Terms()
+    central, its = sides.central_groups.get(name), sides.groups.get(name)
+    sequence, rest = (
+        ([net.transitions[t].name for t in part] for part in (central.sequence, central.rest)) if central else ([], [])
+    )
+    wanted = choice(terms, sequence, rest, competition, turns=central is not None and _turns(central.by))
+    given = Choice({}, {})
+    if its is not None:
+        given = choice(terms, its.sequence, its.rest, in_subnets, turns=_turns(its.by))
+    members = list(dict.fromkeys((*wanted.granted, *given.granted)))
+    grants = {t: given.granted.get(t, terms.false) for t in members}
+    claims: list[Term] = []
+    for t in members:
+        claims.append(terms.equal(grants[t], wanted.granted.get(t, terms.false)))
+        claims.append(terms.equal(given.winning.get(t, terms.false), wanted.winning.get(t, terms.false)))
+    taken: dict[Hashable, Term] = {}
+    for place in dict.fromkeys(place for t in members for place in competition.places.get(t, ())):
+        at = [grants[t] for t in competition.at[place] if t in grants]
+        claims.append(terms.at_most_one(at))
+        taken[place] = terms.disjunction(at)
+    for t in members:
+        against = [taken[place] for place in competition.places.get(t, ())]
+        claims.append(terms.implies(terms.variable(f"enabled({t})"), terms.disjunction([grants[t], *against])))
+    statement = f"whatever is enabled, '{name}' grants a maximal set without conflict, as the central arbiter does"
+    return claimed(terms, f"arbitration.{name}", statement, terms.conjunction(claims), subjects=tuple(members))
+
+
+def _turns(by: ArbitrationRule) -> bool:
+    return by is not ArbitrationRule.PRIORITY

@@ -1,0 +1,45 @@
+"""The table of the families of obligations, in the order in which they are proved and reported.
+
+To add a static one: its file, a function from `Sides` to obligations, and a row here. To add one that proves otherwise:
+its row names a function from `Task` to `Proved`, with the files that its verdicts name as evidence. Either way what a
+net requires of it goes into `firable.nets.right_to_run`, and what a bundle must then hold into the verifier.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from firable.decompose.proofs.arbitration import arbitration
+from firable.decompose.proofs.commands import commands
+from firable.decompose.proofs.deciders import deciders
+from firable.decompose.proofs.discharging import static
+from firable.decompose.proofs.family import Family
+from firable.decompose.proofs.firability import firability
+from firable.decompose.proofs.initial_marking import initial_marking
+from firable.decompose.proofs.next_tokens import next_tokens
+from firable.decompose.proofs.obligation import Obligation
+from firable.decompose.proofs.openness import openness
+from firable.decompose.proofs.ownership import ownership
+from firable.decompose.proofs.reading import reading
+from firable.decompose.proofs.sides import Sides
+
+
+def _static(
+    name: str, title: str, says: str, obligations: Callable[[Sides], Iterator[Obligation]], *serves: str
+) -> Family:
+    return Family(name, title, says, static(name, says, obligations), serves)
+
+
+FAMILIES: Final[tuple[Family, ...]] = (
+    _static("eq7", "Eq. (7)", "a transition is firable iff all its parts are", firability),
+    _static("eq8", "Eq. (8)", "its external gates are open iff those of all its parts are", openness),
+    _static("eq9-10", "Eq. (9)-(10)", "the next token of a place is the same in its subnet", next_tokens),
+    _static("o2", "O2", "transitions that compete have one decider", deciders, "O2"),
+    _static("o3", "O3", "what a transition touches is touched by its owner's part alone", reading, "O3"),
+    _static("ownership", "ownership", "each place and signal is owned once, by its owner", ownership, "O3"),
+    _static("initial-marking", "M0", "the initial markings of the subnets together are M0", initial_marking),
+    _static("commands", "commands", "the subnets send the commands of the net, on the same places", commands),
+    _static("arbitration", "arbitration", "conflicts are decided as in the central net", arbitration, "O2"),
+)
+"""Every family, in the order of a report."""

@@ -1,0 +1,49 @@
+"""Ownership: every place and signal is in one subnet, that of its owner, and every transition of a subnet is a part.
+
+What two controllers owned would have two tokens, and what a subnet held as a copy could be older than the thing itself
+(O3). So who owns what, which controllers there are, and that a part belongs to one transition, are facts that the
+subnets and the net must agree on.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+from firable.decompose.proofs.obligation import Obligation, called, facts, repeated
+from firable.decompose.proofs.sides import Sides
+from firable.nets.net import Net, Place, Signal
+
+
+def ownership(sides: Sides) -> Iterator[Obligation]:
+    """The one obligation on who owns what."""
+    net = sides.net
+    central = [f"controller {_json([c.name, c.coordinator])}" for c in net.controllers]
+    central += [f"{c.name} has one subnet, without arbiters" for c in net.controllers]
+    central += [f"{called(item.owner)} owns {item.name}" for item in _owned(net)]
+    made = [f"controller {_json([c.name, c.coordinator])}" for subnet in sides.subnets for c in subnet.controllers]
+    for subnet in sides.subnets:
+        made.append(f"{subnet.name} has {'other subnets' if subnet.arbiters else 'one subnet, without arbiters'}")
+        made += [f"{subnet.name} owns {item.name}" for item in _owned(subnet)]
+        made += [
+            f"{called(item.owner)} owns {item.name} in the subnet of {subnet.name}"
+            for item in _owned(subnet)
+            if item.owner != subnet.name
+        ]
+        made += [
+            f"{t.name} of {subnet.name} is a part of nothing"
+            for i, t in enumerate(subnet.transitions)
+            if sides.whole_of(subnet, i) not in net.transition_index
+        ]
+    every = [part for parts in sides.parts.values() for part in parts]
+    made += [f"{part} of {controller} is a part twice" for controller, part in repeated(every)]
+    statement = "each place and signal is owned once, in the subnet of its owner, and nothing else is in a subnet"
+    yield facts("ownership", statement, central, made)
+
+
+def _owned(net: Net) -> tuple[Place | Signal, ...]:
+    return (*net.places, *net.signals)
+
+
+def _json(data: object) -> str:
+    return json.dumps(data, ensure_ascii=True)

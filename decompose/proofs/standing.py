@@ -1,0 +1,76 @@
+"""Where each of O1-O9 stands: proved statically, by the protocol proof, or assumed.
+
+SEMANTICS lists nine obligations by which the distributed system does what the central net does. Eq. (7)-(10) are
+identities of one instant and say nothing about most of them. So a report that lists only what was proved would hide
+what was not; here every one of the nine has a line, whether a family proves it or not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from firable.decompose.proofs.assumptions import assumptions
+from firable.decompose.proofs.families import FAMILIES
+from firable.decompose.proofs.family import proved_of
+from firable.nets.decomposition import Decomposition
+from firable.nets.verdict import Status, Verdict, overall
+
+SAYS: Final = {
+    "O1": "a yes vote is a promise: nothing that it rests on changes until commit or abort",
+    "O2": "transitions that compete have one decider, the coordinator where a global one is among them",
+    "O3": "a gate source elsewhere makes its owner a participant; nothing is read from a copy",
+    "O4": "an external gate that a vote saw open stays open until the transition fires",
+    "O5": "orders carry a round, are applied once, repeated until acknowledged, all or nothing",
+    "O6": "votes and decisions are in stable storage, and a promise outlasts a crash",
+    "O7": "commands go to machines only after the local apply",
+    "O8": "a coordinator below another one votes for its children and keeps their locks",
+    "O9": "synchronous steps are equal only in lock-step rounds",
+}
+"""What each obligation says, in a line."""
+
+OTHERWISE: Final = {
+    "O1": ("assumed", "of the protocol"),
+    "O4": ("assumed", "of the cell; completion signals are levels, which their command clears"),
+    "O5": ("assumed", "of the protocol"),
+    "O6": ("assumed", "of the hosts and their storage"),
+    "O7": ("assumed", "of the protocol"),
+    "O8": ("nothing to show", "the coordinator has no other one above it"),
+    "O9": ("not claimed", "what is proved is the equivalence of interleaving"),
+}
+"""The status of an obligation that no family proves, and of whom it is assumed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Where one obligation stands: its status, and the families that show it or what is assumed."""
+
+    name: str
+    says: str
+    status: str
+    by: str
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.says}: {self.status}, {self.by}"
+
+
+def standing(decomposition: Decomposition, verdicts: Iterable[Verdict]) -> Iterator[Standing]:
+    """The line of each of O1-O9, for the verdicts on a decomposition."""
+    given = list(verdicts)
+    for name, says in SAYS.items():
+        families = [family for family in FAMILIES if name in family.serves and proved_of(family, given)]
+        if not families:
+            status, by = OTHERWISE.get(name, ("unknown", "no verdict is on it"))
+            yield Standing(name, says, status, by + _listed(name, decomposition))
+            continue
+        found = overall(verdict for family in families for verdict in proved_of(family, given))
+        kinds = list(dict.fromkeys(family.kind.value for family in families))
+        by = ", ".join(family.title for family in families)
+        yield Standing(name, says, " and ".join(kinds) if found is Status.PROVED else found.value, by)
+
+
+def _listed(name: str, decomposition: Decomposition) -> str:
+    if name != "O4" or not (n := len(assumptions(decomposition))):
+        return ""
+    return f"; and {n} more, each of them listed" if n > 1 else "; and one more, which is listed"
