@@ -3,7 +3,8 @@
 The obligations of the decomposition are proved here; what exploring the net shows is handed in as the report of
 `firable.analysis.check`, because verdicts alone do not say of which net they are: those on a good net would let any
 other run. So the net that is bundled is the one in the report. What is demanded of both is what the executor will
-demand when it reads the bundle: both ask `unproved`, so that no bundle is made that could not run.
+demand when it reads the bundle: both ask `unproved`, so that no bundle is made that could not run. Which votes are
+persistent goes with them for information: nothing that runs rests on it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import replace
 from firable.analysis.report import CheckReport
 from firable.decompose.proofs.proving import TIMEOUT_MS, prove
 from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.persistence import persistence
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.right_to_run import unproved
@@ -37,7 +39,9 @@ def make_bundle(
         raise InputError([Diagnostic("F4003", message, "check the net with the discipline interleaving")])
     decomposition = split(report.net)
     proof = prove(decomposition, timeout_ms=timeout_ms)
-    bundle = Bundle(decomposition, (*report.verdicts, *proof.verdicts), {**(evidence or {}), **proof.files})
+    voted, shown = persistence(decomposition, report.space).with_evidence()
+    verdicts = (*report.verdicts, *proof.verdicts, *voted)
+    bundle = Bundle(decomposition, verdicts, {**(evidence or {}), **proof.files, **shown})
     if problems := unproved(bundle):
         raise InputError(replace(problem, code="F4003") for problem in problems)
     return bundle

@@ -6,9 +6,9 @@ judged, so that verdicts cannot be kept while a subnet is exchanged. What a bund
 verdicts but derived from the net (`right_to_run`).
 
 Reading rebuilds everything from its content, writes it again and compares: there is one spelling of a bundle, and a
-change of any byte is refused. That finds damage and edits by hand; it is no signature, since whoever can write a
-bundle can write its hashes. Pickle, or a folder of loose files, were rejected: the one runs code, the other is copied
-in part.
+change of any byte is refused. So is a `split.json`, what each controller must know, that does not follow from the rest.
+That finds damage and edits by hand; it is no signature, since whoever can write a bundle can write its hashes. Pickle,
+or a folder of loose files, were rejected: the one runs code, the other is copied in part.
 """
 
 from __future__ import annotations
@@ -29,12 +29,13 @@ from firable.nets.bundle_records import JudgedRecord, ManifestRecord, TableRecor
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.interchange import canonical_json, net_from_json, net_to_json
+from firable.nets.knowledge import split_to_json
 from firable.nets.net import Net
 from firable.nets.source import printable, read_bytes
 from firable.nets.verdict import Verdict
 from firable.nets.writing import write_whole
 
-VERSION: Final = 1
+VERSION: Final = 2
 SIZE_BYTES_MAX: Final = 256 * 1024 * 1024
 _HINT: Final = "make the bundle anew with `firable bundle`"
 
@@ -58,6 +59,7 @@ class Bundle:
         judged = {
             "net.json": canonical_json(net_to_json(self.net)),
             "table.json": canonical_json(table_to_json(self.decomposition)),
+            "split.json": canonical_json(split_to_json(self.decomposition)),
             **{
                 f"subnets/{file_stem(subnet.name)}.json": canonical_json(net_to_json(subnet))
                 for subnet in self.decomposition.subnets

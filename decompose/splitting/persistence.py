@@ -13,7 +13,7 @@ What a persistent part may leave out
 ------------------------------------
 Its yes may be as old as it likes *within its round*. To leave out the promise as well, that is to block nothing at its
 controller between yes and order, asks for more than persistence, because the promise (O1) protects two sides: the yes
-from the others, and the others from the order that comes late. `is_free_of_promise` says which parts may:
+from the others, and the others from the order that comes late. `Persistence.free_of_promise` are the parts that may:
 
 1. It is PROVED persistent, against every other transition of the central net: local or global, at whatever controller.
 2. By the arcs alone, it can take no yes back at its own controller: no other transition there takes from its inputs or
@@ -41,8 +41,7 @@ Rejected: the reference player over all markings, which is quick to write, has n
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Event
 from typing import Any, Final
@@ -62,10 +61,11 @@ from firable.analysis.settling import Settling
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.spaces.space import StateSpace, Witnesses
 from firable.analysis.spaces.symbolic import explore_symbolically
-from firable.decompose.splitting.votes import Vote, needs, votes
+from firable.decompose.splitting.votes import Vote, votes
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import Formula, Not
-from firable.nets.net import Net, Transition
+from firable.nets.knowledge import undisturbing
+from firable.nets.net import Net
 from firable.nets.queries import Query
 from firable.nets.temporal import ForAll, Globally
 from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
@@ -73,6 +73,8 @@ from firable.semantics.trace import Discipline
 
 PREFIX: Final = "persistent."
 SECONDS: Final = 20.0
+EVIDENCE: Final = "persistence.evidence.json"
+"""The file of a bundle that shows which votes are persistent."""
 _DIAGRAM_SHARE: Final = 0.4  # of the time, for all markings in a diagram
 _ARCS: Final = "arcs: no other transition can take it back"
 _UNITS: Final = "arcs and P-invariants with one token"
@@ -100,7 +102,7 @@ class Persistence:
 
     @property
     def free_of_promise(self) -> tuple[str, ...]:
-        """The parts that may leave out the promise, as this module's essay says."""
+        """The parts that may leave out the promise: persistent, and undisturbing, as this module's essay says."""
         persistent = (v.part for v, verdict in zip(self.votes, self.verdicts, strict=True) if verdict.holds)
         may = set(undisturbing(self.decomposition))
         return tuple(part for part in persistent if part in may)
@@ -119,6 +121,18 @@ class Persistence:
             if vote.accused and verdict.status is not Status.UNKNOWN
         )
         return Document(self.decomposition.net, Discipline.INTERLEAVING, tuple(shown))
+
+    def with_evidence(self, limits: Limits | None = None) -> tuple[tuple[Verdict, ...], Mapping[str, str]]:
+        """The verdicts, those that the document shows with its name, and the text of the document by its name."""
+        document = self.evidence(limits)
+        if not document.records:
+            return self.verdicts, {}
+        records = iter(document.records)
+        verdicts = []
+        for vote, verdict in zip(self.votes, self.verdicts, strict=True):
+            stands = vote.accused and verdict.status is not Status.UNKNOWN and next(records).shown
+            verdicts.append(replace(verdict, evidence=(EVIDENCE,)) if stands else verdict)
+        return tuple(verdicts), {EVIDENCE: document.to_text()}
 
 
 def persistence(
@@ -152,41 +166,6 @@ def nonpersistent(decomposition: Decomposition) -> dict[str, list[str]]:
         for vote, verdict in zip(found.votes, found.verdicts, strict=True)
         if not verdict.holds and vote.transition in table
     }
-
-
-def undisturbing(decomposition: Decomposition) -> tuple[str, ...]:
-    """The parts that, by the arcs alone, take no other yes back and ask for no gate that may close meanwhile.
-
-    These are the conditions 2 and 3 of this module's essay: what a checker derives anew. Linear in the arcs.
-    """
-    rows = {(part.controller, part.name) for row in decomposition.coordinated for part in row.parts}
-    return tuple(
-        transition.name
-        for subnet in decomposition.subnets
-        for keeps in [_keeping(subnet)]
-        for transition in subnet.transitions
-        if (subnet.name, transition.name) in rows and keeps(transition)
-    )
-
-
-def _keeping(subnet: Net) -> Callable[[Transition], bool]:
-    """Whether a part of the subnet keeps every other yes there, and its own gates."""
-    required = [needs(transition) for transition in subnet.transitions]
-    takers = Counter(place for full, _ in required for place in full)
-    putters = Counter(place for _, empty in required for place in empty)
-    senders: dict[str, set[str]] = {}
-    for place in subnet.places:
-        if place.completion is not None:
-            senders.setdefault(place.completion, set()).add(place.name)
-
-    def keeps(part: Transition) -> bool:
-        alone = all(takers[p] == 1 for p in part.inputs) and all(putters[p] == 1 for p in part.outputs)
-        inputs = set(part.inputs)
-        return alone and all(
-            gate.wanted and gate.signal in senders and senders[gate.signal] <= inputs for gate in part.external
-        )
-
-    return keeps
 
 
 def _share(deadline: Deadline, share: float) -> float:

@@ -10,17 +10,21 @@ from support.examples import examples
 from support.owned_nets import owned_nets
 from support.reference import load_net
 
+from firable.analysis.check import check
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.checking.checker import check_document
 from firable.analysis.evidence.document import document_from_text
 from firable.analysis.goal import Limits
+from firable.decompose.bundling import make_bundle
 from firable.decompose.splitting import persistence as module
 from firable.decompose.splitting.cut import split
-from firable.decompose.splitting.persistence import Persistence, persistence, undisturbing
+from firable.decompose.splitting.persistence import Persistence, persistence
 from firable.decompose.splitting.votes import FALSIFIERS_MAX, votes
+from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
+from firable.nets.knowledge import undisturbing
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 from firable.nets.verdict import Status
 from firable.semantics.algebra import BOOL
@@ -194,3 +198,16 @@ def test_part_whose_completion_another_command_clears_must_promise() -> None:
     places = (net.places[0], again, net.places[2])
     back = replace(net.transitions[1], external=(ExternalGate("a.done"),))
     assert undisturbing(split(crossing_net(places=places, transitions=(net.transitions[0], back)))) == ("t2-12",)
+
+
+def test_bundle_holds_the_verdicts_on_votes_with_a_document_that_shows_them() -> None:
+    bundle = make_bundle(check(catalogue_net("one_robot")))
+    verdicts = {verdict.name: verdict for verdict in bundle.verdicts if verdict.name.startswith("persistent.")}
+    assert len(verdicts) == 24
+    assert {name for name, verdict in verdicts.items() if verdict.evidence} == {
+        f"persistent.t1-{n}1" for n in (2, 3, 4, 5)
+    }
+    document = document_from_text(bundle.evidence["persistence.evidence.json"])
+    assert document.net == bundle.net
+    assert [one.shown for one in check_document(document)] == [True] * 4
+    assert Bundle.from_bytes(bundle.to_bytes()) == bundle

@@ -82,7 +82,7 @@ def test_any_zip_tool_opens_a_bundle() -> None:
     with zipfile.ZipFile(BytesIO(BUNDLE.to_bytes())) as archive:
         assert archive.testzip() is None
         assert archive.namelist() == [
-            *("evidence/eq7-G.smt2", "manifest.json", "net.json", "subnets/a.json", "subnets/b.json"),
+            *("evidence/eq7-G.smt2", "manifest.json", "net.json", "split.json", "subnets/a.json", "subnets/b.json"),
             *("table.json", "verdicts.json"),
         ]
         assert archive.read("evidence/eq7-G.smt2") == b"(check-sat)\n"
@@ -129,6 +129,15 @@ def test_added_and_missing_files_are_refused() -> None:
     assert refused(with_new_hashes({**members, "subnets/c.json": members["subnets/b.json"]}))
     for name in members:
         assert refused(pack({other: data for other, data in members.items() if other != name}))
+
+
+def test_what_a_controller_must_know_is_refused_where_it_does_not_follow_from_the_rest() -> None:
+    members = unpack(BUNDLE.to_bytes())
+    known = json.loads(members["split.json"])
+    known["controllers"][0]["votes"] = []
+    files = {**members, "split.json": canonical_json(known)}
+    assert refused(with_judged_hashes(files))
+    assert refused(with_new_hashes({name: data for name, data in members.items() if name != "split.json"}))
 
 
 @pytest.mark.parametrize("name", ["net.json", "subnets/b.json", "table.json"])
@@ -212,7 +221,7 @@ def test_our_own_fault_is_not_called_a_damaged_bundle(monkeypatch: pytest.Monkey
         Bundle.from_bytes(archive)
 
 
-@pytest.mark.parametrize("data", [b"", b"[]", b"{}", b"\xff", b"[" * 100_000, b"null", b'{"firable_bundle":2}'])
+@pytest.mark.parametrize("data", [b"", b"[]", b"{}", b"\xff", b"[" * 100_000, b"null", b'{"firable_bundle":1}'])
 def test_manifest_of_another_kind_is_refused(data: bytes) -> None:
     assert refused(pack({**unpack(BUNDLE.to_bytes()), "manifest.json": data}))
 

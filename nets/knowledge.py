@@ -1,0 +1,199 @@
+"""What follows from a split: why each transition is coordinated, and what each controller must know.
+
+Whoever takes over a controller asks: what do I hold, which transitions do I fire alone, for which do I vote, what do I
+lock for others that they only read, whom do I talk to? And whoever draws the line between controllers asks which
+transitions became global by it, and whether an arc, a gate or a conflict made them so; a gate that reaches over the
+line can often be moved, an arc cannot.
+
+All of it follows from the net, the subnets and the table, and is written into bundles nevertheless, as `split.json`, so
+that it can be read without this program. Reading a bundle derives it anew and compares, so it cannot say anything else.
+That is why it is total: where a table was edited so that it names what is not there, it says less, and raises nothing.
+Rejected: fields of their own in the table, which could contradict the rest of it.
+
+Cost: linear in the arcs and gates of the net.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any
+
+from firable.nets.decomposition import Decomposition
+from firable.nets.net import Net, Transition
+
+
+class Because(StrEnum):
+    """What makes the coordinator decide a transition."""
+
+    ARCS = "arcs"
+    """It moves tokens of several controllers."""
+    GATE = "gate"
+    """It moves tokens of one controller, and a gate reads a place or a signal of another one (O3)."""
+    CONFLICT = "conflict"
+    """It is local, and in the conflict component of a global one (O2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why the coordinator decides `transition`.
+
+    `gates` are the places and signals of other controllers that its gates read, where nothing else makes it global.
+    `rival` is what it conflicts with at `place`, and by which it is joined to a global one.
+    """
+
+    transition: str
+    because: Because
+    gates: tuple[str, ...] = ()
+    rival: str = ""
+    place: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Knowledge:
+    """What one controller must know.
+
+    `fires` are the transitions that it decides alone, `decides` its own arbitration groups; `votes` are its parts, each
+    with the transition. `locks` are its places that a gate of a global transition reads, each with the transition:
+    while it has promised, they stay as they are. `answers` are its signals in the same way, which it cannot lock (O4).
+    `undisturbing` are the parts that by the arcs take no other yes back and whose gates nothing here closes: one that
+    is persistent needs no promise (`firable.decompose.splitting.persistence`). It `talks_to` these and nobody else.
+    """
+
+    controller: str
+    places: tuple[str, ...]
+    signals: tuple[str, ...]
+    fires: tuple[str, ...]
+    decides: tuple[str, ...]
+    votes: tuple[tuple[str, str], ...]
+    locks: tuple[tuple[str, str], ...]
+    answers: tuple[tuple[str, str], ...]
+    undisturbing: tuple[str, ...]
+    talks_to: tuple[str, ...]
+
+
+COORDINATOR = "the coordinator"
+"""The name of the coordinator where none of the controllers is marked as it."""
+
+
+def reasons(decomposition: Decomposition) -> tuple[Reason, ...]:
+    """Why the coordinator decides each transition that it decides, in the order of the net."""
+    net = decomposition.net
+    joined = _joined(decomposition)
+    found = []
+    for row in decomposition.coordinated:
+        if row.name not in net.transition_index:
+            continue
+        if not row.is_global:
+            rival, place = joined.get(row.name, ("", ""))
+            found.append(Reason(row.name, Because.CONFLICT, rival=rival, place=place))
+            continue
+        transition = net.transition(row.name)
+        movers = {net.place(name).owner for name in (*transition.inputs, *transition.outputs)}
+        if len(movers) > 1:
+            found.append(Reason(row.name, Because.ARCS))
+            continue
+        read = [*transition.permissive, *transition.inhibitive]
+        gates = [name for name in read if net.place(name).owner not in movers]
+        gates += [gate.signal for gate in transition.external if net.signal(gate.signal).owner not in movers]
+        found.append(Reason(row.name, Because.GATE, tuple(dict.fromkeys(gates))))
+    return tuple(found)
+
+
+def knowledge(decomposition: Decomposition) -> tuple[Knowledge, ...]:
+    """What each controller must know, in the order of the subnets."""
+    coordinator = decomposition.net.coordinator
+    top = coordinator.name if coordinator else COORDINATOR
+    whole = {(part.controller, part.name): row for row in decomposition.coordinated for part in row.parts}
+    taking_part = {part.controller for row in decomposition.coordinated for part in row.parts}
+    everyone = tuple(subnet.name for subnet in decomposition.subnets if subnet.name in taking_part - {top})
+    groups: dict[str | None, list[str]] = {}
+    for group in decomposition.groups:
+        groups.setdefault(group.controller, []).append(group.name)
+    found = []
+    for subnet in decomposition.subnets:
+        rows = [(whole.get((subnet.name, t.name)), t) for t in subnet.transitions]
+        votes = [(row, part) for row, part in rows if row is not None]
+        keeps = _keeping(subnet)
+        others = everyone if subnet.name == top else (top,) if subnet.name in taking_part else ()
+        found.append(
+            Knowledge(
+                subnet.name,
+                tuple(place.name for place in subnet.places),
+                tuple(signal.name for signal in subnet.signals),
+                tuple(part.name for row, part in rows if row is None),
+                tuple(groups.get(subnet.name, ())),
+                tuple((row.name, part.name) for row, part in votes),
+                tuple(_read(votes, lambda t: (*t.permissive, *t.inhibitive))),
+                tuple(_read(votes, lambda t: tuple(gate.signal for gate in t.external))),
+                tuple(part.name for _, part in votes if keeps(part)),
+                others,
+            )
+        )
+    return tuple(found)
+
+
+def undisturbing(decomposition: Decomposition) -> tuple[str, ...]:
+    """The parts that, by the arcs alone, take no other yes back, and whose gates nothing at their controller closes."""
+    return tuple(part for one in knowledge(decomposition) for part in one.undisturbing)
+
+
+def split_to_json(decomposition: Decomposition) -> dict[str, Any]:
+    """The content of `split.json`."""
+    return {
+        "coordinated": [asdict(reason) for reason in reasons(decomposition)],
+        "controllers": [asdict(one) for one in knowledge(decomposition)],
+    }
+
+
+def _read(votes: Sequence[tuple[Any, Transition]], gates: Callable[[Transition], tuple[str, ...]]) -> Any:
+    """What the parts of global transitions read, each with the transition, in the order of what is read."""
+    found = [(name, row.name) for row, part in votes if row.is_global for name in dict.fromkeys(gates(part))]
+    return sorted(found)
+
+
+def _joined(decomposition: Decomposition) -> Mapping[str, tuple[str, str]]:
+    """Of the local transitions in the conflict component of a global one: what each is joined by, and the place.
+
+    Breadth first from the global ones, so the rival is one of the nearest to a global transition.
+    """
+    net = decomposition.net
+    is_global = {row.name for row in decomposition.coordinated if row.is_global}
+    seen = [t.name for t in net.transitions if t.name in is_global]
+    joined: dict[str, tuple[str, str]] = {}
+    reached: set[tuple[str, bool]] = set()
+    for name in seen:
+        transition = net.transition(name)
+        shared = [(place, False) for place in transition.inputs] + [(place, True) for place in transition.outputs]
+        for place, put in shared:
+            if (place, put) in reached:
+                continue
+            reached.add((place, put))
+            index = net.place_index[place]
+            for other in (net.producers if put else net.consumers)[index]:
+                rival = net.transitions[other].name
+                if rival not in is_global and rival not in joined:
+                    joined[rival] = (name, place)
+                    seen.append(rival)
+    return joined
+
+
+def _keeping(subnet: Net) -> Callable[[Transition], bool]:
+    """Whether a part of the subnet keeps every other yes there, and its own gates."""
+    takers = Counter(place for t in subnet.transitions for place in {*t.inputs, *t.permissive})
+    putters = Counter(place for t in subnet.transitions for place in {*t.outputs, *t.inhibitive})
+    senders: dict[str, set[str]] = {}
+    for place in subnet.places:
+        if place.completion is not None:
+            senders.setdefault(place.completion, set()).add(place.name)
+
+    def keeps(part: Transition) -> bool:
+        alone = all(takers[p] == 1 for p in part.inputs) and all(putters[p] == 1 for p in part.outputs)
+        inputs = set(part.inputs)
+        return alone and all(
+            gate.wanted and gate.signal in senders and senders[gate.signal] <= inputs for gate in part.external
+        )
+
+    return keeps
