@@ -8,9 +8,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from firable.analysis.methods import Method
 from firable.cli import text
+from firable.cli.loop import loop_report, machines_option, show_loop
 from firable.cli.options import analysis_options, answer_all, budget, format_option, load_net, write_folder
 from firable.cli.report import Report
 from firable.cli.structure import structure_json, structure_lines
@@ -88,6 +90,8 @@ _NAME_MAX = 100  # of a net, in the name of a file
 @click.option(
     "--query", "query_texts", metavar="QUERY", multiple=True, help="Answer a query, such as 'AG EF start'; repeatable."
 )
+@machines_option
+@click.option("--loop-net", "loop_file", metavar="FILE", help="Write the net that NET and its --machines are together.")
 @click.option(
     "--no-cache", is_flag=True, help="Decide anew what was decided before of the same net; see FIRABLE_CACHE."
 )
@@ -105,6 +109,8 @@ def check(
     structure: bool,
     query_file: str | None,
     query_texts: tuple[str, ...],
+    machines: str | None,
+    loop_file: str | None,
     no_cache: bool,
     progress: bool | None,
     verbose: bool,
@@ -117,11 +123,33 @@ def check(
     states, and queries in CTL, LTL and more (docs/queries.md). Each verdict is proved, violated (with a firing
     sequence, a shortest one where exploring found it) or unknown (with the bound reached); Ctrl-C ends the search and
     shows what is known so far.
+
+    With --machines the external gates are no longer free: they open as the machines of the plant allow. What differs
+    is shown side by side, and what a fault of each machine leads to.
     """
     allowed = budget(**limits)
+    if machines is not None:
+        _refuse_beside_machines()
+        closed = [partial(loop_report, net, machines, allowed, loop_file) for net in nets]
+        return answer_all("check", format_, closed, partial(show_loop, verbose=verbose))
+    if loop_file is not None:
+        raise click.UsageError("--loop-net goes with --machines")
     asked = _Asked(discipline, method, allowed, trace_dir, structure, not no_cache, query_file, query_texts, progress)
     makers = [partial(_report, net, asked, evidence_dir, many=len(nets) > 1) for net in nets]
     return answer_all("check", format_, makers, partial(_show, verbose=verbose))
+
+
+def _refuse_beside_machines() -> None:
+    """Refuse what is asked of a net and not of a loop: the loop is a net, once it is written."""
+    context = click.get_current_context()
+    alone = ("discipline", "method", "trace_dir", "evidence_dir", "structure", "query_file", "query_texts")
+    given = [name for name in alone if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+    if given:
+        option = {"query_texts": "query", "query_file": "queries", "evidence_dir": "evidence"}.get(given[0], given[0])
+        message = f"--{option.replace('_', '-')} does not go with --machines: write the loop by --loop-net FILE, "
+        raise click.UsageError(f"{message}and check that file")
+    if len(context.params["nets"]) > 1 and context.params["loop_file"] is not None:
+        raise click.UsageError("--loop-net holds one loop: name one NET")
 
 
 def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: bool) -> Report:

@@ -52,6 +52,7 @@ class Report:
     standing: Sequence[Standing] = ()
     files: Sequence[str] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
+    loop: Mapping[str, Any] = field(default_factory=dict)
     again: bool = False
 
     @property
@@ -79,7 +80,7 @@ class Report:
         }
         if self.table:
             data["table"] = [_row_to_json(row) for row in self.table]
-        for key in ("discipline", "course", "figures", "assumptions", "files", "run"):
+        for key in ("discipline", "course", "figures", "assumptions", "files", "run", "loop"):
             if value := getattr(self, key):
                 data[key] = list(value) if isinstance(value, tuple) else value
         if self.standing:

@@ -27,7 +27,7 @@ def _schema(kind: str) -> Any:
 
             return json_schema()
         case "plant":
-            from firable.executor.plant_file import PlantModel
+            from firable.nets.machines.plant_file import PlantModel
 
             return PlantModel.model_json_schema()
         case _:

@@ -17,9 +17,9 @@ imports `semantics` and `nets` and nothing that proves.
 from firable.executor.drivers import Driver
 from firable.executor.execution import Execution
 from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
-from firable.executor.plant_file import PlantModel, read_plant
 from firable.executor.running import Operator, RunReport, execute, load, run
 from firable.executor.situation import Blocked, Situation, State
+from firable.nets.machines.plant_file import PlantModel, read_plant
 
 __all__ = [
     "Blocked",

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 
-from firable.executor.plant_file import (
+from firable.nets.machines.plant_file import (
     Carry,
     Clamp,
     Grasp,
@@ -250,6 +250,7 @@ class Plant:
         if workpiece is None:
             return
         self.stations[station] = None
+        self._wake()
         self.delivered.append(workpiece)
         if not workpiece.processed and any(
             isinstance(action, Process)
@@ -308,11 +309,14 @@ class Plant:
                 machine.holding = self._taken(station, f"{name} grasps at {busy.parameters['at']}")
             case Put(when_full=when_full):
                 station = machine.model.positions[busy.parameters["at"]]
-                if when_full == "wait" and station is not None and self.stations[station] is not None:
+                if when_full == "wait" and self._full(station):
                     machine.busy = _Busy(busy.command, busy.parameters, busy.ticket, waits=True)
                     return
                 self._lay(name, machine, station)
-            case Carry(target=target):
+            case Carry(target=target, when_full=when_full):
+                if when_full == "wait" and self._full(target):
+                    machine.busy = _Busy(busy.command, busy.parameters, busy.ticket, waits=True)
+                    return
                 self._lay(name, machine, target)
             case Clamp(station=station):
                 self._lying(station, f"{name} clamps on {station}")
@@ -341,10 +345,17 @@ class Plant:
         self.stations[str(station)] = None
         if station == self.model.arrivals.station:
             self._arrive()
+        self._wake()
+        return workpiece
+
+    def _wake(self) -> None:
+        """Let each machine that waits for a station to become free look again."""
         for name, machine in self.machines.items():
             if machine.busy is not None and machine.busy.waits:
                 self._in(0.0, 0.0, _Finish(name, machine.busy))
-        return workpiece
+
+    def _full(self, station: str | None) -> bool:
+        return station is not None and self.stations[station] is not None
 
     def _lay(self, name: str, machine: _MachineNow, station: str | None) -> None:
         workpiece = machine.holding

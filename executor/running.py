@@ -21,7 +21,6 @@ from typing import Any
 from firable.executor.drivers import SimulatedDriver
 from firable.executor.execution import Execution
 from firable.executor.plant import Disturbance, Plant
-from firable.executor.plant_file import PlantModel, misfits
 from firable.executor.recorder import LineStream, Recorder, TraceFile
 from firable.executor.situation import Situation, State
 from firable.executor.virtual_time import run_in_virtual_time
@@ -29,6 +28,7 @@ from firable.nets.bundle import Bundle, read_bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
+from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.nets.net import Net
 from firable.nets.right_to_run import unproved
 

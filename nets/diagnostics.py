@@ -76,6 +76,7 @@ CODES: Final[dict[str, str]] = {
     "F3004": "the budget is used up",
     "F3005": "a completion signal awaited by two commands at once",
     "F3006": "a method that does not know the discipline",
+    "F3007": "a firing with too many outcomes",
     # F4: decomposition
     "F4001": "the net cannot be split",
     "F4002": "an obligation is refuted",

@@ -10,12 +10,16 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from firable.nets.catalogue.families import FAMILIES, family_net
 from firable.nets.net import Net
 from firable.nets.text import read_net
 
-__all__ = ["FAMILIES", "catalogue_names", "catalogue_net", "catalogue_path", "family_net"]
+if TYPE_CHECKING:
+    from firable.nets.machines.plant_file import PlantModel
+
+__all__ = ["FAMILIES", "catalogue_names", "catalogue_net", "catalogue_path", "catalogue_plant", "family_net"]
 
 _SUFFIX = ".firable.yaml"
 
@@ -45,6 +49,16 @@ def catalogue_net(name: str) -> Net:
     (28, 20)
     """
     return _cell(name) if name in catalogue_names() else family_net(name)
+
+
+def catalogue_plant(name: str) -> PlantModel:
+    """The machines of a cell of the catalogue; `KeyError` where there is no such cell or it has none."""
+    from firable.nets.machines.plant_file import read_plant
+
+    path = catalogue_path(name).with_name(f"{name}.plant.yaml")
+    if not path.exists():
+        raise KeyError(name)
+    return read_plant(path)
 
 
 @cache

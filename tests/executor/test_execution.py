@@ -18,7 +18,6 @@ from firable.executor.drivers import SimulatedDriver
 from firable.executor.execution import Execution
 from firable.executor.messages import ProtocolError
 from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
-from firable.executor.plant_file import PlantModel, parse_plant, read_plant
 from firable.executor.recorder import Recorder
 from firable.executor.running import Operator, RunReport, execute, load, run
 from firable.executor.situation import State, is_deadlock
@@ -27,6 +26,7 @@ from firable.nets.bundle import Bundle, write_bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
+from firable.nets.machines.plant_file import PlantModel, parse_plant, read_plant
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.right_to_run import required_verdicts
 from firable.nets.text import parse_net

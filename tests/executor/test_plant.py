@@ -14,9 +14,9 @@ from firable.executor.plant import (
     SensorChanged,
     StuckSensor,
 )
-from firable.executor.plant_file import PlantModel, misfits, parse_plant, read_plant
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
+from firable.nets.machines.plant_file import PlantModel, misfits, parse_plant, read_plant
 
 TEXT = """\
 firable_plant: 1

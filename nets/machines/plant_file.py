@@ -1,9 +1,16 @@
-"""The plant file, `*.plant.yaml`: the physical side of a cell, as the simulated cell plays it.
+"""The plant file, `*.plant.yaml`: the physical side of a cell, for its simulation and for the model of its machines.
 
 It says where workpieces can lie, which machines exist, what each command does to a workpiece and how long that takes,
 and what each sensor sees. It says nothing of places and transitions: commands and sensors are the whole border between
 a net and its cell, so a plant knows nothing that a real cell would not. Times are in seconds, and stand in keys that
 end in `_s`.
+
+One file serves both readers, because both must be told the same facts. `firable run` plays it with its times
+(`firable.executor.plant`); `firable check --machines` leaves the times out and keeps every order in which things can
+happen (`firable.nets.machines.closing`). Two keys speak to the second reader alone: `may_fail` of a command, and
+`may_flicker` and `may_linger` of a sensor; a simulated run is disturbed by its caller instead. The alternative, a file
+of machines beside the plant file, with "idle, busy, done" and the sensors that each command sets, says the same things
+a second time and cannot say why two machines collide.
 
 The file is read like a net file: bounded, without ambiguous YAML, each mistake with its line. All mistakes are F5003
 except those of YAML itself.
@@ -12,6 +19,7 @@ except those of YAML itself.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -45,9 +53,21 @@ class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, populate_by_name=False)
 
 
+class Failure(StrEnum):
+    """What comes after a command that a machine failed at: it is repaired and goes on, or stands still for good."""
+
+    REPAIRABLE = "repairable"
+    FOR_GOOD = "for_good"
+
+
+def _failure(value: object) -> object:
+    return Failure(value) if isinstance(value, str) and value in set(Failure) else value
+
+
 class _Timed(_Model):
     takes_s: Seconds
     jitter_s: Seconds = 0.0
+    may_fail: Annotated[Failure | None, BeforeValidator(_failure, json_schema_input_type=Failure | None)] = None
 
 
 class Move(_Timed):
@@ -73,11 +93,12 @@ class Put(_Timed):
 
 
 class Carry(_Timed):
-    """Carry the workpiece from one station to another."""
+    """Carry the workpiece from one station to another; on a full one it collides or waits, as one that is put does."""
 
     does: Literal["carry"]
     source: Name = Field(alias="from")
     target: Name = Field(alias="to")
+    when_full: Literal["collide", "wait"] = "collide"
 
 
 class Clamp(_Timed):
@@ -137,10 +158,16 @@ class Departures(_Model):
 
 
 class Sensor(_Model):
-    """What a sensor sees: a workpiece on a station, or one in the hand of a machine."""
+    """What a sensor sees: a workpiece on a station, or one in the hand of a machine.
+
+    One that may flicker can drop while the workpiece is there, and come back; one that may linger can stay for a while
+    when the workpiece has gone.
+    """
 
     occupied: Name | None = None
     holding: Name | None = None
+    may_flicker: bool = False
+    may_linger: bool = False
 
 
 class PlantModel(_Model):
@@ -184,7 +211,7 @@ def _problem(source: Source, tree: Node, path: tuple[Any, ...], message: str, hi
     steps = [step for i, step in enumerate(path) if not (i == 4 and path[0] == "machines" and path[2] == "commands")]
     key, node = list(nodes_along(tree, tuple(steps)))[-1]
     where = quoted(".".join(map(str, steps))) if steps else "the file"
-    hint = hint or "the format is described in firable/executor/plant_file.py and by the plants of the catalogue"
+    hint = hint or "the format is described in docs/machines.md and by the plants of the catalogue"
     return Diagnostic("F5003", f"{where}: {message}", hint, tuple(map(str, steps)), node_span(source, key or node))
 
 

@@ -1,0 +1,162 @@
+"""Questions to a closed loop, each a family of properties of its net.
+
+The loop is a `Net`, so what is asked of it is written as properties of that net, and every technique of `check` may
+answer: nothing here explores. One question (is each transition live?) is many properties (one for each transition); the
+verdict joins their answers and names what it is violated for. So a question costs no more than its formulas.
+
+A transition of the cell is several variants in the loop: `fires` says that one of them may. Formulas of the net file
+are put in these terms, where `start` is the cell's own M0, whatever the machines are at, and `deadlock` is that nothing
+moves any more, neither cell nor machines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any, Final, TypeVar
+
+from firable.analysis.check import check
+from firable.analysis.question import listed
+from firable.analysis.report import CheckReport
+from firable.analysis.spaces.reachability import Budget
+from firable.nets.formula import And, Firable, Formula, Holds, Not, Or, Start
+from firable.nets.machines.closing import ClosedLoop
+from firable.nets.machines.laws import ACCIDENT, OVERRUN
+from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
+from firable.nets.temporal import Fires, TemporalOr
+from firable.nets.verdict import Status, Verdict, Weight, Witness
+
+T = TypeVar("T")
+
+ENDED: Final = Or((Holds(ACCIDENT), Holds(OVERRUN)))
+"""The run has ended in an accident."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """One question: properties of the loop's net, by what each is about; all of them must hold.
+
+    `note` says of the marking where a violation ends what holds there; `{}` stands for what it is about.
+    """
+
+    name: str
+    statement: str
+    of: Mapping[str, Property | TemporalProperty]
+    weight: Weight = Weight.REQUIRED
+    hint: str = ""
+    note: str = ""
+
+
+def fires(loop: ClosedLoop, transition: str) -> Formula:
+    """A transition of the cell may fire: one of its variants may."""
+    return Or(tuple(map(Firable, loop.variants[transition])))
+
+
+def firable_in_cell(net: Net, transition: str) -> Formula:
+    """A transition is firable by Eq. (1), whatever its external gates."""
+    one = net.transition(transition)
+    full = (*one.inputs, *one.permissive)
+    bare = (*one.outputs, *one.inhibitive)
+    return And((*map(Holds, full), *(Not(Holds(name)) for name in bare)))
+
+
+def possible(name: str, formula: Formula) -> Property:
+    """From everywhere the formula can come to hold, unless the run ends in an accident."""
+    return Property(name, PropertyKind.ALWAYS_POSSIBLE, Or((formula, ENDED)))
+
+
+def never(name: str, formula: Formula) -> Property:
+    """The formula never holds."""
+    return Property(name, PropertyKind.NEVER, formula)
+
+
+def in_loop(loop: ClosedLoop, formula: T) -> T:
+    """A formula, state or temporal, of the cell as one of the loop."""
+
+    def put(part: Any) -> Any:
+        match part:
+            case Firable(transition):
+                return fires(loop, transition)
+            case Fires(transition):
+                return TemporalOr(tuple(map(Fires, loop.variants[transition])))
+            case Start():
+                places = loop.cell.places
+                return And(tuple(Holds(p.name) if p.marked else Not(Holds(p.name)) for p in places))
+            case tuple():
+                return tuple(map(put, part))
+        if is_dataclass(part) and not isinstance(part, type):
+            return replace(part, **{one.name: put(getattr(part, one.name)) for one in fields(part)})
+        return part
+
+    result: T = put(formula)
+    return result
+
+
+def answers(
+    loop: ClosedLoop, families: Sequence[Family], budget: Budget | None = None
+) -> tuple[tuple[Verdict, ...], CheckReport]:
+    """The verdict on each family, and the report of `check` on the net with all their properties."""
+    properties = tuple(prop for family in families for prop in family.of.values())
+    report = check(replace(loop.net, properties=properties), budget=budget)
+    found = {verdict.name.removeprefix("property."): verdict for verdict in report.verdicts}
+    joined = (_joined(loop, family, {of: found[p.name] for of, p in family.of.items()}) for family in families)
+    return tuple(joined), report
+
+
+def _joined(loop: ClosedLoop, family: Family, found: Mapping[str, Verdict]) -> Verdict:
+    """All properties of a family as one verdict, with the evidence of the first that is violated or unknown."""
+    for status in (Status.VIOLATED, Status.UNKNOWN):
+        about = tuple(of for of, verdict in found.items() if verdict.status is status)
+        if about:
+            first = found[about[0]]
+            return replace(
+                first,
+                name=family.name,
+                statement=family.statement,
+                weight=family.weight,
+                subjects=tuple(one for one in about if one),
+                hint=(family.hint or first.hint) if status is Status.VIOLATED else first.hint,
+                witness=first.witness and replace(first.witness, note=_note(loop, family, about[0], first.witness)),
+            )
+    some = next(iter(found.values()), None)
+    if some is None:
+        nothing = "there is nothing of the kind"
+        return Verdict(family.name, Status.PROVED, family.statement, nothing, family.weight, discipline="interleaving")
+    witness = some.witness and replace(some.witness, note="")
+    return replace(
+        some,
+        name=family.name,
+        statement=family.statement,
+        weight=family.weight,
+        subjects=(),
+        hint="",
+        witness=witness,
+    )
+
+
+def _note(loop: ClosedLoop, family: Family, about: str, witness: Witness) -> str:
+    """What has happened where a violation ends, in the words of the cell."""
+    last = witness.firings[-1][0] if witness.firings else ""
+    if last in loop.accidents:
+        return loop.accidents[last]
+    return ": ".join(filter(None, (family.note.format(about), waiting(loop, witness.marking))))
+
+
+def waiting(loop: ClosedLoop, marking: Sequence[str]) -> str:
+    """What the cell waits for in a marking of the loop, and what its machines are at, as a sentence."""
+    held = set(marking)
+    gates = []
+    for transition in loop.cell.transitions:
+        ready = set(transition.inputs) | set(transition.permissive) <= held
+        if not ready or held & ({*transition.outputs} | {*transition.inhibitive}):
+            continue
+        closed = [
+            gate.signal + ("" if gate.wanted else " to drop")
+            for gate in transition.external
+            if ((loop.shown[gate.signal][0] in held) == loop.shown[gate.signal][1]) != gate.wanted
+        ]
+        if closed:
+            gates.append(f"{transition.name} waits for {listed(closed)}")
+    at_work = [loop.net.place(at).description for at in loop.at.values() if at in held]
+    failed = [loop.net.place(name).description for name in loop.failed.values() if name in held]
+    return "; ".join(dict.fromkeys((*gates, *failed, *at_work)))

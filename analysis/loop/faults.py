@@ -1,0 +1,115 @@
+"""What a fault of each machine leads to: which transitions stand still, which places hang, and whether repair helps.
+
+A machine that fails takes a command and never finishes it. What may fail is said in the plant file (`may_fail`). One
+machine fails at a time; two at once are not asked about. Two loops are.
+
+*For good*: the fault is never repaired. No accident may follow from it, whatever the rest of the cell goes on to do:
+this must hold, and makes the fault *safe*. Which transitions can then come to stand still, and which places can hold
+their token for ever, is information: a cell does not go on without its robot, but its conveyors may.
+
+*Repaired*: a repairable fault ends at some time and the machine goes on with its command. From everywhere every
+transition that is live without faults must be able to fire again: the cell *recovers*. Nothing is said of how long it
+takes, nor of a machine that forgets its command: that is another plant, in which the command fails for good.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from firable.analysis.loop.families import Family, answers, fires, never, possible
+from firable.analysis.loop.verdicts import LoopReport
+from firable.analysis.question import listed
+from firable.analysis.spaces.reachability import Budget
+from firable.nets.formula import Formula, Holds, Not, Or
+from firable.nets.machines.closing import ClosedLoop, Faults, close
+from firable.nets.machines.laws import ACCIDENT, OVERRUN
+from firable.nets.machines.plant_file import PlantModel
+from firable.nets.net import Property
+from firable.nets.verdict import Status, Verdict, Weight
+
+
+def check_faults(report: LoopReport, model: PlantModel, budget: Budget | None = None) -> tuple[Verdict, ...]:
+    """The verdicts on the faults that the plant file declares, none where it declares none.
+
+    `report` is that of the loop without faults. Cost: two more explorations, of loops with a place more for each
+    machine that can fail, and a backward closure for each such machine with each transition and each place.
+    """
+    net = report.loop.cell
+    for_good, repaired = close(net, model, Faults.FOR_GOOD), close(net, model, Faults.REPAIRED)
+    found: list[Verdict] = []
+    if for_good.failed:
+        live = _live(report)
+        found += _for_good(for_good, live, budget)
+        # Of a cell in which nothing is live, a fault takes nothing, and repair cannot give it back.
+        if repaired.failed and live:
+            families = [_recovery(repaired, machine, live) for machine in repaired.failed]
+            found += answers(repaired, families, budget)[0]
+    return tuple(found)
+
+
+def _live(report: LoopReport) -> tuple[str, ...]:
+    """The transitions that are live without faults: of the others a fault takes nothing."""
+    verdict = report.verdict("loop.live")
+    if verdict.status is Status.UNKNOWN:
+        return tuple(report.loop.variants)
+    return tuple(name for name in report.loop.variants if name not in verdict.subjects)
+
+
+def _for_good(loop: ClosedLoop, live: tuple[str, ...], budget: Budget | None) -> Iterator[Verdict]:
+    accidents = Family(
+        "fault.safe",
+        "no accident follows when a machine fails and is not repaired",
+        {"": never("fault.accident", Or((Holds(ACCIDENT), Holds(OVERRUN))))},
+        hint="a fault must stop what depends on the machine: gate it by a completion, not by a time",
+    )
+    families = [accidents]
+    for machine, failed in loop.failed.items() if live else ():
+        families.append(
+            Family(
+                f"fault.{machine}",
+                f"when {machine} has failed for good, every transition can still fire again",
+                {name: _goes_on(f"fault.{machine}.t{i}", failed, fires(loop, name)) for i, name in enumerate(live)},
+                Weight.INFORMATION,
+                note=f"{machine} has failed, and {{}} can never fire again",
+            )
+        )
+        places = [place.name for place in loop.cell.places]
+        families.append(
+            Family(
+                f"fault.{machine}.places",
+                f"when {machine} has failed for good, every place can still lose its token",
+                {name: _goes_on(f"fault.{machine}.p{i}", failed, Not(Holds(name))) for i, name in enumerate(places)},
+                Weight.INFORMATION,
+            )
+        )
+    verdicts = answers(loop, families, budget)[0]
+    yield verdicts[0]
+    for still, hang in zip(verdicts[1::2], verdicts[2::2], strict=True):
+        yield _consequence(still, hang, live)
+
+
+def _goes_on(name: str, failed: str, formula: Formula) -> Property:
+    return possible(name, Or((Not(Holds(failed)), formula)))
+
+
+def _consequence(still: Verdict, hang: Verdict, live: tuple[str, ...]) -> Verdict:
+    """What stands still and what hangs after one fault, as one verdict."""
+    if still.status is not Status.VIOLATED:
+        return still
+    rest = [name for name in live if name not in still.subjects]
+    goes_on = f"these go on whatever fails at it: {listed(rest, 40)}" if rest else "in the end all stand still"
+    held = f"; these can hold their token for ever: {listed(hang.subjects, 40)}" if hang.subjects else ""
+    return replace(still, hint=f"{goes_on}{held}")
+
+
+def _recovery(loop: ClosedLoop, machine: str, live: tuple[str, ...]) -> Family:
+    failed = loop.failed[machine]
+    mended = {name: possible(f"repair.{machine}.{i}", fires(loop, name)) for i, name in enumerate(live)}
+    return Family(
+        f"fault.{machine}.repaired",
+        f"after {machine} was repaired and goes on, every transition can fire again",
+        {**mended, "": possible(f"repair.{machine}", Not(Holds(failed)))},
+        hint="something was lost while the machine stood still: see what the cell waits for at the end",
+        note="from here {} can never fire again",
+    )

@@ -1,0 +1,108 @@
+"""`firable check NET --machines PLANT`: the verdicts on a cell with its machines, beside those with gates free.
+
+The loop that is asked can be written as a net file: whatever else is to be known of it (queries, evidence, a replay,
+the words of another technique) is then asked by the commands for nets, and no option has to be given twice.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from firable.cli import text
+from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_text
+from firable.cli.report import Report
+
+if TYPE_CHECKING:
+    from firable.analysis.loop.verdicts import Difference
+    from firable.analysis.spaces.reachability import Budget
+    from firable.nets.machines.plant_file import PlantModel
+
+machines_option = click.option(
+    "--machines",
+    metavar="PLANT",
+    help="Close the loop with the machines of a plant file, or of catalogue:NAME; see docs/machines.md.",
+)
+
+
+def read_machines(argument: str) -> PlantModel:
+    """The plant that an argument names: a plant file, or `catalogue:NAME`; raises `InputError` as its reader does."""
+    from firable.nets.machines.plant_file import read_plant
+
+    if not argument.startswith(CATALOGUE):
+        return read_plant(argument)
+    path = catalogue_file(argument, "plant")
+    if not path.exists():
+        raise click.UsageError(f"'{argument}' is a net without machines")
+    return read_plant(path)
+
+
+def loop_report(argument: str, machines: str, allowed: Budget, loop_file: str | None) -> Report:
+    """The report on one net with its machines."""
+    from firable.analysis.loop.faults import check_faults
+    from firable.analysis.loop.verdicts import check_loop
+    from firable.nets.printing import format_net
+
+    loaded, model = load_net(argument), read_machines(machines)
+    with loaded.placing():
+        report = check_loop(loaded.net, model, allowed)
+    faults = check_faults(report, model, allowed)
+    files: tuple[str, ...] = ()
+    if loop_file is not None:
+        write_text(loop_file, format_net(report.loop.net))
+        files = (loop_file,)
+    figures = report.closed.figures
+    return Report(
+        "check",
+        argument,
+        report.loop.net,
+        (*report.verdicts, *faults),
+        discipline="interleaving",
+        notes=loaded.notes,
+        files=files,
+        loop={
+            "machines": machines,
+            "markings": figures.markings,
+            "edges": figures.edges,
+            "complete": figures.complete,
+            "places": len(report.loop.net.places),
+            "transitions": len(report.loop.net.transitions),
+            "markings_gates_free": report.opened.figures.markings,
+            "comparison": [_compared(one) for one in report.differences],
+        },
+    )
+
+
+def _compared(one: Difference) -> dict[str, str]:
+    data = {"question": one.question, "gates_free": str(one.gates_free), "with_machines": str(one.with_machines)}
+    return data | ({"remark": one.remark} if one.remark else {})
+
+
+def show_loop(report: Report, *, verbose: bool) -> None:
+    """Print the report on a net with its machines."""
+    for note in report.notes:
+        text.show_diagnostic(note)
+    loop = report.loop
+    click.echo(f"{click.style(report.net.name, bold=True)}  {click.style(report.input, dim=True)}")
+    click.echo(f"  with its machines: {loop['machines']}")
+    counts = [(loop["places"], "place"), (loop["transitions"], "transition"), (loop["markings"], "marking")]
+    edges = "edges not counted" if loop["edges"] is None else text.counted(loop["edges"], "edge")
+    whole = "" if loop["complete"] else " so far"
+    click.echo(f"  the loop has {', '.join(text.counted(n, word) for n, word in counts)} and {edges}{whole}")
+    click.echo(f"  {text.counted(loop['markings_gates_free'], 'marking')} with gates free")
+    rows = loop["comparison"]
+    width = max((len(row["question"]) for row in rows), default=12)
+    click.echo(f"\n{click.style('side by side', bold=True)}{' ' * (width - 6)}gates free  with its machines")
+    for row in rows:
+        differs = row["gates_free"] != row["with_machines"]
+        line = f"  {row['question']:<{width}}    {row['gates_free']:<10}  {row['with_machines']:<10}"
+        click.echo(click.style(line.rstrip(), fg="yellow" if differs else None))
+        if "remark" in row:
+            click.echo(f"      {row['remark']}")
+    text.show_verdicts(report.net, report.verdicts, verbose=verbose)
+    text.show_summary(report)
+    for file in report.files:
+        if file != "-":
+            click.echo(f"  the loop as a net file: {Path(file)}")

@@ -1,0 +1,133 @@
+"""Whether the machines keep what a proof assumes of them (O4): gates that stay open from the vote to the firing.
+
+A part votes yes when it is firable and its gates are open. Its promise holds the places; whether a gate stays open is
+the machines' matter. In the closed loop this is a question about single firings: is there a reachable marking in which
+the part could have voted, its places as it found them and the gate open, and a firing that closes the gate? A firing
+counts that may come between vote and decision: each move of a machine, a workpiece or a sensor, and each transition of
+the cell but those that the promise excludes (O1) and the voted transition itself. If there is none, then a gate that
+was open at the vote is open when the transition fires, by induction over the firings between; so the assumption is
+proved, for these machines. If there is one, the run to it is shown, with the firing that closes the gate at its end.
+
+Gates of completions are asked as well, all in one verdict: that a completion is cleared only by sending its command,
+which the promise excludes, is what the list of assumptions leaves out by reasoning, and here it is confirmed.
+
+Rejected: to ask whether the gate can close before the whole transition fires. Votes are taken one by one, so the gate
+is needed from the moment its own part is firable, and the others may take long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from firable.analysis.loop.families import ENDED, Family, answers, never
+from firable.analysis.spaces.reachability import Budget
+from firable.decompose.proofs.assumptions import Assumption, assumptions
+from firable.nets.decomposition import Coordinated, Decomposition
+from firable.nets.formula import And, Firable, Formula, Holds, Not, Or
+from firable.nets.machines.closing import ClosedLoop, close
+from firable.nets.machines.plant_file import PlantModel
+from firable.nets.net import SignalKind, Transition
+from firable.nets.verdict import Status, Verdict, Witness
+from firable.semantics.player import Player
+
+COMPLETIONS = "o4.completions"
+_HINT = "put the interlock into the machine's own controller, or make the signal one that a command clears"
+
+
+def name_of(assumption: Assumption) -> str:
+    """The name of the verdict on an assumption."""
+    return f"o4.{assumption.transition}.{assumption.signal}"
+
+
+def persistence(decomposition: Decomposition, model: PlantModel, budget: Budget | None = None) -> tuple[Verdict, ...]:
+    """The verdict on each assumption O4 with the machines of a plant, and one on the gates of completions.
+
+    Raises `InputError` as `close` does.
+    """
+    loop = close(decomposition.net, model)
+    rows = {row.name: row for row in decomposition.table}
+    families = []
+    for one in assumptions(decomposition):
+        asked = never(name_of(one), _closed_after_vote(loop, decomposition, rows[one.transition], one))
+        families.append(Family(name_of(one), str(one), {one.signal: asked}, hint=_HINT))
+    completions = [
+        Assumption(row.name, gate.signal, gate.wanted)
+        for row in decomposition.table
+        for gate in decomposition.net.transition(row.name).external
+        if gate.wanted and decomposition.net.signal(gate.signal).kind is SignalKind.COMPLETION
+    ]
+    families.append(
+        Family(
+            COMPLETIONS,
+            "a completion that a global transition waits for stays from the vote until it fires",
+            {
+                f"{one.signal} for {one.transition}": never(
+                    f"o4.completion.{i}", _closed_after_vote(loop, decomposition, rows[one.transition], one)
+                )
+                for i, one in enumerate(completions)
+            },
+            hint=_HINT,
+        )
+    )
+    verdicts = answers(loop, families, budget)[0]
+    every = [(one,) for one in assumptions(decomposition)] + [tuple(completions)]
+    return tuple(_shown(loop, decomposition, verdict, ones) for verdict, ones in zip(verdicts, every, strict=True))
+
+
+def _part(decomposition: Decomposition, row: Coordinated, controller: str | None) -> Transition:
+    for part in row.parts:
+        if part.controller == controller:
+            return decomposition.subnet(part.controller).transition(part.name)
+    raise ValueError(f"'{row.name}' has no part at '{controller}', which owns one of its signals")
+
+
+def _vote(loop: ClosedLoop, part: Transition, one: Assumption) -> Formula:
+    """The part is firable and the gate is open, as its owner found them."""
+    place, means = loop.shown[one.signal]
+    open_ = Holds(place) if means == one.wanted else Not(Holds(place))
+    full = map(Holds, (*part.inputs, *part.permissive))
+    bare = (Not(Holds(name)) for name in (*part.outputs, *part.inhibitive))
+    return And((*full, *bare, open_, Not(ENDED)))
+
+
+def _closing(loop: ClosedLoop, part: Transition, one: Assumption) -> Iterator[str]:
+    """The firings that close the gate and may come between the vote and the firing."""
+    place, means = loop.shown[one.signal]
+    written = {*part.inputs, *part.outputs}
+    read = written | {*part.permissive, *part.inhibitive}
+    excluded = set(loop.variants[one.transition])
+    for transition in loop.cell.transitions:
+        writes = {*transition.inputs, *transition.outputs}
+        reads = writes | {*transition.permissive, *transition.inhibitive}
+        if writes & read or reads & written:
+            excluded |= set(loop.variants[transition.name])
+    for transition in loop.net.transitions:
+        changed = transition.inputs if means == one.wanted else transition.outputs
+        if place in changed and transition.name not in excluded:
+            yield transition.name
+
+
+def _closed_after_vote(loop: ClosedLoop, decomposition: Decomposition, row: Coordinated, one: Assumption) -> Formula:
+    part = _part(decomposition, row, decomposition.net.signal(one.signal).owner)
+    return And((_vote(loop, part, one), Or(tuple(map(Firable, _closing(loop, part, one))))))
+
+
+def _shown(loop: ClosedLoop, decomposition: Decomposition, verdict: Verdict, ones: tuple[Assumption, ...]) -> Verdict:
+    """The verdict with the run led on by the firing that closes the gate."""
+    if verdict.status is not Status.VIOLATED or verdict.witness is None:
+        return replace(verdict, subjects=())
+    rows = {row.name: row for row in decomposition.table}
+    player, marking = Player(loop.net), loop.net.marking(verdict.witness.marking)
+    may_fire = {loop.net.transitions[t].name: t for t in player.firable(marking)}
+    for one in ones:
+        if len(ones) > 1 and f"{one.signal} for {one.transition}" not in verdict.subjects[:1]:
+            continue
+        part = _part(decomposition, rows[one.transition], decomposition.net.signal(one.signal).owner)
+        for name in _closing(loop, part, one):
+            if name in may_fire:
+                after = player.fire(marking, [may_fire[name]])
+                note = f"'{part.name}' had voted yes, and the last firing makes '{one.signal}' {int(not one.wanted)}"
+                firings = (*verdict.witness.firings, (name,))
+                return replace(verdict, witness=Witness(firings, marking=loop.net.names(after), note=note))
+    raise RuntimeError(f"the run of '{verdict.name}' ends where nothing closes the gate")

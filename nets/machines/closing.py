@@ -1,0 +1,372 @@
+"""Closing the loop: a cell's net and its machines as one extended net without external gates.
+
+With gates free, a verdict says what the cell does if every gate opens at some time; a real cell may never open one.
+Here the machines of the plant file become places and transitions beside those of the cell, each signal becomes a place,
+and each external gate an internal gate on it. The result is a `Net` like any other, so every technique of `check`
+decides it, and its firing rule is the one there is.
+
+- *A command is sent* in the firing by which its place is entered: the same firing clears its completion bit and tells
+  the machine (SEMANTICS, "Output signal", "Completion gates"). What it does depends on the plant (the bit was 0 or 1, a
+  stopped machine was idle or busy), and a firing is one transition, so a transition of the cell becomes several
+  *variants*, of which at most one is firable. `variants` maps each back to the cell's own transition.
+- *A machine moves*: a command is done, a workpiece comes or goes, a sensor that is not exact drops.
+- *An accident* ends the run: the executor stops every machine where it is. Nothing fires afterwards.
+
+A variant has exactly the arcs and internal gates of its transition among the places of the cell, and a move of a
+machine has none there. So each run of the loop, without the moves, is a run of the open net: what never happens with
+gates free never happens here. The converse fails, which is the point. An arbiter is left out, as from every verdict on
+what can happen.
+
+A sensor that is exact is no place: it is true iff its station is not empty. One that may flicker or linger is a bit of
+its own. A failure is a place for each machine: while it is marked nothing that the machine is at gets done.
+
+Rejected: a place for each command on its way to the machine, which the machine then takes. That needs no variants, but
+a second command could overtake the first, which no driver allows, and markings show commands that are neither sent nor
+begun.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import chain
+from types import MappingProxyType
+from typing import Final
+
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.machines.laws import ACCIDENT, OVERRUN, PLANT, Laws, fact
+from firable.nets.machines.moment import NOTHING, Case, Literal, Moment, each
+from firable.nets.machines.plant_file import Failure, PlantModel, Stop, misfits
+from firable.nets.net import Controller, Net, Place, SignalKind, Transition
+
+VARIANTS_MAX: Final = 4096
+"""How many variants one transition may have; it doubles with each completion that it clears."""
+
+
+class Faults(StrEnum):
+    """Which commands may fail: none, those that are repaired and then go on, or all that may, for good."""
+
+    NONE = "none"
+    REPAIRED = "repaired"
+    FOR_GOOD = "for good"
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """The net of a cell with its machines, and what its names mean.
+
+    `variants` holds, for each transition of the cell, its transitions in the loop; `accidents` those transitions after
+    which nothing fires; `shown` for each signal the place that shows it, and whether a token there means 1; `at` for
+    each place with a command the place that says that the machine is at it; `failed` the place of each machine that
+    can fail; `acknowledged`, for a completion that waits for its sensor, the place that says so.
+    """
+
+    cell: Net
+    net: Net
+    variants: Mapping[str, tuple[str, ...]]
+    accidents: Mapping[str, str]
+    shown: Mapping[str, Literal]
+    at: Mapping[str, str]
+    failed: Mapping[str, str]
+    acknowledged: Mapping[str, str]
+
+    def of_the_cell(self, firings: Iterable[Iterable[str]]) -> tuple[tuple[str, ...], ...]:
+        """A firing sequence of the loop as one of the cell: the names of its transitions, without the machines."""
+        own = {variant: name for name, variants in self.variants.items() for variant in variants}
+        kept = (tuple(own[name] for name in fired if name in own) for fired in firings)
+        return tuple(fired for fired in kept if fired)
+
+
+def close(net: Net, model: PlantModel, faults: Faults = Faults.NONE) -> ClosedLoop:
+    """The loop of a net with the machines of a plant.
+
+    Raises `InputError`: F5003 where the plant does not fit the net, F3007 where one firing sends more than the loop can
+    tell apart, F2001 where a name of the net is taken by the plant.
+
+    >>> from firable.nets.catalogue import catalogue_net, catalogue_plant
+    >>> loop = close(catalogue_net("one_robot"), catalogue_plant("one_robot"))
+    >>> loop.variants["t1-a"][:2], loop.net.transition("t1-a").permissive, len(loop.net.signals)
+    (('t1-a', 't1-a/clears-robot.touch'), ('robot.at_cv1', 'plant.R.hand_at.CV1', 'plant.R.holds_nothing'), 0)
+    """
+    if problems := misfits(model, net):
+        raise InputError(problems)
+    return _Closing(net, model, faults).loop()
+
+
+class _Closing:
+    """One net and one plant on their way to a loop."""
+
+    def __init__(self, net: Net, model: PlantModel, faults: Faults) -> None:
+        self.net, self.model, self.laws = net, model, Laws(model, net)
+        self.accidents: dict[str, str] = {}
+        completions = [signal.name for signal in net.signals if signal.kind is SignalKind.COMPLETION]
+        self.sharing = {name: sum(place.completion == name for place in net.places) > 1 for name in completions}
+        self.inexact = [name for name, sensor in model.sensors.items() if sensor.may_flicker or sensor.may_linger]
+        self.acknowledged = {name: f"{PLANT}.{name}.acknowledged" for name in completions if name in model.sensors}
+        self.shown = {
+            signal.name: (signal.name, True) if signal.name in self.sharing else self.sensor(signal.name)
+            for signal in net.signals
+        }
+        self.failing = self.may_fail(faults)
+        self.repaired = faults is Faults.REPAIRED
+        self.failed = {name: f"{PLANT}.{name}.failed" for name in model.machines if name in self.failing.values()}
+
+    def may_fail(self, faults: Faults) -> dict[str, str]:
+        """The places whose command may fail, each with its machine."""
+        found = {}
+        for place in self.laws.commanding:
+            name, action = self.laws.machine(place)[0], self.laws.action(place)
+            failure = None if isinstance(action, Stop) else action.may_fail
+            if failure is not None and (
+                faults is Faults.FOR_GOOD or (faults is Faults.REPAIRED and failure is Failure.REPAIRABLE)
+            ):
+                found[place.name] = name
+        return found
+
+    def loop(self) -> ClosedLoop:
+        variants = {transition.name: tuple(self.of_cell(transition)) for transition in self.net.transitions}
+        for transition in self.net.transitions:
+            _assert_projects(self.net, transition, variants[transition.name])
+        moves = tuple(self.moves())
+        _assert_apart(self.net, moves)
+        net = Net(
+            self.net.name,
+            (*(replace(place, completion=None) for place in self.net.places), *self.places()),
+            (*chain.from_iterable(variants.values()), *moves),
+            controllers=(*self.net.controllers, Controller(PLANT, description="Machines and workpieces")),
+            description=f"{self.net.description} (with its machines)",
+        )
+        return ClosedLoop(
+            self.net,
+            net,
+            MappingProxyType({name: tuple(one.name for one in some) for name, some in variants.items()}),
+            MappingProxyType(self.accidents),
+            MappingProxyType(self.shown),
+            MappingProxyType(
+                {place.name: self.laws.busy(place) for place in self.laws.commanding if self.moving(place)}
+            ),
+            MappingProxyType(self.failed),
+            MappingProxyType(self.acknowledged),
+        )
+
+    def moving(self, place: Place) -> bool:
+        return not isinstance(self.laws.action(place), Stop)
+
+    def places(self) -> Iterator[Place]:
+        """The signals, and the places of the plant."""
+        for signal in self.net.signals:
+            if signal.kind is SignalKind.COMPLETION:
+                yield Place(signal.name, signal.owner, description="completion")
+        for name in self.inexact:
+            yield self.bit(name)
+        for name, acknowledged in self.acknowledged.items():
+            yield fact(acknowledged, f"the command of {name} is acknowledged, and its sensor does not show it yet")
+        yield from self.laws.places()
+        for name, failed in self.failed.items():
+            yield fact(failed, f"{name} has failed")
+
+    def bit(self, sensor: str) -> Place:
+        """The place of a sensor that is not exact, under the name of its signal where that is no completion."""
+        if sensor in self.acknowledged:
+            return fact(f"{PLANT}.{sensor}.sensor", f"the sensor of {sensor}")
+        return Place(sensor, self.net.signal(sensor).owner, description="sensor")
+
+    def sensor(self, name: str) -> Literal:
+        """The place that shows a sensor, and whether a token means 1."""
+        if name in self.inexact:
+            return self.bit(name).name, True
+        return (self.reality(name), False) if name in self.model.sensors else (name, True)
+
+    def reality(self, sensor: str) -> str:
+        """The place that holds a token iff there is nothing for the sensor to see."""
+        sees = self.model.sensors[sensor]
+        return self.laws.empty(str(sees.occupied or sees.holding))
+
+    # --- The cell
+
+    def of_cell(self, transition: Transition) -> Iterator[Transition]:
+        """The variants of a transition of the cell."""
+        gates = [(self.shown[gate.signal], gate.wanted) for gate in transition.external]
+        own = Case(
+            (
+                (ACCIDENT, False),
+                (OVERRUN, False),
+                *((name, True) for name in transition.inputs),
+                *((name, False) for name in transition.outputs),
+                *((name, True) for name in transition.permissive),
+                *((name, False) for name in transition.inhibitive),
+                *((place, means == wanted) for (place, means), wanted in gates),
+            ),
+            (*((name, False) for name in transition.inputs), *((name, True) for name in transition.outputs)),
+        )
+        moments, ended = each([NOTHING], [own]), list[Moment]()
+        for name in transition.outputs:
+            place = self.net.place(name)
+            if place.command is None:
+                continue
+            moments = each(moments, self.cleared(place))
+            ended += each(moments, self.laws.refused(place))
+            moments = each(moments, self.laws.sent(place))
+            if len(moments) + len(ended) > VARIANTS_MAX:
+                raise _too_many(transition)
+        for moment in chain.from_iterable(map(self.seen, moments)):
+            yield moment.transition("/".join((transition.name, *moment.tags)), _told(transition, moment))
+        for moment in ended:
+            yield self.accident("/".join((transition.name, *moment.tags)), _told(transition, moment), moment)
+
+    def cleared(self, place: Place) -> Iterator[Case]:
+        """Sending a command clears the completion that it will set."""
+        signal = place.completion
+        if signal is None:
+            yield Case()
+            return
+        waiting = self.acknowledged.get(signal)
+        idle = () if waiting is None else ((waiting, False),)
+        yield Case(((signal, False), *idle))
+        yield Case(((signal, True), *idle), ((signal, False),), f"clears-{signal}", f"clears {signal}")
+        if waiting is not None:
+            yield Case(
+                ((signal, False), (waiting, True)), ((waiting, False),), f"forgets-{signal}", f"forgets {signal}"
+            )
+
+    def accident(self, name: str, description: str, moment: Moment) -> Transition:
+        self.accidents[name] = moment.says[-1]
+        return moment.transition(name, description)
+
+    # --- The machines
+
+    def moves(self) -> Iterator[Transition]:
+        """What machines, workpieces and sensors do by themselves."""
+        calm = Case(((ACCIDENT, False), (OVERRUN, False)))
+        start = each([NOTHING], [calm])
+        for place in self.laws.commanding:
+            if not self.moving(place):
+                continue
+            name, _ = self.laws.machine(place)
+            busy, idle = self.laws.busy(place), self.laws.idle(name)
+            working = ((busy, True), (idle, False), *(((self.failed[name], False),) if name in self.failed else ()))
+            at_work = each(start, [Case(working, ((busy, False), (idle, True)))])
+            words = self.words(place)
+            done = each(at_work, self.laws.done(place))
+            done = [
+                one for moment in done for seen in self.seen(moment) for one in each([seen], self.formed(place, seen))
+            ]
+            yield from self.named(f"{name}/done/{place.name}", f"{words} is done", done)
+            yield from self.ended(f"{name}/accident/{place.name}", each(at_work, self.laws.spoiled(place)))
+            if place.name in self.failing:
+                others = tuple((failed, False) for other, failed in self.failed.items() if other != name)
+                failed = self.failed[name]
+                fails = Case((*working, *others), ((failed, True),))
+                yield from self.named(f"{name}/fails/{place.name}", f"{words} fails", each(start, [fails]))
+        for name, failed in self.failed.items() if self.repaired else ():
+            repair = Case(((failed, True),), ((failed, False),))
+            yield from self.named(f"{name}/repaired", f"{name} is repaired and goes on", each(start, [repair]))
+        for signal, waiting in self.acknowledged.items():
+            shows = Case(((waiting, True), (signal, False), self.sensor(signal)), ((waiting, False), (signal, True)))
+            yield from self.named(f"{signal}/shown", f"the sensor of {signal} shows it", each(start, [shows]))
+        yield from self.workpieces(start)
+        yield from self.unsteady(start)
+
+    def workpieces(self, start: list[Moment]) -> Iterator[Transition]:
+        entry, exit_ = self.model.arrivals.station, self.model.departures.station
+        arrived = chain.from_iterable(map(self.seen, each(start, [self.laws.arrives()])))
+        yield from self.named(f"arrives/{entry}", f"a workpiece comes to {entry}", arrived)
+        gone = chain.from_iterable(map(self.seen, each(start, self.laws.departs())))
+        yield from self.named(f"leaves/{exit_}", f"the workpiece on {exit_} is taken away", gone)
+        yield from self.ended(f"leaves/{exit_}", each(start, self.laws.departs_raw()))
+
+    def unsteady(self, start: list[Moment]) -> Iterator[Transition]:
+        """What a sensor that is not exact does by itself."""
+        for name in self.inexact:
+            sensor, bit, empty = self.model.sensors[name], self.bit(name).name, self.reality(name)
+            ways = []
+            if sensor.may_flicker:
+                ways.append(("drops", False, "drops, though the workpiece is there"))
+                ways.append(("returns", True, "shows the workpiece again"))
+            for word, value, says in ways:
+                case = Case(((empty, False), (bit, not value)), ((bit, value),))
+                yield from self.named(f"{name}/{word}", f"the sensor of {name} {says}", each(start, [case]))
+            if sensor.may_linger:
+                case = Case(((empty, True), (bit, True)), ((bit, False),))
+                words = f"the sensor of {name} sees that the workpiece has gone"
+                yield from self.named(f"{name}/clears", words, each(start, [case]))
+
+    def named(self, name: str, description: str, moments: Iterable[Moment]) -> Iterator[Transition]:
+        for moment in moments:
+            yield moment.transition("/".join((name, *moment.tags)), ", ".join((description, *moment.says)))
+
+    def ended(self, name: str, moments: Iterable[Moment]) -> Iterator[Transition]:
+        for moment in moments:
+            yield self.accident("/".join((name, *moment.tags)), moment.says[-1], moment)
+
+    def words(self, place: Place) -> str:
+        return str(place.command)
+
+    def formed(self, place: Place, moment: Moment) -> Iterator[Case]:
+        """Its completion is set when a command is done, if the sensor of that name agrees, where there is one."""
+        signal = place.completion
+        if signal is None:
+            yield Case()
+            return
+        waiting = self.acknowledged.get(signal)
+        if waiting is None:
+            yield Case(((signal, False),), ((signal, True),))
+        else:
+            bit, means = self.sensor(signal)
+            calm = ((waiting, False), (signal, False))
+            known = moment.after.get(bit)
+            if known in (None, means):
+                yield Case((*calm, (bit, means)), ((signal, True),))
+            if known in (None, not means):
+                yield Case((*calm, (bit, not means)), ((waiting, True),), "unseen", "and its sensor does not show it")
+            if self.sharing[signal]:
+                yield Case(((waiting, True), (signal, False)), (), "twice")
+        if self.sharing[signal]:
+            yield Case(((signal, True),), (), "set-already")
+
+    def seen(self, moment: Moment) -> list[Moment]:
+        """A firing with what the sensors that are not exact see of it at once."""
+        moments = [moment]
+        for name in self.inexact:
+            sensor, bit, empty = self.model.sensors[name], self.bit(name).name, self.reality(name)
+            before, after = moment.before.get(empty), moment.after.get(empty)
+            if before == after:
+                continue
+            came = not after
+            at_once = Case(((bit, not came),), ((bit, came),))
+            stays = Case(((bit, came),), (), f"{name}-{'on' if came else 'off'}")
+            if came:
+                moments = each(moments, [at_once, *([stays] if sensor.may_linger else [])])
+            elif not sensor.may_linger:
+                moments = each(moments, [at_once, *([stays] if sensor.may_flicker else [])])
+        return moments
+
+
+def _told(transition: Transition, moment: Moment) -> str:
+    more = "; ".join(moment.says)
+    return f"{transition.description}: {more}" if transition.description and more else transition.description or more
+
+
+def _too_many(transition: Transition) -> InputError:
+    message = f"'{transition.name}' sends commands with more than {VARIANTS_MAX:,} outcomes in one firing"
+    hint = "send them one after the other, in transitions of their own"
+    return InputError([Diagnostic("F3007", message, hint, ("transitions", transition.name, "to"))])
+
+
+def _assert_projects(net: Net, transition: Transition, variants: Iterable[Transition]) -> None:
+    """Among the places of the cell a variant is its transition: what safety verdicts carry over by."""
+    want, put = set(transition.inputs), set(transition.outputs)
+    for variant in variants:
+        same = {name for name in variant.inputs if name in net.place_index} == want
+        same &= {name for name in variant.outputs if name in net.place_index} == put
+        same &= set(transition.permissive) <= {*variant.permissive}
+        same &= set(transition.inhibitive) <= {*variant.inhibitive, *variant.outputs}
+        if not same:
+            raise RuntimeError(f"the variant '{variant.name}' does not do what '{transition.name}' does")
+
+
+def _assert_apart(net: Net, moves: Iterable[Transition]) -> None:
+    for move in moves:
+        if not {*move.inputs, *move.outputs, *move.permissive, *move.inhibitive}.isdisjoint(net.place_index):
+            raise RuntimeError(f"the machines' '{move.name}' touches a place of the cell")

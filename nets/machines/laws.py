@@ -1,0 +1,341 @@
+"""The laws of the plant as cases: what each command wants when it is sent, what it does when it is done.
+
+These are the laws that the simulated cell obeys (`firable.executor.plant`), without times: each station and each hand
+holds a workpiece or none; a machine is idle or at one command; a hand is at one position; a station is clamped or not.
+Each of these facts is a place, and what has one of several values is *one-hot*: a place for each value, so that each
+condition is one gate. What cannot be done (laying a workpiece on another, a command to a busy machine) is an
+*accident*.
+
+A command acts at two instants. It is *sent*: what it wants is checked, and a conveyor takes its workpiece. It is
+*done*: the effect, and its completion bit, formed with the sensor of that name where the plant has one. Between them
+lies any time. Workpieces are told apart by one bit, whether they were machined; simulation has identities, which would
+make the number of markings grow with the number of workpieces and which no law asks for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from firable.nets.machines.moment import Case, Literal
+from firable.nets.machines.plant_file import (
+    Action,
+    Carry,
+    Clamp,
+    Grasp,
+    Machine,
+    Move,
+    PlantModel,
+    Process,
+    Put,
+    Release,
+    Stop,
+)
+from firable.nets.net import Command, Net, Place
+
+PLANT = "plant"
+"""The owner of what stands for machines and workpieces."""
+ACCIDENT = f"{PLANT}.accident"
+OVERRUN = f"{PLANT}.overrun"
+_RAW, _MACHINED = "raw", "machined"
+
+
+@dataclass(frozen=True)
+class Laws:
+    """The laws of one plant for the commands of one net; places are named by what they say of the plant."""
+
+    model: PlantModel
+    net: Net
+
+    # --- The facts and their places
+
+    @cached_property
+    def commanding(self) -> tuple[Place, ...]:
+        """The places that send a command."""
+        return tuple(place for place in self.net.places if place.command is not None)
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """What a workpiece can be."""
+        commands = (action for machine in self.model.machines.values() for action in machine.commands.values())
+        return (_RAW, _MACHINED) if any(isinstance(action, Process) for action in commands) else (_RAW,)
+
+    @cached_property
+    def clamps(self) -> frozenset[str]:
+        """The stations where a workpiece can be clamped, or would have to be."""
+        return frozenset(
+            action.station
+            for machine in self.model.machines.values()
+            for action in machine.commands.values()
+            if isinstance(action, (Clamp, Process, Release))
+        )
+
+    def machine(self, place: Place) -> tuple[str, Machine]:
+        """The machine that a place commands."""
+        name = _command(place).machine
+        return name, self.model.machines[name]
+
+    def action(self, place: Place) -> Action:
+        """What the command of a place does."""
+        return self.machine(place)[1].commands[_command(place).command]
+
+    def busy(self, place: Place) -> str:
+        """The place that says that the machine is at the command of a place of the cell."""
+        return f"{PLANT}.{_command(place).machine}.at.{place.name}"
+
+    def idle(self, machine: str) -> str:
+        """The place that says that a machine is at no command."""
+        return f"{PLANT}.{machine}.idle"
+
+    def hand_at(self, machine: str, position: str) -> str:
+        """The place that says where a hand is."""
+        return f"{PLANT}.{machine}.hand_at.{position}"
+
+    def empty(self, holder: str) -> str:
+        """The place that says that a station is empty, or that a machine holds nothing."""
+        return f"{PLANT}.{holder}.{'holds_nothing' if holder in self.model.machines else 'empty'}"
+
+    def has(self, holder: str, kind: str) -> str:
+        """The place that says that a station or a machine has a workpiece of a kind."""
+        return f"{PLANT}.{holder}.{'holds_' if holder in self.model.machines else ''}{kind}"
+
+    def clamped(self, station: str) -> str:
+        """The place that says that the workpiece on a station is clamped."""
+        return f"{PLANT}.{station}.clamped"
+
+    def places(self) -> Iterator[Place]:
+        """The places of machines and stations, as they are when all is at rest and no workpiece has come."""
+
+        def holding(holder: str) -> Iterator[Place]:
+            held = isinstance(self.model.machines.get(holder), Machine)
+            yield fact(self.empty(holder), f"{holder} {'holds nothing' if held else 'is empty'}", marked=True)
+            for kind in self.kinds:
+                words = f"{holder} holds a {kind} workpiece" if held else f"a {kind} workpiece lies on {holder}"
+                yield fact(self.has(holder, kind), words)
+
+        for name, machine in self.model.machines.items():
+            yield fact(self.idle(name), f"{name} is idle", marked=True)
+            for place in self.commanding:
+                if _command(place).machine == name:
+                    yield fact(self.busy(place), f"{name} is at {_words(place)}")
+            for position in machine.positions if machine.hand is not None else ():
+                yield fact(
+                    self.hand_at(name, position),
+                    f"the hand of {name} is at {position}",
+                    marked=position == machine.hand,
+                )
+            if machine.hand is not None or any(isinstance(action, Carry) for action in machine.commands.values()):
+                yield from holding(name)
+        for station in self.model.stations:
+            yield from holding(station)
+            if station in self.clamps:
+                yield fact(self.clamped(station), f"the workpiece on {station} is clamped")
+        yield fact(OVERRUN, "a machine was given a command while it was at another")
+        yield fact(ACCIDENT, "something happened that must not")
+
+    # --- A command is sent
+
+    def sent(self, place: Place) -> Iterator[Case]:
+        """The ways in which a machine can take the command of a place."""
+        name, action = self.machine(place)[0], self.action(place)
+        if isinstance(action, Stop):
+            yield Case(((self.idle(name), True),), tag=f"{name}-idle")
+            for other in self.commanding:
+                if self.machine(other)[0] == name and not isinstance(self.action(other), Stop):
+                    now = ((self.busy(other), True), (self.idle(name), False))
+                    then = ((self.busy(other), False), (self.idle(name), True))
+                    yield Case(now, then, f"stops-{other.name}", f"{name} leaves {_words(other)} undone")
+            return
+        free = ((self.idle(name), True), (self.busy(place), False))
+        taken = ((self.idle(name), False), (self.busy(place), True))
+        match action:
+            case Grasp():
+                yield Case((*free, (self._hand(place), True), (self.empty(name), True)), taken)
+            case Put():
+                yield Case((*free, (self._hand(place), True), (self.empty(name), False)), taken)
+            case Carry(source=source):
+                for kind in self.kinds:
+                    moved = self._moved(source, name, kind)
+                    yield Case((*free, *moved[0]), (*taken, *moved[1]), self._tag(kind))
+                yield Case((*free, (self.empty(name), False)), taken, "goes-on", f"{name} still has its workpiece")
+            case Process(station=station):
+                yield Case((*free, (self.clamped(station), True), (self.has(station, _RAW), True)), taken)
+            case _:
+                yield Case(free, taken)
+
+    def refused(self, place: Place) -> Iterator[Case]:
+        """The accidents that sending the command of a place can be: each wants that none before it happens."""
+        name, action = self.machine(place)[0], self.action(place)
+        if isinstance(action, Stop):
+            return
+        idle: Literal = (self.idle(name), True)
+        told = f"{name} is given {_words(place)}"
+        yield self._accident(((idle[0], False),), f"{name}-busy", f"{told} while it is at another command", OVERRUN)
+        match action:
+            case Grasp() | Put():
+                at: Literal = (self._hand(place), True)
+                takes = isinstance(action, Grasp)
+                yield self._accident((idle, (at[0], False)), f"{name}-elsewhere", f"{told}, and its hand is elsewhere")
+                yield self._accident(
+                    (idle, at, (self.empty(name), not takes)),
+                    f"{name}-{'holds' if takes else 'empty'}",
+                    f"{told}, and holds {'a workpiece already' if takes else 'nothing'}",
+                )
+            case Carry(source=source):
+                nothing = ((self.empty(name), True), (self.empty(source), True))
+                yield self._accident((idle, *nothing), f"{name}-nothing", f"{told}, and nothing lies on {source}")
+            case Process(station=station):
+                clamped: Literal = (self.clamped(station), True)
+                yield self._accident(
+                    (idle, (clamped[0], False)), f"{name}-loose", f"{told}, and nothing is clamped on {station}"
+                )
+                yield self._accident(
+                    (idle, clamped, (self.has(station, _RAW), False)),
+                    f"{name}-again",
+                    f"{told}, and no raw workpiece lies on {station}",
+                )
+            case _:
+                pass
+
+    # --- A command is done
+
+    def done(self, place: Place) -> Iterator[Case]:
+        """The ways in which a command can have its effect."""
+        name, machine = self.machine(place)
+        match self.action(place):
+            case Move():
+                there = self._hand(place)
+                for position in machine.positions:
+                    here = self.hand_at(name, position)
+                    if here == there:
+                        yield Case(((there, True),), tag=f"at-{position}")
+                    else:
+                        yield Case(
+                            ((here, True), (there, False)), ((here, False), (there, True)), tag=f"from-{position}"
+                        )
+            case Grasp():
+                if (station := self._station(place)) is not None:
+                    loose = ((self.clamped(station), False),) if station in self.clamps else ()
+                    for kind in self.kinds:
+                        wants, leaves = self._moved(station, name, kind)
+                        yield Case((*loose, *wants), leaves, self._tag(kind))
+            case Put():
+                if (station := self._station(place)) is not None:
+                    for kind in self.kinds:
+                        yield Case(*self._moved(name, station, kind), self._tag(kind))
+            case Carry(target=target):
+                for kind in self.kinds:
+                    yield Case(*self._moved(name, target, kind), self._tag(kind))
+            case Clamp(station=station):
+                fixed, lies = self.clamped(station), (self.empty(station), False)
+                yield Case(((fixed, False), lies), ((fixed, True),))
+                yield Case(((fixed, True), lies), tag="again")
+            case Process(station=station):
+                raw, machined = self.has(station, _RAW), self.has(station, _MACHINED)
+                yield Case(((raw, True), (machined, False)), ((raw, False), (machined, True)))
+                yield Case(((machined, True),), tag="again")
+            case Release(station=station):
+                fixed = self.clamped(station)
+                yield Case(((fixed, True),), ((fixed, False),))
+                yield Case(((fixed, False),), tag="again")
+            case Stop():
+                return
+
+    def spoiled(self, place: Place) -> Iterator[Case]:
+        """The accidents that a command can end in."""
+        name, _ = self.machine(place)
+        match self.action(place):
+            case Grasp():
+                station = self._station(place)
+                if station is None:
+                    yield self._accident((), "nothing", f"{name} grasps where no workpiece can lie")
+                    return
+                if station in self.clamps:
+                    held = ((self.clamped(station), True), (self.empty(station), False))
+                    words = f"{name} pulls at the workpiece that is clamped on {station}"
+                    yield self._accident(held, "clamped", words)
+                words = f"{name} grasps at {station}, where no workpiece lies"
+                yield self._accident(((self.empty(station), True),), "nothing", words)
+            case Put(when_full=when_full):
+                station = self._station(place)
+                if station is None:
+                    yield self._accident((), "drops", f"{name} drops its workpiece where nothing is")
+                elif when_full == "collide":
+                    yield self._collides(name, station)
+            case Carry(target=target, when_full=when_full):
+                if when_full == "collide":
+                    yield self._collides(name, target)
+            case Clamp(station=station) | Process(station=station):
+                words = f"{name} does {_words(place)} on {station}, where no workpiece lies"
+                yield self._accident(((self.empty(station), True),), "nothing", words)
+            case Move() | Release() | Stop():
+                return
+
+    def arrives(self) -> Case:
+        """A workpiece comes."""
+        station = self.model.arrivals.station
+        raw, empty = self.has(station, _RAW), self.empty(station)
+        return Case(((empty, True), (raw, False)), ((empty, False), (raw, True)))
+
+    def departs(self) -> Iterator[Case]:
+        """A finished workpiece is taken away."""
+        station = self.model.departures.station
+        kind, empty = self.has(station, self.kinds[-1]), self.empty(station)
+        yield Case(((kind, True), (empty, False)), ((kind, False), (empty, True)))
+
+    def departs_raw(self) -> Iterator[Case]:
+        """The accident that a workpiece leaves which no machine has machined, where one should have."""
+        if len(self.kinds) > 1:
+            station = self.model.departures.station
+            words = "a workpiece leaves the cell without having been machined"
+            yield self._accident(((self.has(station, _RAW), True),), "raw", words)
+
+    def _hand(self, place: Place) -> str:
+        """The place that says that the hand is where the command of a place is about."""
+        parameter = "to" if isinstance(self.action(place), Move) else "at"
+        return self.hand_at(self.machine(place)[0], dict(_command(place).parameters)[parameter])
+
+    def _station(self, place: Place) -> str | None:
+        return self.machine(place)[1].positions[dict(_command(place).parameters)["at"]]
+
+    def _moved(self, source: str, target: str, kind: str) -> tuple[tuple[Literal, ...], tuple[Literal, ...]]:
+        """What moving a workpiece wants and leaves."""
+        wants = (
+            (self.has(source, kind), True),
+            (self.empty(source), False),
+            (self.empty(target), True),
+            (self.has(target, kind), False),
+        )
+        return wants, tuple((place, not value) for place, value in wants)
+
+    def _tag(self, kind: str) -> str:
+        return kind if len(self.kinds) > 1 else ""
+
+    def _collides(self, machine: str, station: str) -> Case:
+        words = f"{machine} pushes its workpiece onto {station}, where another lies"
+        return self._accident(((self.empty(station), False), (self.empty(machine), False)), "collides", words)
+
+    def _accident(self, wants: tuple[Literal, ...], tag: str, says: str, kind: str = ACCIDENT) -> Case:
+        return Case(((kind, False), *wants), ((kind, True),), tag, says)
+
+
+def fact(name: str, description: str, *, marked: bool = False) -> Place:
+    """A place that says something of the plant."""
+    return Place(name, PLANT, marked, description=description)
+
+
+def _command(place: Place) -> Command:
+    if place.command is None:
+        raise ValueError(f"'{place.name}' sends no command")
+    return place.command
+
+
+def _words(place: Place) -> str:
+    """The command of a place, without its machine.
+
+    >>> _words(Place("p", command=Command("R", "MOVE", (("to", "MC"),))))
+    'MOVE to=MC'
+    """
+    command = _command(place)
+    return str(Command("", command.command, command.parameters)).strip()

@@ -1,0 +1,303 @@
+"""The verdicts on a cell with its machines: what gates free is too hopeful about, accidents, faults."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from support.bench_cell import bench, free_cell
+from support.examples import seeds
+
+from firable.analysis.check import check
+from firable.analysis.loop.faults import check_faults
+from firable.analysis.loop.verdicts import LoopReport, check_loop
+from firable.analysis.spaces.reachability import Budget
+from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
+from firable.nets.formula import Deadlock, parse_formula
+from firable.nets.machines.plant_file import PlantModel, parse_plant
+from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
+from firable.nets.temporal import Logic, parse_temporal
+from firable.nets.text import parse_net
+from firable.nets.verdict import Status
+from firable.semantics.player import Player
+
+SIZES = {
+    "one_robot": (92, 178, 746, 1976),
+    "one_robot_mc_late": (91, 176, 1838, 5670),
+    "one_robot_mc_late_capacity": (92, 178, 746, 1976),
+    "two_robots_shared": (105, 159, 1706, 5080),
+    "two_robots_separate": (105, 159, 1706, 5080),
+}
+
+
+def text_of(cell: str, kind: str = "firable") -> str:
+    return catalogue_path(cell).with_name(f"{cell}.{kind}.yaml").read_text("utf-8")
+
+
+def plant_with(old: str, new: str, cell: str = "one_robot") -> PlantModel:
+    text = text_of(cell, "plant")
+    assert old in text
+    return parse_plant(text.replace(old, new))
+
+
+def net_with(old: str, new: str, cell: str = "one_robot") -> Net:
+    text = text_of(cell)
+    assert old in text
+    return parse_net(text.replace(old, new))
+
+
+@cache
+def report_of(cell: str) -> LoopReport:
+    return check_loop(catalogue_net(cell), catalogue_plant(cell))
+
+
+def replays(report: LoopReport, name: str) -> None:
+    """The witness is a run of the loop, and without the machines one of the open net."""
+    witness = report.verdict(name).witness
+    assert witness is not None
+    for net, firings in (
+        (report.loop.net, witness.firings),
+        (report.loop.cell, report.loop.of_the_cell(witness.firings)),
+    ):
+        player, marking = Player(net), net.initial_marking
+        for fired in firings:
+            marking = player.fire(marking, [net.transition_index[one] for one in fired])
+
+
+# --- The catalogue
+
+
+@pytest.mark.parametrize("cell", SIZES)
+def test_sizes_of_the_loops_of_the_catalogue(cell: str) -> None:
+    report = report_of(cell)
+    figures = report.closed.figures
+    net = report.loop.net
+    assert (len(net.places), len(net.transitions), figures.markings, figures.edges) == SIZES[cell]
+
+
+@pytest.mark.parametrize("cell", [cell for cell in SIZES if cell != "one_robot_mc_late"])
+def test_the_good_cells_hold_everything_with_their_machines_too(cell: str) -> None:
+    report = report_of(cell)
+    assert {verdict.name for verdict in report.verdicts if not verdict.holds} == set()
+    assert not any(one.differs for one in report.differences)
+    assert not report.closed.figures.contacts
+
+
+def test_the_late_cell_hangs_with_its_machines_as_it_does_without() -> None:
+    report = report_of("one_robot_mc_late")
+    hangs = report.verdict("loop.deadlock-free")
+    assert hangs.status is Status.VIOLATED
+    assert hangs.witness is not None
+    assert hangs.witness.note.startswith("from here no transition of the cell ever fires again: R is at PUT at=MC")
+    replays(report, "loop.deadlock-free")
+    assert report.verdict("loop.property.no_deadlock").status is Status.VIOLATED
+    assert not any(one.differs for one in report.differences)
+
+
+@pytest.mark.parametrize("cell", SIZES)
+def test_what_is_proved_to_be_safe_with_gates_free_is_safe_with_the_machines(cell: str) -> None:
+    report = report_of(cell)
+    safe = {PropertyKind.NEVER, PropertyKind.ALWAYS}
+    for of in report.loop.cell.properties:
+        if isinstance(of, Property) and of.kind in safe and of.formula != Deadlock():
+            free = report.opened.verdict(f"property.{of.name}")
+            assert free.status is not Status.PROVED or report.verdict(f"loop.property.{of.name}").holds
+
+
+# --- Mistakes that gates free cannot see
+
+
+def test_a_sensor_on_the_wrong_station_lets_the_cell_hang_though_gates_free_calls_it_live() -> None:
+    report = check_loop(catalogue_net("one_robot"), plant_with("{occupied: mc_table}", "{occupied: cv2_entry}"))
+    assert report.opened.verdict("live").holds
+    gates = report.verdict("loop.gates-open")
+    assert gates.status is Status.VIOLATED
+    assert gates.subjects == ("G4",)
+    assert gates.witness is not None
+    assert gates.witness.note.startswith("from here the gates of G4 never open again: ")
+    assert "G4 waits for robot.put_done, mc.part_present; R is at PUT at=MC" in gates.witness.note
+    hopeful = [one for one in report.differences if one.differs]
+    assert {"deadlock-free", "live", "property.restart"} <= {one.question for one in hopeful}
+    assert {one.remark for one in hopeful} >= {"gates free was too hopeful: here a gate that it opened stays closed"}
+    replays(report, "loop.gates-open")
+
+
+def test_a_net_that_does_not_wait_for_its_robot_commands_it_while_it_is_busy() -> None:
+    net = net_with("command: MOVE,  to: CV1},  until: at_cv1, ", "command: MOVE,  to: CV1}, ")
+    report = check_loop(net, catalogue_plant("one_robot"))
+    busy = report.verdict("loop.busy-machines")
+    assert busy.status is Status.VIOLATED
+    assert busy.witness is not None
+    assert busy.witness.note == "R is given GRASP at=CV1 while it is at another command"
+    assert busy.witness.firings[-1] == ("t1-a/R-busy",)
+    replays(report, "loop.busy-machines")
+
+
+def test_an_exit_that_is_not_cleared_in_time_is_a_collision() -> None:
+    report = check_loop(catalogue_net("one_robot"), plant_with(", when_full: wait", ""))
+    collision = report.verdict("loop.accidents")
+    assert collision.status is Status.VIOLATED
+    assert collision.witness is not None
+    assert collision.witness.note == "CV2 pushes its workpiece onto cv2_exit, where another lies"
+    replays(report, "loop.accidents")
+
+
+def test_a_place_that_is_marked_at_first_waits_in_vain_for_a_command_that_was_never_sent() -> None:
+    net = net_with("start: [cv1, cv2]", "start: [cv1, cv2_run]")
+    net = replace(net, properties=())
+    report = check_loop(net, catalogue_plant("one_robot"))
+    lost = report.verdict("loop.completions")
+    assert (lost.status, lost.subjects) == (Status.VIOLATED, ("conveyor.cv2_run",))
+    assert report.verdict("loop.live").status is Status.VIOLATED
+
+
+def test_a_completion_that_two_commands_share_can_be_lost() -> None:
+    net = parse_net(SHARED)
+    report = check_loop(net, bench())
+    lost = report.verdict("loop.completions")
+    assert lost.status is Status.VIOLATED
+    assert "c.clamp and c.unclamp" in lost.subjects
+
+
+SHARED = """\
+firable: 1
+cell: shared
+controllers:
+  c:
+    start: [a, b]
+    inputs: [entry, hand]
+    places:
+      a:
+      b:
+      clamp: {send: {machine: R, command: MOVE, to: TABLE}, until: done}
+      unclamp: {send: {machine: M, command: UNCLAMP}, until: done}
+transitions:
+  t: {from: c.a, to: c.clamp}
+  u: {from: c.b, to: c.unclamp}
+  t2: {from: c.clamp, to: c.a}
+  u2: {from: c.unclamp, to: c.b}
+"""
+
+
+# --- Properties of the net file
+
+
+def test_start_is_the_marking_of_the_cell_wherever_its_machines_are() -> None:
+    assert report_of("one_robot").verdict("loop.property.restart").holds
+
+
+def test_formulas_of_temporal_logic_are_asked_with_the_variants_of_each_transition() -> None:
+    properties = (
+        TemporalProperty("again", Logic.CTL, parse_temporal("AG (system.carrying_in -> EF firable(G5))")),
+        TemporalProperty("order", Logic.LTL, parse_temporal("not fires(G5) W fires(G2)")),
+        TemporalProperty("wrong", Logic.LTL, parse_temporal("not fires(G2) W fires(G5)")),
+    )
+    net = replace(catalogue_net("one_robot"), properties=properties)
+    report = check_loop(net, catalogue_plant("one_robot"))
+    found = [str(report.verdict(f"loop.property.{name}").status) for name in ("again", "order", "wrong")]
+    assert found == ["proved", "proved", "violated"]
+
+
+def test_a_deadlock_within_a_formula_is_unknown_where_a_sensor_never_rests() -> None:
+    inner = Property("inner", PropertyKind.NEVER, parse_formula("deadlock and robot.put_mc"))
+    bare = Property("bare", PropertyKind.NEVER, Deadlock())
+    net = replace(catalogue_net("one_robot_mc_late"), properties=(inner, bare))
+    plant = plant_with("{occupied: mc_table}", "{occupied: mc_table, may_flicker: true}", "one_robot_mc_late")
+    report = check_loop(net, plant)
+    assert report.verdict("loop.property.inner").status is Status.UNKNOWN
+    assert "flicker" in report.verdict("loop.property.inner").bound
+    assert report.verdict("loop.property.bare").status is Status.VIOLATED
+    steady = check_loop(net, catalogue_plant("one_robot_mc_late"))
+    assert steady.verdict("loop.property.inner").status is Status.VIOLATED
+
+
+def test_a_budget_that_ends_leaves_the_loop_unknown() -> None:
+    net, plant = catalogue_net("one_robot"), catalogue_plant("one_robot")
+    report = check_loop(net, plant, Budget(markings=20, seconds=0.0))
+    assert report.status is Status.UNKNOWN
+    assert report.verdict("loop.live").status is Status.UNKNOWN
+
+
+# --- Faults
+
+
+def faults_of(net: Net, plant: PlantModel) -> dict[str, Status]:
+    return {verdict.name: verdict.status for verdict in check_faults(check_loop(net, plant), plant)}
+
+
+def test_each_fault_of_the_one_robot_cell_is_safe_stops_all_and_is_recovered_from() -> None:
+    plant = catalogue_plant("one_robot")
+    verdicts = {verdict.name: verdict for verdict in check_faults(report_of("one_robot"), plant)}
+    assert verdicts.pop("fault.safe").holds
+    for machine in ("R", "MC", "CV1", "CV2"):
+        assert verdicts.pop(f"fault.{machine}.repaired").holds
+        gone = verdicts.pop(f"fault.{machine}")
+        assert gone.status is Status.VIOLATED
+        assert len(gone.subjects) == 15
+        assert gone.hint.startswith("in the end all stand still; these can hold their token for ever")
+        assert gone.witness is not None
+        assert gone.witness.note.startswith(f"{machine} has failed, and")
+    assert not verdicts
+
+
+def test_a_part_of_the_cell_that_does_not_need_the_machine_goes_on() -> None:
+    text = """\
+firable: 1
+cell: apart
+controllers:
+  c:
+    start: [a, b]
+    inputs: [entry, hand]
+    places:
+      a:
+      b:
+      clamp: {send: {machine: R, command: MOVE, to: TABLE}, until: at_table}
+      stand:
+transitions:
+  t: {from: c.a, to: c.clamp}
+  t2: {from: c.clamp, to: c.a}
+  u: {from: c.b, to: c.stand}
+  u2: {from: c.stand, to: c.b}
+"""
+    net = parse_net(text)
+    (safe, gone, repaired) = check_faults(check_loop(net, bench()), bench())[:3]
+    assert (safe.holds, repaired.holds) == (True, True)
+    assert gone.subjects == ("t", "t2")
+    assert gone.hint == "these go on whatever fails at it: u, u2; these can hold their token for ever: c.clamp"
+
+
+def test_a_fault_that_leads_to_an_accident_is_not_safe() -> None:
+    net = net_with("command: MOVE,  to: CV1},  until: at_cv1, ", "command: MOVE,  to: CV1}, ")
+    assert faults_of(net, catalogue_plant("one_robot"))["fault.safe"] is Status.VIOLATED
+
+
+def test_a_plant_in_which_nothing_may_fail_has_no_verdicts_on_faults() -> None:
+    assert not faults_of(catalogue_net("one_robot"), plant_with(", may_fail: repairable", ""))
+
+
+def test_what_fails_for_good_is_not_said_to_be_repaired() -> None:
+    names = faults_of(catalogue_net("one_robot"), plant_with("may_fail: repairable", "may_fail: for_good")).keys()
+    assert {name for name in names if name.endswith(".repaired")} == set()
+    assert "fault.R" in names
+
+
+# --- Any net
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("seed", seeds(10))
+def test_what_can_never_happen_with_gates_free_never_happens_in_the_loop(seed: int) -> None:
+    from random import Random
+
+    from support.bench_cell import COMMANDS
+
+    net = free_cell(tuple(Random(seed).sample(list(COMMANDS), 4)))
+    report = check_loop(net, bench())
+    places = [place.name for place in net.places]
+    pairs = [(p, q) for p in places for q in places if p < q]
+    asked = [Property(f"x{i}", PropertyKind.NEVER, parse_formula(f"{p} and {q}")) for i, (p, q) in enumerate(pairs)]
+    free = check(replace(net, properties=tuple(asked)))
+    closed = check(replace(report.loop.net, properties=tuple(asked)))
+    for one in asked:
+        assert not free.verdict(f"property.{one.name}").holds or closed.verdict(f"property.{one.name}").holds

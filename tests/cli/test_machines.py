@@ -1,0 +1,85 @@
+"""`firable check --machines`: what it prints, what it writes, what it refuses."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from firable.cli.main import main
+from firable.nets.catalogue import catalogue_path
+
+SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+CELL, PLANT = "catalogue:one_robot", "catalogue:one_robot"
+
+
+@pytest.fixture
+def wrong_plant(tmp_path: Path) -> str:
+    """The plant of the one-robot cell with a sensor on another station."""
+    text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
+    path = tmp_path / "wrong.plant.yaml"
+    path.write_text(text.replace("{occupied: mc_table}", "{occupied: cv2_entry}"), "utf-8")
+    return str(path)
+
+
+def test_the_loop_is_told_beside_the_net_with_gates_free(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", CELL, "--machines", PLANT]) == 0
+    told = capsys.readouterr().out
+    assert "the loop has 92 places, 178 transitions, 746 markings and 1,976 edges" in told
+    assert "  deadlock-free                       proved      proved\n" in told
+    assert "✓ proved    fault.MC.repaired" in told
+    assert told.endswith("all hold: 17 proved\n")
+
+
+def test_what_gates_free_was_too_hopeful_about_stands_out(wrong_plant: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", CELL, "--machines", wrong_plant]) == 1
+    told = capsys.readouterr().out
+    assert "  live                                proved      violated\n      gates free was too hopeful" in told
+    assert "✗ violated  loop.gates-open" in told
+
+
+def test_the_json_of_a_loop_fits_the_published_schema(wrong_plant: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", CELL, "--machines", wrong_plant, "--format", "json"]) == 1
+    data = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator(SCHEMA).validate(data)
+    loop = data["reports"][0]["loop"]
+    assert loop["machines"] == wrong_plant
+    row = next(row for row in loop["comparison"] if row["question"] == "live")
+    assert (row["gates_free"], row["with_machines"]) == ("proved", "violated")
+
+
+def test_the_loop_is_written_as_a_net_that_is_checked_like_any_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "loop.firable.yaml"
+    assert main(["check", CELL, "--machines", PLANT, "--loop-net", str(path)]) == 0
+    assert f"the loop as a net file: {path}" in capsys.readouterr().out
+    assert main(["check", str(path), "--query", "AG not (plant.accident or plant.overrun)"]) == 1
+    told = capsys.readouterr().out
+    assert "746 markings, 1,976 edges" in told
+    assert "✓ proved    query.query-1" in told
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--machines", "nowhere.yaml"], "F1001"),
+        (["--machines", "catalogue:conceptual_one_robot"], "is a net without machines"),
+        (["--machines", "catalogue:nothing"], "the catalogue has no 'nothing'"),
+        (["--machines", "catalogue:two_robots_separate"], "F5003"),
+        (["--machines", PLANT, "--query", "AG EF start"], "--query does not go with --machines"),
+        (["--machines", PLANT, "--discipline", "step"], "--discipline does not go with --machines"),
+        (["--machines", PLANT, "--trace-dir", "x"], "--trace-dir does not go with --machines"),
+        (["--loop-net", "x"], "--loop-net goes with --machines"),
+        ([CELL, "--machines", PLANT, "--loop-net", "x"], "--loop-net holds one loop"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", CELL, *arguments]) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err + captured.out
