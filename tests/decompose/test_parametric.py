@@ -14,7 +14,7 @@ from firable.decompose.protocol.parametric.fragment import dependencies, order
 from firable.decompose.protocol.parametric.logic import Formula, Relation, Sort, Variable, exists, forall
 from firable.decompose.protocol.parametric.proving import parametric_verdicts, theorem
 from firable.decompose.protocol.parametric.side_conditions import CONDITIONS, side_conditions
-from firable.decompose.protocol.parametric.system import ACTIONS, shadow
+from firable.decompose.protocol.parametric.system import PROTOCOL, shadow
 from firable.decompose.protocol.parametric.theorem import parametric_obligations
 from firable.decompose.splitting.cut import split
 from firable.nets.catalogue import catalogue_names, catalogue_net
@@ -48,8 +48,8 @@ def test_files_are_the_same_for_every_net_and_every_time() -> None:
 
 
 def test_shadow_moves_when_something_fires_and_at_no_other_step() -> None:
-    assert {action.name for action in ACTIONS if action.fires} == {"decide", "fire"}
-    for action in ACTIONS:
+    assert {action.name for action in PROTOCOL.actions if action.fires} == {"decide", "fire"}
+    for action in PROTOCOL.actions:
         assert action.fires == (shadow in {update.relation for update in action.updates}), action.name
 
 

@@ -72,7 +72,7 @@ class Action:
 class Script:
     """The lines of a file, as they are added."""
 
-    def __init__(self, comments: Iterable[str]) -> None:
+    def __init__(self, comments: Iterable[str] = ()) -> None:
         self.comments = tuple(comments)
         self.formulas: list[Formula] = []
         """Every formula that was asserted or defines a change, for `fragment`."""
@@ -80,12 +80,16 @@ class Script:
         self._declared: dict[str, str] = {}
         self._body: list[str] = []
         self._versions: dict[Relation, int] = {}
-        self._written: set[str] = set()
+        self._written: dict[str, str] = {}
+        """The text of each definition, by its symbol: two of one name would be taken for one."""
 
-    @property
-    def now(self) -> Mapping[Relation, int]:
-        """The versions of the relations that have changed, at the present moment."""
-        return dict(self._versions)
+    def continued(self, comments: Iterable[str]) -> Script:
+        """A copy under another head, to go on with by itself."""
+        copy = Script(comments)
+        copy.formulas = list(self.formulas)
+        copy._sorts, copy._declared, copy._body = dict(self._sorts), dict(self._declared), list(self._body)
+        copy._versions, copy._written = dict(self._versions), dict(self._written)
+        return copy
 
     def add(self, formula: Formula, words: str, names: Mapping[Variable, str] | None = None) -> None:
         """Assert a formula of the present moment; what nothing quantifies in it is a constant."""
@@ -95,6 +99,12 @@ class Script:
         self.formulas.append(formula)
         self._body.append(f"; {words}" if words else ";")
         self._body.append(f"(assert {text_of(formula, names, self._symbol)})")
+
+    def observe(self, formula: Formula, name: str) -> None:
+        """Give a formula of the present moment a name, by which a model says whether it holds."""
+        self._define(formula)
+        self._declared[name] = f"(declare-const {name} Bool)"
+        self._body.append(f"(assert (= {name} {text_of(formula, None, self._symbol)}))")
 
     def step(self, action: Action, names: Mapping[Variable, str] | None = None) -> None:
         """Play an action: assert its demands, and go on to the moment after it."""
@@ -148,13 +158,14 @@ class Script:
 
     def _define_once(self, definition: Definition) -> None:
         symbol = self._symbol(definition)
-        if symbol in self._written:
-            return
         self._define(definition.body)
-        self._written.add(symbol)
         self._declare_sorts(v.sort for v in definition.parameters)
         typed = " ".join(f"({v.name} {v.sort.name})" for v in definition.parameters)
-        self._body.append(_defined(symbol, typed, text_of(definition.body, None, self._symbol)))
+        text = _defined(symbol, typed, text_of(definition.body, None, self._symbol))
+        assert self._written.get(symbol, text) == text, f"two definitions are named '{symbol}'"
+        if symbol not in self._written:
+            self._written[symbol] = text
+            self._body.append(text)
 
     def _declare(self, relation: Relation) -> None:
         self._declare_sorts(relation.sorts)

@@ -192,11 +192,11 @@ def _gates(split: _Split) -> Iterator[_Problem]:
             continue  # which `parts` says
         whole = split.net.transition(row.name)
         for part in row.parts:
-            subnet = split.subnets.get(part.controller)
-            if subnet is None or part.name not in subnet.transition_index:
+            its = split.subnets.get(part.controller)
+            if its is None or part.name not in its.transition_index:
                 continue
             wanted = {gate for gate in whole.external if owner_of[gate.signal] == part.controller}
-            if set(subnet.transition(part.name).external) != wanted:
+            if set(its.transition(part.name).external) != wanted:
                 words = (
                     f"the external gates of '{part.name}' at '{part.controller}' are not those of '{row.name}' there"
                 )

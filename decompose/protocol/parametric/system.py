@@ -31,6 +31,7 @@ capable, and show nothing more. Rounds as numbers: nothing is ever asked of them
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 from firable.decompose.protocol.parametric.logic import (
@@ -156,6 +157,9 @@ undisturbed_locally = Definition(  # O1, of a local transition and all promises
 )
 
 # --- What may happen
+#
+# Every demand is needed: without any one of them the proof fails (tests/decompose/test_wrong_protocols.py). So the
+# executor demands more here and there, as that a vote counts only before the decision, which changes nothing.
 
 
 def _is(formals: tuple[Variable, ...], terms: tuple[Term, ...]) -> Formula:
@@ -219,7 +223,6 @@ PROMISE: Final = Action(
     (
         Demand("a request of the round has arrived", request(r, t, c)),
         Demand("no order of the round has been obeyed", ~obeyed(r, t, c)),
-        Demand("it is not yet promised", ~promised(r, t, c)),
         Demand("the part is firable in the subnet", part_firable(t, c)),
         Demand("its external gates can open", openable_at(t, c)),
         Demand("no promise of another round is disturbed (O1)", undisturbed(r, t, c)),
@@ -230,10 +233,7 @@ PROMISE: Final = Action(
 HEAR: Final = Action(
     "hear",
     (r, t, c),
-    (
-        Demand("a vote of the round has arrived", vote(r, t, c)),
-        Demand("the round is not decided", ~decided(r)),
-    ),
+    (Demand("a vote of the round has arrived", vote(r, t, c)),),
     (adds(heard, r, t, c),),
     "the vote of {c} for {t} in {r} arrives",
 )
@@ -311,7 +311,6 @@ CLOSE: Final = Action(
     "close",
     (r,),
     (
-        Demand("the round is begun", begun(r)),
         Demand("the round is decided", decided(r)),
         Demand(
             "all who were asked have obeyed", forall(u, d)((asked(r, u) & takes_part(u, d)).implies(noted(r, u, d)))
@@ -341,7 +340,23 @@ FIRE: Final = Action(
     fires=True,
 )
 
-ACTIONS: Final = (ASK, PROMISE, HEAR, DECIDE, GIVE_UP, RESTART, APPLY, RELEASE, NOTE, CLOSE, FORGET, FIRE)
+
+@dataclass(frozen=True)
+class Protocol:
+    """A protocol: what it assumes of the net, and what may happen."""
+
+    static: tuple[tuple[str, Formula], ...]
+    actions: tuple[Action, ...]
+
+    def action(self, name: str) -> Action:
+        """The action of a name; `KeyError` where there is none."""
+        return {action.name: action for action in self.actions}[name]
+
+
+PROTOCOL: Final = Protocol(
+    STATIC, (ASK, PROMISE, HEAR, DECIDE, GIVE_UP, RESTART, APPLY, RELEASE, NOTE, CLOSE, FORGET, FIRE)
+)
+"""The protocol of the executor."""
 
 INITIAL: Final[tuple[tuple[str, Formula], ...]] = (
     ("the subnets hold the initial marking", forall(q)(marked(q).iff(initially(q)))),

@@ -1,0 +1,381 @@
+"""Protocols that are wrong, each by one thing that an engineer might leave out, and a run that shows it.
+
+A proof that no mistake breaks proves nothing. So each obligation O1 to O6 of SEMANTICS is taken out of the protocol by
+itself, in each of the ways in which one would forget it; then some obligation of the theorem fails, and there
+is a run from the start on a small net at whose end something is wrong:
+
+- NOT_FOLLOWED: the last thing that fires, the central net cannot fire then;
+- APART: every decided round is closed, and the controllers hold another marking than the central net;
+- STUCK: every round is closed, and a promise still stands, which nobody will ever release.
+
+Most of these are the folklore of distributed commit (Gray, Notes on data base operating systems, 1978; Bernstein,
+Hadzilacos, Goodman, 1987, chapter 7), told of tokens. The actions of each run are given here, and what they happen
+on is found (`runs`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from firable.decompose.protocol.parametric.logic import Definition, Formula, Variable, exists, forall, same
+from firable.decompose.protocol.parametric.runs import (
+    NOT_FOLLOWED,
+    Run,
+    cannot_follow,
+    central_marking,
+    find_run,
+    steps_of,
+)
+from firable.decompose.protocol.parametric.script import Action, Demand, Update
+from firable.decompose.protocol.parametric.system import (
+    GATES_TAKE_PART,
+    PROTOCOL,
+    Controller,
+    Protocol,
+    Round,
+    Transition,
+    abort_order,
+    adds_where,
+    asked,
+    c,
+    central_firable,
+    commit_order,
+    coordinated,
+    d,
+    home,
+    input_of,
+    marked,
+    obeyed,
+    owner,
+    permissive_of,
+    promised,
+    q,
+    r,
+    reads,
+    s,
+    t,
+    takes_part,
+    u,
+    vote,
+    writes,
+)
+from firable.decompose.protocol.parametric.theorem import agree, none_open, none_underway
+
+APART: Final = none_underway & ~agree
+STUCK: Final = none_open & exists(s, u, d)(promised(s, u, d))
+
+EARLIER: Final = Variable("e", Round)
+"""The round of a message, where it is not asked whether it is the present one."""
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """A wrong protocol: what is forgotten, what it does instead, which obligations fail, and a run that goes wrong.
+
+    `breaks` are obligations of the theorem that fail; there may be more. `given` holds at the start of the run.
+    """
+
+    name: str
+    forgets: str
+    words: str
+    change: Callable[[Protocol], Protocol]
+    breaks: tuple[str, ...]
+    run: str
+    places: int
+    goal: Formula = NOT_FOLLOWED
+    given: tuple[Formula, ...] = ()
+
+    @property
+    def protocol(self) -> Protocol:
+        """The protocol, changed."""
+        return self.change(PROTOCOL)
+
+
+def refute(wrong: Wrong) -> Run | None:
+    """A run that shows what is wrong, and that the reference player has confirmed; None where there is none."""
+    run = find_run(wrong.protocol, steps_of(wrong.run), wrong.places, wrong.goal, wrong.given)
+    if run is None:
+        return None
+    if wrong.goal is NOT_FOLLOWED:
+        confirmed = cannot_follow(run)
+    else:
+        central = central_marking(run)
+        confirmed = set(central) == set(run.central) and (wrong.goal is STUCK or set(run.local) != set(central))
+    assert confirmed, f"the reference player does not confirm the run of '{wrong.name}'"
+    return run
+
+
+# --- Ways to forget something
+
+
+def _with(name: str, change: Callable[[Action], Action]) -> Callable[[Protocol], Protocol]:
+    """One action changed."""
+    return lambda protocol: replace(
+        protocol,
+        actions=tuple(change(action) if action.name == name else action for action in protocol.actions),
+    )
+
+
+def _all(*changes: Callable[[Protocol], Protocol]) -> Callable[[Protocol], Protocol]:
+    def change(protocol: Protocol) -> Protocol:
+        for one in changes:
+            protocol = one(protocol)
+        return protocol
+
+    return change
+
+
+def without(name: str, words: str) -> Callable[[Protocol], Protocol]:
+    """An action without one of its demands, named by a piece of its words."""
+
+    def change(action: Action) -> Action:
+        kept = tuple(demand for demand in action.demands if words not in demand.words)
+        assert len(kept) == len(action.demands) - 1, f"'{words}' names no demand of '{name}'"
+        return replace(action, demands=kept)
+
+    return _with(name, change)
+
+
+def _instead(name: str, words: str, formula: Formula, *more: Variable) -> Callable[[Protocol], Protocol]:
+    """An action with another formula for one of its demands, and with more parameters."""
+
+    def change(action: Action) -> Action:
+        demands = tuple(Demand(demand.words, formula) if words in demand.words else demand for demand in action.demands)
+        assert demands != action.demands, f"'{words}' names no demand of '{name}'"
+        return replace(action, demands=demands, parameters=(*action.parameters, *more))
+
+    return _with(name, change)
+
+
+def _without_update(name: str, of: str) -> Callable[[Protocol], Protocol]:
+    return _with(
+        name,
+        lambda action: replace(action, updates=tuple(up for up in action.updates if up.relation.name != of)),
+    )
+
+
+def _covering(disturbed: Formula) -> Callable[[Protocol], Protocol]:
+    """Promises that keep away only what disturbs them in this sense: t, at a place q, what is promised of u."""
+    promises = Definition(
+        "kept-away",
+        (r, t, c),
+        forall(s, u, q)((promised(s, u, c) & ~same(s, r) & same(owner(q), c)).implies(~disturbed)),
+    )
+    locally = Definition(
+        "kept-away-locally",
+        (t, c),
+        forall(s, u, q)((promised(s, u, c) & same(owner(q), c)).implies(~disturbed)),
+    )
+    return _all(_instead("promise", "O1", promises(r, t, c)), _instead("fire", "O1", locally(t, home(t))))
+
+
+def _gates_elsewhere_are_cached(protocol: Protocol) -> Protocol:
+    moved = forall(u, q)((coordinated(u) & writes(u, q)).implies(takes_part(u, owner(q))))
+    return replace(
+        protocol,
+        static=tuple((words, moved if words == GATES_TAKE_PART else formula) for words, formula in protocol.static),
+    )
+
+
+_inputs_only = Definition(
+    "inputs-hold",
+    (t, c),
+    forall(q)(same(owner(q), c).implies((input_of(t, q) | permissive_of(t, q)).implies(marked(q)))),
+)
+
+_FORGOTTEN: Final = Action(
+    "lose-memory",
+    (c,),
+    (),
+    (Update(promised, (s, u, d), promised(s, u, d) & ~same(d, c)),),
+    "{c} crashes and starts again, and its promises are gone",
+)
+
+_VOTES: Final = "ask r1 G; promise r1 G a; promise r1 G b; hear r1 G a; hear r1 G b"
+_APPLIED: Final = f"{_VOTES}; decide r1 G; apply r1 G a; apply r1 G b; note r1 G a; note r1 G b; close r1"
+_G = Variable("G", Transition)
+
+WRONG: Final = (
+    Wrong(
+        "cached-votes",
+        "O1",
+        "a vote is a report of what was firable, and promises nothing; orders are carried out blindly",
+        _all(_without_update("promise", "promised"), _instead("apply", "it is promised", ~obeyed(r, t, c))),
+        ("keeps.promise",),
+        "ask r1 G; promise r1 G a; promise r1 G b; fire l; hear r1 G a; hear r1 G b; decide r1 G",
+        3,
+    ),
+    Wrong(
+        "promises-with-a-time-limit",
+        "O1",
+        "a promise ends by itself when no order comes for long",
+        without("release", "order to abort"),
+        ("keeps.release",),
+        "ask r1 G; promise r1 G a; release r1 G a; fire l; promise r1 G b; hear r1 G a; hear r1 G b; decide r1 G",
+        3,
+    ),
+    Wrong(
+        "local-transitions-ignore-promises",
+        "O1",
+        "a local transition fires though a promise stands",
+        without("fire", "O1"),
+        ("keeps.fire", "follows.fire"),
+        "ask r1 G; promise r1 G a; fire l; promise r1 G b; hear r1 G a; hear r1 G b; decide r1 G",
+        3,
+    ),
+    Wrong(
+        "unlocked-conflicts",
+        "O1, O2",
+        "a part is promised though it disturbs the promise of another round",
+        without("promise", "O1"),
+        ("keeps.promise",),
+        f"{_VOTES}; ask r2 H; promise r2 H a; promise r2 H b; hear r2 H a; hear r2 H b; decide r1 G; decide r2 H",
+        5,
+    ),
+    Wrong(
+        "read-places-not-promised",
+        "O1",
+        "a promise keeps away only what writes the places that the part writes, not what writes its gates",
+        _covering(writes(t, q) & writes(u, q)),
+        ("keeps.promise", "keeps.fire", "follows.fire"),
+        "ask r1 G; promise r1 G a; fire l; promise r1 G b; hear r1 G a; hear r1 G b; decide r1 G",
+        4,
+    ),
+    Wrong(
+        "written-places-may-be-read",
+        "O1",
+        "a promise keeps away what writes the places that the part reads, not what reads those that it will write",
+        _covering(writes(t, q) & reads(u, q)),
+        ("keeps.promise", "follows.fire"),
+        f"{_VOTES}; decide r1 G; fire l",
+        4,
+    ),
+    Wrong(
+        "two-commits-in-a-round",
+        "O2",
+        "the arbiter of a group commits one more of the transitions that it asked for together",
+        without("decide", "not decided"),
+        ("keeps.decide", "follows.decide"),
+        f"{_VOTES}; ask r1 H; promise r1 H a; promise r1 H b; hear r1 H a; hear r1 H b; decide r1 G; decide r1 H",
+        5,
+    ),
+    Wrong(
+        "cached-gates",
+        "O3",
+        "who owns only a gate takes no part, and the gate is read from a copy",
+        _gates_elsewhere_are_cached,
+        ("follows.decide",),
+        "ask r1 G; promise r1 G a; promise r1 G b; fire l; hear r1 G a; hear r1 G b; decide r1 G",
+        4,
+        given=(central_firable(_G), takes_part(Variable("l", Transition), Variable("c", Controller))),
+    ),
+    Wrong(
+        "votes-from-before-the-decision",
+        "O5",
+        "a vote counts in whatever round of its transition it arrives",
+        _instead("hear", "a vote", vote(EARLIER, t, c), EARLIER),
+        ("keeps.hear",),
+        "ask r1 G; promise r1 G a; give-up r1; release r1 G a; fire l; ask r2 G; promise r2 G b; "
+        "hear r2 G a r1; hear r2 G b r2; decide r2 G",
+        3,
+    ),
+    Wrong(
+        "orders-applied-twice",
+        "O5",
+        "an order that arrives again is carried out again",
+        without("apply", "it is promised"),
+        ("keeps.apply", "once"),
+        f"{_APPLIED}; fire l; apply r1 G a",
+        3,
+        APART,
+    ),
+    Wrong(
+        "orders-of-another-round",
+        "O5",
+        "a late order of an earlier round is taken for the one of the present round",
+        _instead("apply", "the order", commit_order(EARLIER, t, c), EARLIER),
+        ("keeps.apply",),
+        f"{_APPLIED}; fire l; fire m; ask r2 G; promise r2 G a; apply r2 G a r1".replace(
+            "apply r1 G a;", "apply r1 G a r1;"
+        ).replace("apply r1 G b;", "apply r1 G b r1;"),
+        4,
+        APART,
+    ),
+    Wrong(
+        "commit-without-all-votes",
+        "O5",
+        "the coordinator decides when the votes that have come are yes",
+        without("decide", "voted yes"),
+        ("keeps.decide", "follows.decide"),
+        "ask r1 G; promise r1 G a; hear r1 G a; decide r1 G",
+        3,
+        given=(takes_part(_G, Variable("b", Controller)),),
+    ),
+    Wrong(
+        "late-requests-promise",
+        "O5",
+        "a request is granted though its round has been decided",
+        without("promise", "obeyed"),
+        ("keeps.promise",),
+        "ask r1 G; give-up r1; release r1 G a; release r1 G b; note r1 G a; note r1 G b; close r1; promise r1 G a",
+        2,
+        STUCK,
+    ),
+    Wrong(
+        "given-up-after-the-commit",
+        "O5",
+        "the coordinator aborts a round that it has committed, because some do not answer",
+        without("give-up", "not decided"),
+        ("keeps.give-up",),
+        f"{_VOTES}; decide r1 G; apply r1 G a; give-up r1; release r1 G b; note r1 G a; note r1 G b; close r1",
+        2,
+        APART,
+    ),
+    Wrong(
+        "closed-before-all-have-obeyed",
+        "O5",
+        "the coordinator closes a round without waiting for the acknowledgements, and an order is lost",
+        without("close", "obeyed"),
+        ("keeps.close",),
+        f"{_VOTES}; decide r1 G; apply r1 G a; close r1; forget r1 b",
+        2,
+        APART,
+    ),
+    Wrong(
+        "promises-not-in-stable-storage",
+        "O6",
+        "a controller that crashes forgets what it has promised",
+        lambda protocol: replace(protocol, actions=(*protocol.actions, _FORGOTTEN)),
+        ("keeps.lose-memory",),
+        "ask r1 G; promise r1 G a; lose-memory a; fire l; promise r1 G b; hear r1 G a; hear r1 G b; decide r1 G",
+        3,
+    ),
+    Wrong(
+        "decisions-not-in-stable-storage",
+        "O6",
+        "a coordinator that crashes forgets what it has decided, and gives up every round that is begun",
+        _with(
+            "restart",
+            lambda action: replace(
+                action,
+                updates=(action.updates[0], adds_where(abort_order, asked(s, u) & takes_part(u, d))),
+            ),
+        ),
+        ("keeps.restart",),
+        f"{_VOTES}; decide r1 G; apply r1 G a; restart; release r1 G b; note r1 G a; note r1 G b; close r1",
+        2,
+        APART,
+    ),
+    Wrong(
+        "filled-outputs-not-looked-at",
+        "Eq. (5)",
+        "a part is promised though its output place is full, as Eq. (5) reads without its bars",
+        _instead("promise", "firable", _inputs_only(t, c)),
+        ("keeps.promise",),
+        f"{_VOTES}; decide r1 G",
+        2,
+    ),
+)
+"""The wrong protocols, in the order of the obligations that they forget."""

@@ -1,0 +1,129 @@
+"""The proof is about something: every action can happen, every demand is needed, every wrong protocol is refuted."""
+
+from dataclasses import replace
+
+import pytest
+import z3
+
+from firable.decompose.protocol.parametric.logic import both
+from firable.decompose.protocol.parametric.proving import decide_text
+from firable.decompose.protocol.parametric.runs import central_marking, find_run, steps_of
+from firable.decompose.protocol.parametric.script import Action, Demand
+from firable.decompose.protocol.parametric.system import PROTOCOL, Protocol
+from firable.decompose.protocol.parametric.theorem import parametric_obligations
+from firable.decompose.protocol.parametric.wrong import WRONG, Wrong, refute
+
+# --- Nothing is proved of nothing
+
+
+def test_every_action_can_happen_with_two_rounds_open() -> None:
+    steps = steps_of(
+        "ask r1 G; ask r2 H; promise r1 G a; promise r2 H a; promise r1 G b; promise r2 H b; hear r1 G a; fire l;"
+        "hear r1 G b; decide r1 G; apply r1 G a; hear r2 H a; apply r1 G b; note r1 G a; note r1 G b; close r1;"
+        "forget r1 a; give-up r2; release r2 H a; ask r3 H; restart; release r3 H b"
+    )
+    assert {name for name, _ in steps} == {action.name for action in PROTOCOL.actions}
+    run = find_run(PROTOCOL, steps, 6, both([]))
+    assert run is not None
+    assert run.fired == ("l", "G")
+    assert set(central_marking(run)) == set(run.local) == set(run.central)
+
+
+@pytest.mark.parametrize("name", [obligation.name for obligation in parametric_obligations()])
+def test_what_an_obligation_is_given_is_possible(name: str) -> None:
+    text = next(o.script.text() for o in parametric_obligations() if o.name == name)
+    given, denied, _ = text.partition("; and what is to be shown does not hold\n")
+    assert denied
+    assert decide_text(small(given + "(check-sat)\n"))[0] == z3.sat
+
+
+# --- Every demand is needed
+
+
+def without(action: Action, demand: Demand) -> Protocol:
+    changed = replace(action, demands=tuple(other for other in action.demands if other is not demand))
+    return replace(PROTOCOL, actions=tuple(changed if other is action else other for other in PROTOCOL.actions))
+
+
+def small(text: str) -> str:
+    """A file with three places, and two things of each other sort at most; a model of it is a model of the file."""
+    for line in text.splitlines():
+        if line.startswith("(declare-sort "):
+            sort = line.split()[1]
+            names = [f"some-{sort}-{i}" for i in range(3 if sort == "Place" else 2)]
+            text += "".join(f"(declare-const {name} {sort})\n" for name in names)
+            text += f"(assert (forall ((x {sort})) (or {' '.join(f'(= x {name})' for name in names)})))\n"
+    return text.replace("(check-sat)\n", "") + "(check-sat)\n"
+
+
+def fails(protocol: Protocol, names: tuple[str, ...]) -> bool:
+    """Whether an obligation of these names is refuted."""
+    chosen = (o for o in parametric_obligations(protocol) if o.name in names)
+    return any(decide_text(small(o.script.text()))[0] == z3.sat for o in chosen)
+
+
+@pytest.mark.parametrize(
+    ("action", "demand"),
+    [
+        pytest.param(action, demand, id=f"{action.name}-{demand.words}")
+        for action in PROTOCOL.actions
+        for demand in action.demands
+    ],
+)
+def test_no_demand_can_be_left_out(action: Action, demand: Demand) -> None:
+    assert fails(without(action, demand), (f"keeps.{action.name}", f"follows.{action.name}"))
+
+
+@pytest.mark.parametrize("words", [words for words, _ in PROTOCOL.static])
+def test_no_assumption_on_the_net_can_be_left_out(words: str) -> None:
+    changed = replace(PROTOCOL, static=tuple(its for its in PROTOCOL.static if its[0] != words))
+    assert fails(changed, ("follows.decide", "follows.fire", "complete.fire"))
+
+
+# --- Wrong protocols
+
+
+@pytest.mark.parametrize("wrong", WRONG, ids=[wrong.name for wrong in WRONG])
+def test_wrong_protocol_is_refuted_by_a_run_that_the_reference_player_confirms(wrong: Wrong) -> None:
+    run = refute(wrong)
+    assert run is not None
+    assert len(run.events) == len(steps_of(wrong.run))
+
+
+@pytest.mark.parametrize("wrong", WRONG, ids=[wrong.name for wrong in WRONG])
+def test_wrong_protocol_breaks_the_proof(wrong: Wrong) -> None:
+    assert wrong.breaks
+    assert all(fails(wrong.protocol, (name,)) for name in wrong.breaks)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [w for w in WRONG if len(w.protocol.actions) == len(PROTOCOL.actions) and "earlier" not in w.words],
+    ids=lambda wrong: wrong.name,
+)
+def test_right_protocol_has_no_such_run(wrong: Wrong) -> None:
+    if all(len(names) == len(PROTOCOL.action(name).parameters) for name, names in steps_of(wrong.run)):
+        assert find_run(PROTOCOL, steps_of(wrong.run), wrong.places, wrong.goal, wrong.given) is None
+
+
+def test_every_obligation_is_forgotten_by_some_wrong_protocol() -> None:
+    forgotten = {name for wrong in WRONG for name in wrong.forgets.split(", ")}
+    assert forgotten == {"O1", "O2", "O3", "O5", "O6", "Eq. (5)"}
+
+
+def test_run_reads_as_a_story() -> None:
+    wrong = next(wrong for wrong in WRONG if wrong.name == "votes-from-before-the-decision")
+    run = refute(wrong)
+    assert run is not None
+    assert run.events == (
+        "the coordinator asks for 'G' in round 1",
+        "'a' promises 'G' in round 1, and votes yes",
+        "the coordinator gives round 1 up",
+        "the abort of 'G' in round 1 arrives at 'a'",
+        "its home fires the local transition 'l'",
+        "the coordinator asks for 'G' in round 2",
+        "'b' promises 'G' in round 2, and votes yes",
+        "the vote of 'a' for 'G' in round 2 arrives",
+        "the vote of 'b' for 'G' in round 2 arrives",
+        "the coordinator decides 'G' in round 2: it fires",
+    )
