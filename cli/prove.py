@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
+from firable.cli.loop import machines_option, read_machines
 from firable.cli.options import answer, format_option, load_net, net_argument, write_folder
 from firable.cli.report import Report
 
@@ -28,16 +29,18 @@ if TYPE_CHECKING:
     metavar="SECONDS",
     help="Give up an obligation after so much time.",
 )
+@machines_option
 @format_option
-def prove(net: str, smt_dir: str | None, timeout: float, format_: str) -> int:
+def prove(net: str, smt_dir: str | None, timeout: float, machines: str | None, format_: str) -> int:
     """Split NET by ownership, print the coordinator table, and discharge every obligation with z3.
 
     Eq. (7) and (8) for every transition, (9)-(10) for every place, one decider for all that compete (O2), no gate read
     from a copy (O3), ownership, initial marking, commands, and that the arbiters together choose as the central one
     does. Of each of O1-O9 it is told whether it is proved, and where, or assumed. A violated obligation shows the
-    values of the net's own names that refute it.
+    values of the net's own names that refute it. With --machines the gates that a vote relies on (O4) are asked of the
+    loop that the plant closes, instead of being assumed.
     """
-    return answer("prove", format_, lambda: _report(net, smt_dir, timeout), _show)
+    return answer("prove", format_, lambda: _report(net, smt_dir, timeout, machines), _show)
 
 
 def show_obligations(verdicts: Sequence[Verdict]) -> None:
@@ -56,7 +59,7 @@ def show_obligations(verdicts: Sequence[Verdict]) -> None:
         click.echo(f"  {click.style(symbol, fg=colour)} {count} {family.title:<16} {family.says}")
 
 
-def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
+def _report(argument: str, smt_dir: str | None, timeout: float, machines: str | None) -> Report:
     from firable.decompose.proofs.assumptions import assumptions
     from firable.decompose.proofs.proving import prove as prove_split
     from firable.decompose.proofs.standing import standing
@@ -66,16 +69,24 @@ def _report(argument: str, smt_dir: str | None, timeout: float) -> Report:
     with loaded.placing():
         decomposition = split(loaded.net)
     found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)))
+    verdicts, loop = found.verdicts, None
+    if machines is not None:
+        from firable.decompose.proofs.persisting import persistence
+        from firable.nets.machines.closing import close
+
+        loop = close(loaded.net, read_machines(machines))
+        verdicts += persistence(decomposition, loop)
     files = write_folder(smt_dir, found.files) if smt_dir is not None else ()
     return Report(
         "prove",
         argument,
         loaded.net,
-        found.verdicts,
+        verdicts,
         notes=loaded.notes,
         table=decomposition.table,
         assumptions=tuple(map(str, assumptions(decomposition))),
-        standing=tuple(standing(decomposition, found.verdicts)),
+        standing=tuple(standing(decomposition, verdicts)),
+        loop_net=None if loop is None else loop.net,
         files=files,
     )
 
@@ -97,14 +108,27 @@ def _show(report: Report) -> None:
         click.echo(f"  {line.name}  {line.says}")
         click.echo(f"      {line.status}: {line.by}")
     if report.assumptions:
-        click.echo(f"\n{click.style('assumed of the cell', bold=True)}")
-        for assumption in report.assumptions:
-            click.echo(f"  {assumption} [O4]")
+        _show_assumptions(report)
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
-    if refuted:
-        text.show_verdicts(report.net, refuted)
+    for net, of_loop in ((report.net, False), (report.loop_net, True)):
+        some = [verdict for verdict in refuted if verdict.name.startswith("o4.") is of_loop]
+        if net is not None and some:
+            text.show_verdicts(net, some)
     text.show_summary(report)
     if report.files:
         from pathlib import Path
 
         click.echo(f"  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
+
+
+def _show_assumptions(report: Report) -> None:
+    """What is assumed of the cell, or where its machines were given what became of it."""
+    asked = [verdict for verdict in report.verdicts if verdict.name.startswith("o4.")]
+    if asked:
+        click.echo(f"\n{click.style('asked of the cell with its machines', bold=True)}")
+        for verdict in asked:
+            click.echo(text.verdict_line(verdict, max(len(one.name) for one in asked)))
+        return
+    click.echo(f"\n{click.style('assumed of the cell', bold=True)}")
+    for assumption in report.assumptions:
+        click.echo(f"  {assumption} [O4]")

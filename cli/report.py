@@ -36,7 +36,8 @@ class ExitCode(IntEnum):
 class Report:
     """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON.
 
-    `again` says that the same was decided before, which a program need not know.
+    `loop_net` is the net that the runs of the verdicts `o4.…` are of. `again` says that the same was decided before,
+    which a program need not know.
     """
 
     command: str
@@ -53,6 +54,7 @@ class Report:
     files: Sequence[str] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
     loop: Mapping[str, Any] = field(default_factory=dict)
+    loop_net: Net | None = None
     again: bool = False
 
     @property

@@ -25,8 +25,7 @@ from firable.analysis.spaces.reachability import Budget
 from firable.decompose.proofs.assumptions import Assumption, assumptions
 from firable.nets.decomposition import Coordinated, Decomposition
 from firable.nets.formula import And, Firable, Formula, Holds, Not, Or
-from firable.nets.machines.closing import ClosedLoop, close
-from firable.nets.machines.plant_file import PlantModel
+from firable.nets.machines.closing import ClosedLoop
 from firable.nets.net import SignalKind, Transition
 from firable.nets.verdict import Status, Verdict, Witness
 from firable.semantics.player import Player
@@ -40,12 +39,11 @@ def name_of(assumption: Assumption) -> str:
     return f"o4.{assumption.transition}.{assumption.signal}"
 
 
-def persistence(decomposition: Decomposition, model: PlantModel, budget: Budget | None = None) -> tuple[Verdict, ...]:
-    """The verdict on each assumption O4 with the machines of a plant, and one on the gates of completions.
+def persistence(decomposition: Decomposition, loop: ClosedLoop, budget: Budget | None = None) -> tuple[Verdict, ...]:
+    """The verdict on each assumption O4 in the closed loop of the net, and one on the gates of completions.
 
-    Raises `InputError` as `close` does.
+    Runs are those of the loop.
     """
-    loop = close(decomposition.net, model)
     rows = {row.name: row for row in decomposition.table}
     families = []
     for one in assumptions(decomposition):

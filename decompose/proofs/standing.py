@@ -60,6 +60,11 @@ def standing(decomposition: Decomposition, verdicts: Iterable[Verdict]) -> Itera
     given = list(verdicts)
     for name, says in SAYS.items():
         families = [family for family in FAMILIES if name in family.serves and proved_of(family, given)]
+        if name == "O4" and (held := [verdict for verdict in given if verdict.name.startswith("o4.")]):
+            shown = overall(held)
+            status = "shown in the loop" if shown is Status.PROVED else shown.value
+            yield Standing(name, says, status, "with the machines that were given")
+            continue
         if not families:
             status, by = OTHERWISE.get(name, ("unknown", "no verdict is on it"))
             yield Standing(name, says, status, by + _listed(name, decomposition))

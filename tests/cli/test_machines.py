@@ -83,3 +83,31 @@ def test_what_does_not_go_together_is_refused(
     assert main(["check", CELL, *arguments]) == 2
     captured = capsys.readouterr()
     assert message in captured.err + captured.out
+
+
+def test_prove_asks_the_assumptions_of_the_machines(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["prove", CELL, "--machines", PLANT]) == 0
+    told = capsys.readouterr().out
+    assert "shown in the loop: with the machines that were given" in told
+    assert "✓ proved    o4.G4.mc.part_present" in told
+    assert "assumed of the cell" not in told
+
+
+def test_prove_shows_the_run_in_which_a_machine_closes_a_gate_after_the_vote(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
+    path = tmp_path / "flickers.plant.yaml"
+    path.write_text(text.replace("{occupied: mc_table}", "{occupied: mc_table, may_flicker: true}"), "utf-8")
+    assert main(["prove", CELL, "--machines", str(path)]) == 1
+    told = capsys.readouterr().out
+    assert (
+        "12. mc.part_present/drops          the sensor of mc.part_present drops, though the workpiece is there" in told
+    )
+    assert "'t2-82' had voted yes, and the last firing makes 'mc.part_present' 0" in told
+    assert "hint: put the interlock into the machine's own controller" in told
+    assert main(["prove", CELL, "--machines", str(path), "--format", "json"]) == 1
+    data = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator(SCHEMA).validate(data)
+    (o4,) = [line for line in data["reports"][0]["standing"] if line["name"] == "O4"]
+    assert o4["status"] == "violated"

@@ -26,7 +26,7 @@ def plant_with(old: str, new: str) -> PlantModel:
 @pytest.mark.parametrize("cell", CELLS)
 def test_the_machines_of_the_catalogue_keep_every_assumption(cell: str) -> None:
     decomposition = split(catalogue_net(cell))
-    verdicts = persistence(decomposition, catalogue_plant(cell))
+    verdicts = persistence(decomposition, close(decomposition.net, catalogue_plant(cell)))
     assert [verdict.name for verdict in verdicts] == [*map(name_of, assumptions(decomposition)), COMPLETIONS]
     assert all(verdict.holds for verdict in verdicts)
 
@@ -41,7 +41,7 @@ def test_the_machines_of_the_catalogue_keep_every_assumption(cell: str) -> None:
 def test_a_sensor_that_is_not_exact_breaks_its_assumption_alone(old: str, new: str, name: str, move: str) -> None:
     plant = plant_with(old, new)
     net = catalogue_net("one_robot")
-    verdicts = {verdict.name: verdict for verdict in persistence(split(net), plant)}
+    verdicts = {verdict.name: verdict for verdict in persistence(split(net), close(net, plant))}
     broken = verdicts.pop(name)
     assert broken.status is Status.VIOLATED
     assert "interlock" in broken.hint
@@ -71,7 +71,8 @@ def test_a_gate_that_another_machine_closes_is_found() -> None:
     plant = plant_with(
         "robot.touch:            {holding: R}", "robot.touch: {holding: R}\n  mc.entry_taken: {occupied: cv1_entry}"
     )
-    verdicts = {verdict.name: verdict for verdict in persistence(split(parse_net(wrong)), plant)}
+    net = parse_net(wrong)
+    verdicts = {verdict.name: verdict for verdict in persistence(split(net), close(net, plant))}
     taken = verdicts["o4.G6.mc.entry_taken"]
     assert taken.status is Status.VIOLATED
     assert taken.witness is not None
