@@ -55,6 +55,7 @@ class Report:
     run: Mapping[str, Any] = field(default_factory=dict)
     loop: Mapping[str, Any] = field(default_factory=dict)
     loop_net: Net | None = None
+    split: Mapping[str, Any] = field(default_factory=dict)
     again: bool = False
 
     @property
@@ -82,7 +83,7 @@ class Report:
         }
         if self.table:
             data["table"] = [_row_to_json(row) for row in self.table]
-        for key in ("discipline", "course", "figures", "assumptions", "files", "run", "loop"):
+        for key in ("discipline", "course", "figures", "assumptions", "files", "run", "loop", "split"):
             if value := getattr(self, key):
                 data[key] = list(value) if isinstance(value, tuple) else value
         if self.standing:

@@ -1,0 +1,178 @@
+"""`firable split`: who owns what, what the coordinator decides and why, and what each controller must know."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from textwrap import indent
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from firable.cli import text
+from firable.cli.options import answer, format_option, load_net, net_argument, write_folder
+from firable.cli.report import Report
+
+if TYPE_CHECKING:
+    from firable.decompose.splitting.persistence import Persistence
+    from firable.nets.decomposition import Decomposition
+
+_NAMES_MAX = 10  # in one line of text
+_CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
+
+
+@click.command(short_help="Split a net over its controllers: table, arbitration, votes, what each must know.")
+@net_argument
+@click.option("--subnets", "subnet_dir", metavar="DIR", help="Write the subnet of each controller as a net file.")
+@click.option(
+    "--max-seconds",
+    type=click.FloatRange(min=0),
+    default=20.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Give up so late which votes are persistent.",
+)
+@format_option
+def split(net: str, subnet_dir: str | None, max_seconds: float, format_: str) -> int:
+    """Split NET by ownership and tell what follows from it.
+
+    The coordinator table; what became coordinated because of a gate or a conflict; the arbitration groups, and who
+    decides each; which parts are persistent, that is, whose yes no other transition takes back, and which may leave
+    out the promise; of each controller what it fires alone, votes on, locks for others, and whom it talks to.
+
+    `firable prove` proves the split.
+    """
+    return answer("split", format_, lambda: _report(net, subnet_dir, max_seconds), _show)
+
+
+def _report(argument: str, subnet_dir: str | None, max_seconds: float) -> Report:
+    from firable.analysis.deadline import Deadline
+    from firable.analysis.goal import Limits
+    from firable.decompose.splitting.cut import split as split_net
+    from firable.decompose.splitting.persistence import persistence
+
+    loaded = load_net(argument)
+    with loaded.placing():
+        decomposition = split_net(loaded.net)
+    found = persistence(decomposition, limits=Limits(Deadline.after(max_seconds)))
+    files = write_folder(subnet_dir, _subnets(decomposition)) if subnet_dir is not None else ()
+    return Report(
+        "split",
+        argument,
+        loaded.net,
+        found.verdicts,
+        notes=loaded.notes,
+        table=decomposition.table,
+        files=files,
+        split=_split_json(found),
+    )
+
+
+def _subnets(decomposition: Decomposition) -> dict[str, str]:
+    from firable.nets.bundle import file_stem
+    from firable.nets.printing import format_net
+
+    return {f"{file_stem(subnet.name)}.firable.yaml": format_net(subnet) for subnet in decomposition.subnets}
+
+
+def _split_json(found: Persistence) -> dict[str, Any]:
+    """What `split.json` of a bundle holds, with the groups, and the parts that may leave out the promise."""
+    from firable.nets.bundle_records import table_to_json
+    from firable.nets.knowledge import split_to_json
+
+    free = set(found.free_of_promise)
+    facts = split_to_json(found.decomposition)
+    for one in facts["controllers"]:
+        del one["undisturbing"]
+        one["promises"] = [part for _, part in one["votes"] if part not in free]
+    return {**facts, "groups": table_to_json(found.decomposition)["groups"]}
+
+
+def _show(report: Report) -> None:
+    from firable.decompose.splitting.table import table_text
+
+    for note in report.notes:
+        text.show_diagnostic(note)
+    text.heading(report.net, report.input)
+    click.echo(f"\n{click.style('coordinator table', bold=True)}")
+    click.echo(indent(table_text(report.table), "  "), nl=False)
+    if not report.table:
+        click.echo("  no transition has more than one participant")
+    for title, lines in (
+        ("coordinated because of a gate or a conflict", _because(report.split["coordinated"])),
+        ("arbitration", _groups(report)),
+        ("votes", _votes(report)),
+        ("controllers", _controllers(report)),
+    ):
+        if told := list(lines):
+            click.echo(f"\n{click.style(title, bold=True)}")
+            for line in told:
+                click.echo(f"  {line}")
+    if report.files:
+        click.echo(f"\n{text.counted(len(report.files), 'subnet')} in {Path(report.files[0]).parent}")
+
+
+def _because(reasons: Sequence[dict[str, Any]]) -> Iterator[str]:
+    for reason in reasons:
+        if reason["because"] == "gate":
+            yield f"{reason['transition']}: would be local but for {_listed(reason['gates'])}"
+        elif reason["because"] == "conflict":
+            yield f"{reason['transition']}: local, in conflict with {reason['rival']} at {reason['place']}"
+
+
+def _groups(report: Report) -> Iterator[str]:
+    for group in report.split["groups"]:
+        members = list(dict.fromkeys((*group["sequence"], *group["rest"])))
+        by = {"priority": "by priority", "order": "in a given order", "rotation": "in rotation"}[group["by"]]
+        rule = by if group["sequence"] else "by the order of the file"
+        yield f"{group['name']}: {_listed(members)}; decided by {group['controller'] or _top(report)} {rule}"
+
+
+def _top(report: Report) -> str:
+    from firable.nets.knowledge import COORDINATOR
+
+    return report.net.coordinator.name if report.net.coordinator else COORDINATOR
+
+
+def _votes(report: Report) -> Iterator[str]:
+    """How many votes are persistent; of the others each, with what takes it back."""
+    persistent = sum(verdict.holds for verdict in report.verdicts)
+    promising = sum(len(one["promises"]) for one in report.split["controllers"])
+    if report.verdicts:
+        yield f"{persistent} of {len(report.verdicts)} are persistent: no other transition takes the yes back"
+        yield f"{len(report.verdicts) - promising} of these may leave out the promise, as nothing there waits for them"
+    others = [verdict for verdict in report.verdicts if not verdict.holds]
+    for verdict in others[:_CONTROLLERS_MAX]:
+        part, names = verdict.name.removeprefix("persistent."), _listed(verdict.subjects)
+        if verdict.status.value == "unknown":
+            yield f"? {part}: not decided ({verdict.bound}){f'; {names} may take it back' if names else ''}"
+            continue
+        firings = verdict.witness.firings if verdict.witness else ()
+        way = ", ".join(name for fired in firings[-4:] for name in fired)
+        yield f"· {part}: taken back by {names}, as after {'… ' if len(firings) > 4 else ''}{way}"
+    if len(others) > _CONTROLLERS_MAX:
+        yield f"and {len(others) - _CONTROLLERS_MAX} more that are not; --format json has them all"
+
+
+def _controllers(report: Report) -> Iterator[str]:
+    known = report.split["controllers"]
+    for one in known[:_CONTROLLERS_MAX]:
+        counts = ((len(one[key]), word) for key, word in (("places", "place"), ("signals", "signal")))
+        yield f"{click.style(one['controller'], bold=True)}  {', '.join(text.counted(n, w) for n, w in counts if n)}"
+        told = (
+            ("fires alone", one["fires"]),
+            ("decides", one["decides"]),
+            ("votes on", [f"{name} ({part})" if name != part else name for name, part in one["votes"]]),
+            ("must promise", one["promises"]),
+            ("locks for others", [f"{place} ({name})" for place, name in one["locks"]]),
+            ("answers for", list(dict.fromkeys(signal for signal, _ in one["answers"]))),
+            ("talks to", one["talks_to"]),
+        )
+        yield from (f"  {title:<17}{_listed(names)}" for title, names in told if names)
+    if len(known) > _CONTROLLERS_MAX:
+        yield f"and {len(known) - _CONTROLLERS_MAX} more; --format json has them all"
+
+
+def _listed(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:_NAMES_MAX])
+    return f"{shown} and {len(names) - _NAMES_MAX} more" if len(names) > _NAMES_MAX else shown

@@ -1,0 +1,96 @@
+"""`firable split`: what it tells of a split, as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from pathlib import Path
+from textwrap import indent
+from typing import Any
+
+import jsonschema
+import pytest
+from support.published import COORDINATOR_TABLE
+from support.reference import load_net
+
+from firable.cli.main import main
+from firable.decompose.splitting.cut import split
+from firable.nets.catalogue import catalogue_net
+from firable.nets.printing import format_net
+from firable.nets.text import read_net
+
+SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+
+
+def as_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, Any]:
+    """The exit code and the JSON of the command, which has to fit the published schema."""
+    capsys.readouterr()
+    code = main(["split", *arguments, "--format", "json"])
+    data = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator(SCHEMA).validate(data)
+    return code, data
+
+
+def written(folder: Path, name: str) -> str:
+    """A net of the reference as a file."""
+    path = folder / f"{name}.firable.yaml"
+    path.write_text(format_net(load_net(name)), encoding="utf-8")
+    return str(path)
+
+
+def test_split_of_the_cell_tells_the_published_table_and_the_two_votes_that_do_not_stand(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["split", "catalogue:one_robot"]) == 0
+    told = capsys.readouterr().out
+    assert indent(COORDINATOR_TABLE, "  ") in told
+    assert "22 of 24 are persistent" in told
+    assert "· t1-41: taken back by G2, as after G1, G2" in told
+    assert "conflict-1: G2, G6; decided by system by the order of the file" in told
+    assert "because of a gate" not in told
+
+
+def test_split_tells_which_transition_only_a_gate_makes_global(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["split", written(tmp_path, "remote_gate")]) == 0
+    told = capsys.readouterr().out
+    assert "l: would be local but for c2.y" in told
+    assert "locks for others c2.y (l)" in told
+
+
+def test_split_tells_which_local_transition_a_conflict_takes_to_the_coordinator(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["split", written(tmp_path, "local_conflict")]) == 0
+    assert "l: local, in conflict with G at c1." in capsys.readouterr().out
+
+
+def test_json_of_a_split_holds_what_each_controller_must_know(capsys: pytest.CaptureFixture[str]) -> None:
+    code, data = as_json(capsys, "catalogue:one_robot")
+    (report,) = data["reports"]
+    assert (code, report["status"]) == (0, "proved")
+    mc = next(one for one in report["split"]["controllers"] if one["controller"] == "mc")
+    assert (mc["fires"], mc["promises"], mc["talks_to"]) == (["t2-a", "t2-b"], ["t2-82"], ["system"])
+    assert [group["rest"] for group in report["split"]["groups"]] == [["G2", "G6"], ["G5", "G8"]]
+    assert sum(verdict["status"] == "violated" for verdict in report["verdicts"]) == 2
+
+
+def test_subnets_are_written_as_net_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["split", "catalogue:one_robot", "--subnets", str(tmp_path / "subnets")]) == 0
+    assert "4 subnets in" in capsys.readouterr().out
+    assert read_net(tmp_path / "subnets" / "robot.firable.yaml") == split(catalogue_net("one_robot")).subnet("robot")
+
+
+def test_net_without_owners_is_refused_with_a_hint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "bare.firable.yaml"
+    path.write_text("firable: 1\ncell: bare\nplaces: {p: , q: }\nstart: p\ntransitions: {t: {from: p, to: q}}\n")
+    assert main(["split", str(path)]) == 2
+    assert "F2011" in capsys.readouterr().err
+
+
+def test_large_split_is_told_in_part(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["split", "catalogue:manufacturing_cells-60", "--max-seconds", "0"]) == 0
+    told = capsys.readouterr().out
+    assert "and 60 more; --format json has them all" in told
+    assert "s1_load may take it back" in told
