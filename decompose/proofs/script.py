@@ -59,11 +59,13 @@ def block(name: str, statement: str, assertions: tuple[Term, ...]) -> str:
 
 
 class Reader:
-    """z3, reading a file from its beginning; `timeout_ms` is for each answer."""
+    """z3, reading a file from its beginning, up to its first block; `timeout_ms` is for each answer."""
 
-    def __init__(self, timeout_ms: int) -> None:
+    def __init__(self, timeout_ms: int, beginning: str = f"{LOGIC}\n") -> None:
         self._context = z3.Context()
-        self._read(f"(set-option :timeout {timeout_ms})\n(set-option :smt.random_seed {SEED})\n{LOGIC}\n")
+        said = self._read(f"(set-option :timeout {timeout_ms})\n(set-option :smt.random_seed {SEED})\n{beginning}")
+        if said:
+            raise ScriptError(f"z3 said {said} to\n{beginning}")
 
     def _read(self, text: str) -> list[str]:
         said: str = z3.Z3_eval_smtlib2_string(self._context.ref(), text)

@@ -16,9 +16,10 @@ The rest says what messages say: that of what was sent the cause is true, and th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
-from firable.decompose.protocol.parametric.logic import Formula, closed, exists, same
+from firable.decompose.protocol.parametric.logic import Definition, Formula, both, closed, exists, same
 from firable.decompose.protocol.parametric.system import (
     abort_order,
     acknowledgement,
@@ -54,7 +55,7 @@ from firable.decompose.protocol.parametric.system import (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Conjunct:
     """One sentence of the invariant; `formula` is for all values of its free variables."""
 
@@ -62,10 +63,10 @@ class Conjunct:
     words: str
     formula: Formula
 
-    @property
-    def sentence(self) -> Formula:
-        """The formula with its quantifiers."""
-        return closed(self.formula)
+    @cached_property
+    def sentence(self) -> Definition:
+        """The formula with its quantifiers, under its name."""
+        return Definition(f"inv-{self.name}", (), closed(self.formula))
 
 
 _underway = committed(r, t) & ~obeyed(r, t, owner(p)) & writes(t, p)
@@ -112,3 +113,6 @@ INVARIANT: Final = (
         closed_round(r) & asked(r, t) & takes_part(t, c)).implies(obeyed(r, t, c))),
 )  # fmt: skip
 """The invariant; the order is the one of the documentation."""
+
+invariant: Final = Definition("invariant", (), both([conjunct.sentence() for conjunct in INVARIANT]))
+"""All conjuncts together."""

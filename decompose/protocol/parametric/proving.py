@@ -1,7 +1,8 @@
 """The theorem decided by z3, and brought to one decomposition by the side conditions.
 
-The files are the same for every net, so the verdicts are found once in a process and given to every net. z3 reads the
-very text of the file.
+One file holds the whole theorem: what is assumed of every net, the protocol's relations, the invariant, and each
+obligation in a block of its own, as in the files of `firable.decompose.proofs`. It is the same for every net, so
+it is decided once in a process. z3 reads the very text.
 """
 
 from __future__ import annotations
@@ -10,16 +11,19 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Final
 
-import z3
-
-from firable.analysis.induction.smt import SEED
+from firable.analysis.induction.smt import Answer
+from firable.decompose.proofs.script import Reader
+from firable.decompose.protocol.parametric.fragment import dependencies, order
 from firable.decompose.protocol.parametric.side_conditions import side_conditions
-from firable.decompose.protocol.parametric.theorem import ParametricObligation, parametric_obligations
+from firable.decompose.protocol.parametric.system import PROTOCOL, Protocol
+from firable.decompose.protocol.parametric.theorem import ParametricObligation, parametric_obligations, theory
 from firable.nets.decomposition import Decomposition
 from firable.nets.verdict import Status, Verdict
 
 TIMEOUT_MS: Final = 10_000
-"""For each obligation; each takes some hundredths of a second."""
+"""For each obligation; each takes some thousandths of a second."""
+
+FILE: Final = "protocol.smt2"
 
 
 def parametric_verdicts(
@@ -28,53 +32,50 @@ def parametric_verdicts(
     """The verdicts `protocol.*` on one decomposition, and the text of each SMT-LIB 2 file by its name.
 
     The protocol does what the central net does, for whatever decomposition fulfils the side conditions; so all of them
-    must be proved, those of the theorem and the `protocol.side.*` of this decomposition. Some seconds for the first
-    net of a process, then linear in its arcs and gates.
+    must be proved, those of the theorem and the `protocol.side.*` of this decomposition. Less than a second for the
+    first net of a process, then linear in its arcs and gates.
     """
-    verdicts, files = theorem(timeout_ms)
-    return (*verdicts, *side_conditions(decomposition)), dict(files)
+    verdicts, text = theorem(timeout_ms)
+    return (*verdicts, *side_conditions(decomposition)), {FILE: text}
 
 
 @cache
-def theorem(timeout_ms: int = TIMEOUT_MS) -> tuple[tuple[Verdict, ...], tuple[tuple[str, str], ...]]:
-    """The verdict on each obligation of the theorem, and the names and texts of the files."""
-    verdicts, files = [], []
-    for obligation in parametric_obligations():
-        text = obligation.text
-        files.append((file_name(obligation), text))
-        verdicts.append(_verdict(obligation, text, timeout_ms))
-    return tuple(verdicts), tuple(files)
+def theorem(timeout_ms: int = TIMEOUT_MS) -> tuple[tuple[Verdict, ...], str]:
+    """The verdict on each obligation of the theorem, and the file that holds all of them."""
+    obligations = tuple(parametric_obligations())
+    sorts = order({edge for obligation in obligations for edge in dependencies(obligation.script.formulas)})
+    assert sorts is not None, "the theorem is outside the decidable fragment"
+    head = "".join(f"; {line}\n" for line in (*_HEAD, f"  {', '.join(sort.name for sort in sorts)}."))
+    beginning = head + start(PROTOCOL)
+    reader = Reader(timeout_ms, beginning)
+    verdicts = tuple(_verdict(obligation, reader.answer(obligation.block)) for obligation in obligations)
+    return verdicts, beginning + "".join(obligation.block for obligation in obligations)
 
 
-def file_name(obligation: ParametricObligation) -> str:
-    """The name of the file of an obligation, as `proofs.proving.evidence_name` forms it.
-
-    >>> from firable.decompose.protocol.parametric.theorem import parametric_obligations
-    >>> file_name(next(parametric_obligations()))
-    'protocol-starts.smt2'
-    """
-    return f"protocol-{obligation.name}.smt2"
+def start(protocol: Protocol) -> str:
+    """What stands in the file before the first obligation."""
+    return "\n".join(theory(protocol).lines()) + "\n"
 
 
-def decide_text(text: str, *, timeout_ms: int = TIMEOUT_MS) -> tuple[z3.CheckSatResult, z3.Solver]:
-    """What z3 answers to a file, and the solver, which has a model where the answer is `sat`."""
-    solver = z3.Solver(ctx=z3.Context())
-    solver.set("random_seed", SEED)
-    solver.set("timeout", timeout_ms)
-    solver.from_string(text)
-    return solver.check(), solver
+_HEAD: Final = (
+    "The voting protocol does what the central net does: for any net, any number of controllers and of rounds",
+    "Each block asserts that its sentence does not hold, so the answer `unsat` proves it.",
+    "The relations: what there is in a net, who holds what, what the coordinator knows, which messages were sent.",
+    "A relation with a number, as marked.1, is what a step makes of it; a definition with one speaks of these.",
+    "To check it with another solver: cvc5 --incremental FILE, or z3 FILE; every name is followed by `unsat`.",
+    "It can be decided, for functions and what depends on what go one way through the sorts:",
+)
 
 
-def _verdict(obligation: ParametricObligation, text: str, timeout_ms: int) -> Verdict:
-    answer, solver = decide_text(text, timeout_ms=timeout_ms)
-    name, file = f"protocol.{obligation.name}", file_name(obligation)
-    method = "z3, of the negated obligation, for every net"
-    if answer == z3.unsat:
-        return Verdict(name, Status.PROVED, obligation.statement, method, evidence=(file,))
-    if answer == z3.sat:
-        hint = "the protocol itself is at fault, for every net: do not run it"
-        return Verdict(name, Status.VIOLATED, obligation.statement, method, code="F4002", hint=hint, evidence=(file,))
-    bound = f"z3 gave up: {solver.reason_unknown()}"
-    return Verdict(
-        name, Status.UNKNOWN, obligation.statement, method, bound=bound, hint="allow more time", evidence=(file,)
-    )
+def _verdict(obligation: ParametricObligation, answer: Answer) -> Verdict:
+    def verdict(status: Status, code: str = "", hint: str = "", bound: str = "") -> Verdict:
+        name, method = f"protocol.{obligation.name}", "z3, of the negated obligation, for nets of any size"
+        return Verdict(name, status, obligation.statement, method, code=code, hint=hint, bound=bound, evidence=(FILE,))
+
+    match answer:
+        case Answer.UNSAT:
+            return verdict(Status.PROVED)
+        case Answer.SAT:
+            return verdict(Status.VIOLATED, "F4002", "the protocol itself is at fault: run no net by it")
+        case Answer.UNKNOWN:
+            return verdict(Status.UNKNOWN, hint="allow more time", bound="z3 gave up")

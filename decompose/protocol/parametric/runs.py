@@ -187,7 +187,7 @@ def _events(protocol: Protocol, steps: Sequence[Step]) -> Iterator[str]:
 def _script(
     protocol: Protocol, stage: _Stage, steps: Sequence[Step], goal: Formula, given: Sequence[Formula]
 ) -> Script:
-    script = Script(("A run of the protocol.",))
+    script = Script()
     for words, formula in protocol.static:
         script.add(formula, f"net: {words}")
     for sort, things in stage.sorts:

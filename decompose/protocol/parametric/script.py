@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Final
 
 from firable.decompose.protocol.parametric.logic import (
     Application,
@@ -29,6 +30,8 @@ from firable.decompose.protocol.parametric.logic import (
     terms_of,
     text_of,
 )
+
+LOGIC: Final = "(set-logic UF)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,24 +75,41 @@ class Action:
 class Script:
     """The lines of a file, as they are added."""
 
-    def __init__(self, comments: Iterable[str] = ()) -> None:
-        self.comments = tuple(comments)
+    def __init__(self) -> None:
         self.formulas: list[Formula] = []
         """Every formula that was asserted or defines a change, for `fragment`."""
         self._sorts: dict[Sort, None] = {}
         self._declared: dict[str, str] = {}
         self._body: list[str] = []
         self._versions: dict[Relation, int] = {}
+        self._moments: dict[Definition, list[tuple[int, ...]]] = {}
+        """For each definition, the versions of its relations of which it was spoken so far."""
         self._written: dict[str, str] = {}
         """The text of each definition, by its symbol: two of one name would be taken for one."""
+        self._shared = (0, 0)
+        """How many declarations and lines of the body stand in what this one continues."""
 
-    def continued(self, comments: Iterable[str]) -> Script:
-        """A copy under another head, to go on with by itself."""
-        copy = Script(comments)
+    def continued(self) -> Script:
+        """A copy, to go on with by itself."""
+        copy = Script()
         copy.formulas = list(self.formulas)
         copy._sorts, copy._declared, copy._body = dict(self._sorts), dict(self._declared), list(self._body)
         copy._versions, copy._written = dict(self._versions), dict(self._written)
+        copy._moments = {definition: list(versions) for definition, versions in self._moments.items()}
+        copy._shared = len(self._declared), len(self._body)
         return copy
+
+    def remark(self, words: str) -> None:
+        """Add a comment."""
+        self._body.append(f"; {words}")
+
+    def speak_of(self, *items: Relation | Definition) -> None:
+        """Declare relations and write definitions before anything is said with them."""
+        for item in items:
+            if isinstance(item, Relation):
+                self._declare(item)
+            else:
+                self._define_once(item)
 
     def add(self, formula: Formula, words: str, names: Mapping[Variable, str] | None = None) -> None:
         """Assert a formula of the present moment; what nothing quantifies in it is a constant."""
@@ -97,7 +117,7 @@ class Script:
         for variable in free_variables(formula):
             self._declare_constant((names or {}).get(variable, variable.name), variable.sort)
         self.formulas.append(formula)
-        self._body.append(f"; {words}" if words else ";")
+        self.remark(words)
         self._body.append(f"(assert {text_of(formula, names, self._symbol)})")
 
     def observe(self, formula: Formula, name: str) -> None:
@@ -128,19 +148,33 @@ class Script:
             self._declare_sorts(update.relation.sorts)
             version = self._versions[update.relation] = self._versions.get(update.relation, 0) + 1
             typed = " ".join(f"({v.name} {v.sort.name})" for v in update.formals)
-            self._body.append(f"; {update.relation.name} after '{action.name}'")
+            self.remark(f"{update.relation.name} after '{action.name}'")
             self._body.append(_defined(f"{update.relation.name}.{version}", typed, text))
 
-    def text(self, *comments: str) -> str:
-        """The whole file, which ends by asking whether all of it can be true; its head ends with the comments."""
-        lines = [f"; {comment}".rstrip() for comment in (*self.comments, *comments)]
-        lines += ["(set-logic UF)", *(f"(declare-sort {sort.name} 0)" for sort in self._sorts)]
-        return "\n".join([*lines, *self._declared.values(), *self._body, "(check-sat)"]) + "\n"
+    def lines(self) -> list[str]:
+        """The whole theory: the logic, what is declared, and the body."""
+        sorts = [f"(declare-sort {sort.name} 0)" for sort in self._sorts]
+        return [LOGIC, *sorts, *self._declared.values(), *self._body]
+
+    def text(self) -> str:
+        """The whole theory as a file, which ends by asking whether all of it can be true."""
+        return "\n".join([*self.lines(), "(check-sat)"]) + "\n"
+
+    def more(self) -> list[str]:
+        """The lines that were added to what this one continues; no sort is among them."""
+        declared, body = self._shared
+        return [*list(self._declared.values())[declared:], *self._body[body:]]
 
     def _symbol(self, item: Relation | Definition) -> str:
-        moving = (item,) if isinstance(item, Relation) else item.moving
-        versions = [self._versions.get(relation, 0) for relation in moving]
-        return f"{item.name}.{'-'.join(map(str, versions))}" if any(versions) else item.name
+        if isinstance(item, Relation):
+            version = self._versions.get(item, 0)
+        else:
+            moments = self._moments.setdefault(item, [(0,) * len(item.moving)])
+            versions = tuple(self._versions.get(relation, 0) for relation in item.moving)
+            if versions not in moments:
+                moments.append(versions)
+            version = moments.index(versions)
+        return f"{item.name}.{version}" if version else item.name
 
     def _define(self, formula: Formula) -> None:
         """Declare and define, at the present moment, all that a formula speaks of and that is not yet there."""

@@ -25,11 +25,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
-from firable.decompose.protocol.parametric.fragment import dependencies, order
-from firable.decompose.protocol.parametric.invariant import INVARIANT
+from firable.decompose.protocol.parametric.invariant import INVARIANT, invariant
 from firable.decompose.protocol.parametric.logic import (
     Formula,
     any_of,
@@ -44,6 +42,7 @@ from firable.decompose.protocol.parametric.logic import (
 from firable.decompose.protocol.parametric.script import Action, Script
 from firable.decompose.protocol.parametric.system import (
     INITIAL,
+    MOVING,
     PROTOCOL,
     Protocol,
     abort_order,
@@ -87,12 +86,23 @@ class ParametricObligation:
     script: Script
 
     @property
-    def text(self) -> str:
-        """The file, whose head says why it can be decided."""
-        sorts = order(dependencies(self.script.formulas))
-        assert sorts is not None, f"{self.name} is outside the decidable fragment"
-        way = ", ".join(sort.name for sort in sorts)
-        return self.script.text(f"Decidable, for functions and what depends on what go one way: {way}.")
+    def block(self) -> str:
+        """What is asserted beyond the theory, as a block of the file of all obligations."""
+        lines = [f"; {self.statement}", "(push 1)", f'(echo "protocol.{self.name}")', *self.script.more()]
+        return "\n" + "\n".join([*lines, "(check-sat)", "(pop 1)"]) + "\n"
+
+
+def theory(protocol: Protocol = PROTOCOL) -> Script:
+    """What there is, what is assumed of every net, and what the invariant says."""
+    script = Script()
+    script.speak_of(*MOVING)
+    for words, formula in protocol.static:
+        script.add(formula, f"assumed of every net: {words}")
+    for conjunct in INVARIANT:
+        script.remark(f"invariant {conjunct.name}: {conjunct.words}")
+        script.speak_of(conjunct.sentence)
+    script.speak_of(invariant)
+    return script
 
 
 def parametric_obligations(protocol: Protocol = PROTOCOL) -> Iterator[ParametricObligation]:
@@ -107,11 +117,6 @@ def parametric_obligations(protocol: Protocol = PROTOCOL) -> Iterator[Parametric
     for action in protocol.actions:
         if action.name != "ask" and not action.fires:
             yield prover.advances(action)
-
-
-def whole_invariant() -> Formula:
-    """All conjuncts together."""
-    return both([conjunct.sentence for conjunct in INVARIANT])
 
 
 none_underway: Final = forall(s)(decided(s).implies(closed_round(s)))
@@ -152,32 +157,13 @@ class _Prover:
 
     def __init__(self, protocol: Protocol) -> None:
         self.protocol = protocol
+        self.theory = theory(protocol)
 
-    @cached_property
-    def net(self) -> Script:
-        """What is assumed of every net."""
-        script = Script()
-        for words, formula in self.protocol.static:
-            script.add(formula, f"net: {words}")
+    def begin(self) -> Script:
+        """Some configuration of which the invariant holds."""
+        script = self.theory.continued()
+        script.add(invariant(), "given: the invariant")
         return script
-
-    @cached_property
-    def configuration(self) -> Script:
-        """Some configuration in which the invariant holds, of some net."""
-        script = self.net.continued(())
-        for conjunct in INVARIANT:
-            script.add(conjunct.sentence, f"invariant {conjunct.name}: {conjunct.words}")
-        return script
-
-    def begin(self, name: str, statement: str, given: Script) -> Script:
-        """A file with its head and what is given."""
-        return given.continued(
-            (
-                f"protocol.{name} of the voting protocol, for any net and any number of controllers and rounds",
-                f"To prove: {statement}.",
-                "Asserted is that it does not hold, so the answer `unsat` proves it.",
-            )
-        )
 
     def implied(
         self, name: str, statement: str, given: Formula, claim: Formula, by: Action | None = None
@@ -186,7 +172,7 @@ class _Prover:
 
         The claim speaks of the moment after the action; what it says of the one before is marked `earlier`.
         """
-        script = self.begin(name, statement, self.configuration)
+        script = self.begin()
         script.add(given, "given")
         if by is not None:
             script.change(by)
@@ -197,17 +183,17 @@ class _Prover:
 
     def starts(self) -> ParametricObligation:
         statement = "the invariant holds at the start"
-        script = self.begin("starts", statement, self.net)
+        script = self.theory.continued()
         for words, formula in INITIAL:
             script.add(formula, f"start: {words}")
-        _deny(script, whole_invariant())
+        _deny(script, invariant())
         return ParametricObligation("starts", statement, script)
 
     def keeps(self, action: Action) -> ParametricObligation:
         name, statement = f"keeps.{action.name}", f"'{action.name}' keeps the invariant"
-        script = self.begin(name, statement, self.configuration)
+        script = self.begin()
         script.step(action)
-        _deny(script, whole_invariant())
+        _deny(script, invariant())
         return ParametricObligation(name, statement, script)
 
     # --- Safety
@@ -303,7 +289,7 @@ class _Prover:
             f"advances.{action.name}",
             f"'{action.name}' changes nothing, or makes something known for good",
         )
-        script = self.begin(name, statement, self.configuration)
+        script = self.begin()
         script.step(action)
         growing = (vote, heard, decided, obeyed, noted, closed_round)
         known = [begun(s) & relation(*formals_of(relation)) for relation in growing]
