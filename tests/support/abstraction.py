@@ -1,0 +1,141 @@
+"""What the parametric proof calls the things of a decomposition, and a run of it told as actions of the proof.
+
+A *configuration* is a structure with the relations of `parametric.system`. `explain` says by which actions one became
+another: it reads from the difference what must have happened, plays it, and compares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from support.finite_structures import Structure, Thing, Tuples, Values
+
+from firable.decompose.protocol.parametric.invariant import INVARIANT
+from firable.decompose.protocol.parametric.script import Action
+from firable.decompose.protocol.parametric.system import MOVING, PROTOCOL
+from firable.nets.decomposition import Decomposition
+
+Instance = tuple[str, tuple[Thing, ...]]
+"""An action with the values of its parameters."""
+
+
+def net_structure(decomposition: Decomposition, rounds: Sequence[Thing]) -> Structure:
+    """The things and the fixed relations of a decomposition; nothing moves yet."""
+    net = decomposition.net
+    rows = {row.name: row for row in decomposition.coordinated}
+    homes = {t.name: s.name for s in decomposition.subnets for t in s.transitions if t.name in net.transition_index}
+    part = [(row.name, its.controller) for row in rows.values() for its in row.parts]
+    part += [(name, home) for name, home in homes.items() if name not in rows]
+    openable_at = [
+        (row.name, its.controller)
+        for row in rows.values()
+        for its in row.parts
+        if decomposition.subnet(its.controller).transition(its.name).openable
+    ]
+    openable_at += [(n, home) for n, home in homes.items() if n not in rows and net.transition(n).openable]
+
+    def arcs(kind: str) -> Tuples:
+        return frozenset((t.name, place) for t in net.transitions for place in getattr(t, kind))
+
+    fixed: dict[str, Tuples] = {
+        "coordinated": frozenset((name,) for name in rows),
+        "takes-part": frozenset(part),
+        "openable": frozenset((t.name,) for t in net.transitions if t.openable),
+        "openable-at": frozenset(openable_at),
+        "input": arcs("inputs"),
+        "output": arcs("outputs"),
+        "permissive": arcs("permissive"),
+        "inhibitive": arcs("inhibitive"),
+    }
+    some_home = decomposition.subnets[0].name
+    return Structure(
+        {
+            "Place": tuple(place.name for place in net.places),
+            "Transition": tuple(t.name for t in net.transitions),
+            "Controller": tuple(subnet.name for subnet in decomposition.subnets),
+            "Round": tuple(rounds),
+        },
+        {
+            "owner": {place.name: place.owner or "" for place in net.places},
+            "home": {t.name: homes.get(t.name, some_home) for t in net.transitions},
+        },
+        {**fixed, **{relation.name: frozenset() for relation in MOVING}},
+    )
+
+
+def broken(configuration: Structure) -> list[str]:
+    """The names of the conjuncts of the invariant, and of the assumptions, that do not hold."""
+    found = [words for words, formula in PROTOCOL.static if not configuration.holds(formula, {})]
+    return found + [each.name for each in INVARIANT if not configuration.holds(each.sentence.body, {})]
+
+
+def instance(step: Instance) -> tuple[Action, Values]:
+    """An action of the protocol, and its parameters with their values."""
+    action = PROTOCOL.action(step[0])
+    return action, dict(zip(action.parameters, step[1], strict=True))
+
+
+def play(configuration: Structure, steps: Iterable[Instance]) -> Structure:
+    """The configuration after actions, of which each must be possible where it stands."""
+    for step in steps:
+        action, values = instance(step)
+        missing = configuration.may(action, values)
+        assert not missing, f"{step} is not possible: {missing}"
+        configuration = configuration.after(action, values)
+    return configuration
+
+
+def differences(found: Structure, wanted: Structure) -> list[str]:
+    """The relations that differ, with the tuples that one has more."""
+    return [
+        f"{relation.name}: {sorted(map(str, found.relations[relation.name] ^ wanted.relations[relation.name]))}"
+        for relation in MOVING
+        if found.relations[relation.name] != wanted.relations[relation.name]
+    ]
+
+
+def explain(before: Structure, after: Structure, fired: Sequence[str] = ()) -> list[Instance]:
+    """The actions by which one configuration becomes the other; `fired` are the local transitions that fired.
+
+    Raises `AssertionError` where there are none: then something has happened that the proof knows nothing of.
+    """
+    steps = list(_steps(before, after, fired))
+    reached = play(before, steps)
+    assert not differences(reached, after), f"{steps} leads elsewhere: {differences(reached, after)}"
+    return steps
+
+
+def _steps(before: Structure, after: Structure, fired: Sequence[str]) -> Iterator[Instance]:
+    def new(name: str) -> list[tuple[Thing, ...]]:
+        return sorted(after.relations[name] - before.relations[name], key=str)
+
+    yield from (("forget", pair) for pair in sorted({(r, c) for r, _, c in _forgotten(before, after)}, key=str))
+    yield from (("fire", (name,)) for name in fired)
+    yield from (("promise", key) for key in new("promised"))
+    for key in new("obeyed"):
+        if key in _forgotten(before, after):
+            continue
+        yield ("apply" if key[:2] in before.relations["committed"] else "release"), key
+    yield from (("hear", key) for key in new("heard"))
+    for (r,) in new("decided"):
+        commits = [key for key in new("committed") if key[0] == r]
+        yield ("decide", commits[0]) if commits else ("give-up", (r,))
+    yield from (("note", key) for key in new("noted"))
+    yield from (("close", key) for key in new("closed"))
+    yield from (("ask", key) for key in new("asked"))
+
+
+def _forgotten(before: Structure, after: Structure) -> set[tuple[Thing, ...]]:
+    """What a controller takes for obeyed because it has heard that the round is closed."""
+    fresh = after.relations["obeyed"] - before.relations["obeyed"]
+    return {key for key in fresh if (key[0],) in before.relations["closed"]}
+
+
+def with_relations(structure: Structure, **relations: Iterable[tuple[Thing, ...]]) -> Structure:
+    """The structure with other tuples in some relations; `_` in a name stands for a hyphen."""
+    named = {name.replace("_", "-"): frozenset(tuples) for name, tuples in relations.items()}
+    return replace(structure, relations={**structure.relations, **named})
+
+
+Explainer = Callable[[Structure, Structure], list[Instance]]
