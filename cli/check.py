@@ -13,7 +13,16 @@ from click.core import ParameterSource
 from firable.analysis.methods import Method
 from firable.cli import text
 from firable.cli.loop import loop_report, machines_option, show_loop
-from firable.cli.options import analysis_options, answer_all, budget, format_option, load_net, write_folder
+from firable.cli.options import (
+    analysis_options,
+    answer_all,
+    budget,
+    format_option,
+    load_net,
+    page_option,
+    with_page,
+    write_folder,
+)
 from firable.cli.report import Report
 from firable.cli.structure import structure_json, structure_lines
 
@@ -92,6 +101,7 @@ _NAME_MAX = 100  # of a net, in the name of a file
 )
 @machines_option
 @click.option("--loop-net", "loop_file", metavar="FILE", help="Write the net that NET and its --machines are together.")
+@page_option
 @click.option(
     "--no-cache", is_flag=True, help="Decide anew what was decided before of the same net; see FIRABLE_CACHE."
 )
@@ -111,6 +121,7 @@ def check(
     query_texts: tuple[str, ...],
     machines: str | None,
     loop_file: str | None,
+    page: str | None,
     no_cache: bool,
     progress: bool | None,
     verbose: bool,
@@ -128,14 +139,16 @@ def check(
     is shown side by side, and what a fault of each machine leads to.
     """
     allowed = budget(**limits)
+    if page is not None and len(nets) > 1:
+        raise click.UsageError("--report is a page on one net: name one NET")
     if machines is not None:
         _refuse_beside_machines()
-        closed = [partial(loop_report, net, machines, allowed, loop_file) for net in nets]
+        closed = [with_page(partial(loop_report, net, machines, allowed, loop_file), page) for net in nets]
         return answer_all("check", format_, closed, partial(show_loop, verbose=verbose))
     if loop_file is not None:
         raise click.UsageError("--loop-net goes with --machines")
     asked = _Asked(discipline, method, allowed, trace_dir, structure, not no_cache, query_file, query_texts, progress)
-    makers = [partial(_report, net, asked, evidence_dir, many=len(nets) > 1) for net in nets]
+    makers = [with_page(partial(_report, net, asked, evidence_dir, many=len(nets) > 1), page) for net in nets]
     return answer_all("check", format_, makers, partial(_show, verbose=verbose))
 
 

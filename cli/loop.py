@@ -57,11 +57,12 @@ def loop_report(argument: str, machines: str, allowed: Budget, loop_file: str | 
     return Report(
         "check",
         argument,
-        report.loop.net,
+        loaded.net,
         (*report.verdicts, *faults),
         discipline="interleaving",
         notes=loaded.notes,
         files=files,
+        loop_net=report.loop.net,
         loop={
             "machines": machines,
             "markings": figures.markings,
@@ -101,7 +102,7 @@ def show_loop(report: Report, *, verbose: bool) -> None:
         click.echo(click.style(line.rstrip(), fg="yellow" if differs else None))
         if "remark" in row:
             click.echo(f"      {row['remark']}")
-    text.show_verdicts(report.net, report.verdicts, verbose=verbose)
+    text.show_verdicts(report.loop_net or report.net, report.verdicts, verbose=verbose)
     text.show_summary(report)
     for file in report.files:
         if file != "-":

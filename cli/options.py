@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -29,6 +30,28 @@ format_option = click.option(
     show_default=True,
     help="How to print the report; `firable schema report` prints the schema of the JSON.",
 )
+
+
+page_option = click.option(
+    "--report", "page", metavar="FILE", help="Write the report as one HTML page, to read, print and send."
+)
+
+
+def with_page(make: Callable[[], Report], path: str | None) -> Callable[[], Report]:
+    """What makes a report, and its page as well where a file is named."""
+    if path is None:
+        return make
+    if path == "-":
+        raise click.UsageError("the page cannot go to standard output, where the report goes: name a file")
+
+    def make_both() -> Report:
+        from firable.cli.page.page import page_of
+
+        report = replace(make(), page=path)
+        write_text(path, page_of(report))
+        return report
+
+    return make_both
 
 
 def analysis_options(command: F) -> F:

@@ -9,7 +9,7 @@ import click
 
 from firable.cli import text
 from firable.cli.loop import machines_option, read_machines
-from firable.cli.options import answer, format_option, load_net, net_argument, write_folder
+from firable.cli.options import answer, format_option, load_net, net_argument, page_option, with_page, write_folder
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
     help="Give up an obligation after so much time.",
 )
 @machines_option
+@page_option
 @format_option
-def prove(net: str, smt_dir: str | None, timeout: float, machines: str | None, format_: str) -> int:
+def prove(net: str, smt_dir: str | None, timeout: float, machines: str | None, page: str | None, format_: str) -> int:
     """Split NET by ownership, print the coordinator table, and discharge every obligation with z3.
 
     Eq. (7) and (8) for every transition, (9)-(10) for every place, one decider for all that compete (O2), no gate read
@@ -40,7 +41,8 @@ def prove(net: str, smt_dir: str | None, timeout: float, machines: str | None, f
     values of the net's own names that refute it. With --machines the gates that a vote relies on (O4) are asked of the
     loop that the plant closes, instead of being assumed.
     """
-    return answer("prove", format_, lambda: _report(net, smt_dir, timeout, machines), _show)
+    make = with_page(lambda: _report(net, smt_dir, timeout, machines), page)
+    return answer("prove", format_, make, _show)
 
 
 def show_obligations(verdicts: Sequence[Verdict]) -> None:
@@ -86,6 +88,7 @@ def _report(argument: str, smt_dir: str | None, timeout: float, machines: str | 
         table=decomposition.table,
         assumptions=tuple(map(str, assumptions(decomposition))),
         standing=tuple(standing(decomposition, verdicts)),
+        decomposition=decomposition,
         loop_net=None if loop is None else loop.net,
         files=files,
     )
@@ -110,9 +113,8 @@ def _show(report: Report) -> None:
     if report.assumptions:
         _show_assumptions(report)
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
-    for net, of_loop in ((report.net, False), (report.loop_net, True)):
-        some = [verdict for verdict in refuted if verdict.name.startswith("o4.") is of_loop]
-        if net is not None and some:
+    for net in (report.net, report.loop_net):
+        if net is not None and (some := [verdict for verdict in refuted if report.net_of(verdict) is net]):
             text.show_verdicts(net, some)
     text.show_summary(report)
     if report.files:

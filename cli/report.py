@@ -10,16 +10,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from firable.decompose.proofs.standing import Standing
-    from firable.nets.decomposition import Coordinated
+    from firable.nets.decomposition import Coordinated, Decomposition
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
 VERSION = 1
+_OF_THE_LOOP: Final = frozenset({"loop", "fault", "o4"})
 
 
 class ExitCode(IntEnum):
@@ -36,8 +37,8 @@ class ExitCode(IntEnum):
 class Report:
     """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON.
 
-    `loop_net` is the net that the runs of the verdicts `o4.…` are of. `again` says that the same was decided before,
-    which a program need not know.
+    `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`). `page` is the report as a page
+    for a person, where one was written. `again` says that the same was decided before, which a program need not know.
     """
 
     command: str
@@ -54,9 +55,16 @@ class Report:
     files: Sequence[str] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
     loop: Mapping[str, Any] = field(default_factory=dict)
+    decomposition: Decomposition | None = None
     loop_net: Net | None = None
     split: Mapping[str, Any] = field(default_factory=dict)
+    page: str = ""
     again: bool = False
+
+    def net_of(self, verdict: Verdict) -> Net:
+        """The net that the runs of a verdict are of."""
+        of_loop = verdict.name.partition(".")[0] in _OF_THE_LOOP
+        return self.loop_net if of_loop and self.loop_net is not None else self.net
 
     @property
     def exit_code(self) -> ExitCode:
@@ -86,6 +94,8 @@ class Report:
         for key in ("discipline", "course", "figures", "assumptions", "files", "run", "loop", "split"):
             if value := getattr(self, key):
                 data[key] = list(value) if isinstance(value, tuple) else value
+        if self.page:
+            data["files"] = [*self.files, self.page]
         if self.standing:
             data["standing"] = [asdict(line) for line in self.standing]
         if self.notes:

@@ -75,11 +75,12 @@ def show_verdicts(
 
 def verdict_line(verdict: Verdict, width: int = 0, words: Mapping[str, str] = WORDS) -> str:
     """The line of a verdict: symbol, word, name, statement."""
-    symbol, word, colour = _mark(verdict, words)
+    symbol, word, colour = mark(verdict, words)
     return f"  {click.style(f'{symbol} {word:<8}', fg=colour)}  {verdict.name:<{width}}  {verdict.statement}"
 
 
-def _mark(verdict: Verdict, words: Mapping[str, str]) -> tuple[str, str, str | None]:
+def mark(verdict: Verdict, words: Mapping[str, str] = WORDS) -> tuple[str, str, str | None]:
+    """How a verdict ended: a sign, a word, a colour."""
     weight, status = verdict.weight.value, verdict.status.value
     if status == "proved":
         return "✓", "yes" if weight == "information" else words["proved"], "green"
@@ -163,3 +164,5 @@ def show_summary(report: Report) -> None:
         parts.append(counted(warnings, "warning"))
     word, colour = {0: ("all hold", "green"), 1: ("violated", "red")}.get(report.exit_code, ("not decided", "yellow"))
     click.echo(f"\n{click.style(word, fg=colour, bold=True)}: {', '.join(parts) or 'there is nothing to hold'}")
+    if report.page:
+        click.echo(f"  the report as a page: {report.page}")

@@ -1,0 +1,89 @@
+"""The page: one file with everything in it, which a browser shows, a printer prints and a mail can carry.
+
+No script, no picture, no font and no address is loaded from anywhere; what folds is the browser's own `details`. The
+same report gives the same bytes: there is no date and no measured time in it, so two pages can be compared.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from firable.cli.page.markup import Markup, raw, tag, together
+from firable.cli.page.sections import SECTIONS, counts_of, overall_badge, refuted
+from firable.cli.page.style import STYLE
+from firable.cli.report import Report
+from firable.cli.text import counted
+from firable.nets.verdict import Weight
+
+_ASKED: Final = {"prove": "Proof of the decomposition", "check": "Check of the net", "bundle": "Bundle"}
+_FAILING_MAX: Final = 6
+_POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'"
+
+
+def page_of(report: Report) -> str:
+    """The report as an HTML page, whole and by itself."""
+    title = f"{report.net.name or 'the net'}: {_ASKED.get(report.command, report.command)}"
+    made = [(section, markup) for section in SECTIONS if (markup := section.make(report)) is not None]
+    links = [tag("li", tag("a", section.title, href=f"#{section.anchor}")) for section, _ in made]
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("title", title),
+        tag("style", raw(STYLE)),
+    )
+    sections = [
+        tag("section", tag("h2", section.title), markup, id=section.anchor, aria_label=section.title)
+        for section, markup in made
+    ]
+    body = tag(
+        "body",
+        _masthead(report),
+        tag("nav", tag("div", tag("ul", links)), aria_label="sections") if links else None,
+        tag("main", sections),
+        _foot(report),
+    )
+    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+
+
+def _masthead(report: Report) -> Markup:
+    net = report.net
+    sizes = [(len(net.places), "place"), (len(net.transitions), "transition"), (len(net.controllers), "controller")]
+    counts = [tag("li", tag("b", f"{n:,}"), f" {word}") for n, word in counts_of(report.verdicts)]
+    return tag(
+        "header",
+        tag(
+            "div",
+            tag("p", _ASKED.get(report.command, report.command)),
+            tag("h1", net.name or "the net"),
+            tag("p", net.description) if net.description else None,
+            tag("p", ", ".join(counted(n, word) for n, word in sizes if n)),
+            tag("div", overall_badge(report.verdicts), tag("ul", counts, cls="counts"), cls="verdict-line"),
+            _failing(report),
+        ),
+        cls="masthead",
+    )
+
+
+def _failing(report: Report) -> Markup | None:
+    """What must hold and does not, each with the way to its run."""
+    some = [(anchor, verdict) for anchor, verdict in refuted(report) if verdict.weight is Weight.REQUIRED]
+    if not some:
+        return None
+    lines = [
+        tag("li", tag("span", "✗ ", aria_hidden="true"), tag("a", verdict.statement, href=f"#{anchor}"))
+        for anchor, verdict in some[:_FAILING_MAX]
+    ]
+    if len(some) > _FAILING_MAX:
+        lines.append(tag("li", f"and {len(some) - _FAILING_MAX:,} more"))
+    return tag("ul", lines, cls="failing", aria_label="what does not hold")
+
+
+def _foot(report: Report) -> Markup:
+    from firable import __version__
+    from firable.nets.interchange import net_digest
+
+    notes = [tag("p", str(note)) for note in report.notes]
+    words = f"firable {__version__}, of {report.input}; the net is {net_digest(report.net)} (SHA-256)"
+    return tag("footer", together(*notes), tag("p", words))

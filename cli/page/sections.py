@@ -1,0 +1,370 @@
+"""The sections of the page, each a function from the report to markup, or to nothing where the report has none of it.
+
+They are generic over verdicts: a family of obligations, a part of the protocol or a fault that is reported tomorrow
+appears by its verdicts, under the first word of their names. Only what has a shape of its own has a section of its own:
+the table, the groups, the knowledge of controllers, the nine obligations, the assumptions, the loop with its machines.
+
+To add a section: its function, and a row in `SECTIONS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from firable.cli.page.markup import Content, Markup, raw, tag, together
+from firable.cli.page.runs import strip
+from firable.cli.report import Report
+from firable.cli.text import WORDS, counted, mark
+from firable.nets.decomposition import Decomposition
+from firable.nets.verdict import Status, Verdict, Weight, overall
+
+LISTED_MAX: Final = 300
+"""How many verdicts of one family are listed; of more, those that are not proved come first."""
+COUNTEREXAMPLES_MAX: Final = 24
+_DRAWN_TRANSITIONS_MAX: Final = 80
+_ROWS_MAX: Final = 400
+_TONES: Final = {"✓": "good", "✗": "bad", "?": "open", "!": "open", "·": None}
+_HEADINGS: Final = {
+    Weight.REQUIRED: "must hold",
+    Weight.WARNING: "warnings",
+    Weight.INFORMATION: "for information",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A section: its anchor, its title, and what makes it."""
+
+    anchor: str
+    title: str
+    make: Callable[[Report], Markup | None]
+
+
+def badge(verdict: Verdict) -> Markup:
+    """How a verdict ended, as a sign and a word."""
+    sign, word, _ = mark(verdict, WORDS)
+    return tag("span", f"{sign} {word}", cls=_classes(_TONES[sign]))
+
+
+def status_badge(status: Status) -> Markup:
+    """A status by itself."""
+    sign = {Status.PROVED: "✓", Status.VIOLATED: "✗", Status.UNKNOWN: "?"}[status]
+    return tag("span", f"{sign} {status}", cls=_classes(_TONES[sign]))
+
+
+def _classes(tone: str | None) -> str:
+    return f"badge {tone}" if tone else "badge"
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[Content]], *, caption: str) -> Markup:
+    """A table that becomes a stack of cards on a phone; the first cell of a row is its head."""
+    body = []
+    for row in rows:
+        cells = [tag("th", row[0], scope="row")]
+        cells += [tag("td", cell, data_of=head) for head, cell in zip(heads[1:], row[1:], strict=True)]
+        body.append(tag("tr", *cells))
+    more = len(body) - _ROWS_MAX
+    rest = tag("p", f"and {more:,} more", cls="soft") if more > 0 else None
+    head = tag("thead", tag("tr", *(tag("th", one, scope="col") for one in heads)))
+    hidden = tag("caption", caption, cls="unseen")
+    return together(
+        tag("div", tag("table", hidden, head, tag("tbody", body[:_ROWS_MAX]), cls="stack"), cls="wide"), rest
+    )
+
+
+def _names(names: Iterable[str]) -> Markup:
+    return tag("span", ", ".join(names), cls="code")
+
+
+# --- Obligations and assumptions
+
+
+def _standing(report: Report) -> Markup | None:
+    if not report.standing:
+        return None
+    rows = []
+    for line in report.standing:
+        tone = "good" if line.status.startswith(("proved", "by the protocol", "shown")) else None
+        tone = {"violated": "bad", "unknown": "open", "assumed": "open"}.get(line.status, tone)
+        rows.append((line.name, line.says, tag("span", line.status, cls=_classes(tone)), line.by))
+    lead = "What the running, distributed cell needs so that it does what the central net does."
+    return together(
+        tag("p", lead, cls="lead"),
+        _table(("", "obligation", "status", "shown by, or assumed of"), rows, caption="The obligations O1 to O9"),
+    )
+
+
+def _obligations(report: Report) -> Markup | None:
+    from firable.decompose.proofs.families import FAMILIES
+    from firable.decompose.proofs.family import proved_of
+
+    rows = []
+    for family in FAMILIES:
+        if some := proved_of(family, report.verdicts):
+            rows.append(_family(family.title, family.says, some))
+    if not rows or report.command == "check":
+        return None
+    lead = "Each obligation compares the central net with its parts, and a solver finds no case in which they differ."
+    return together(tag("p", lead, cls="lead"), *rows)
+
+
+def _family(title: str, says: str, some: Sequence[Verdict]) -> Markup:
+    proved = sum(verdict.holds for verdict in some)
+    # A line for each, those that are not proved first: whoever opens it looks for them.
+    ordered = sorted(some, key=lambda verdict: verdict.holds)
+    share = f"width:{100 * proved // len(some)}%"
+    bar = tag("i", tag("b", style=share), aria_hidden="true")
+    line = tag(
+        "span",
+        tag("b", title),
+        tag("span", bar, f"{proved:,} of {len(some):,}", cls="share"),
+        tag("span", says, cls="says"),
+        cls="family",
+    )
+    more = len(some) - LISTED_MAX
+    rest = (
+        tag("p", f"and {more:,} more, all {'proved' if ordered[LISTED_MAX].holds else 'like these'}")
+        if more > 0
+        else None
+    )
+    inside = tag("div", *map(_verdict, ordered[:LISTED_MAX]), rest, cls="inside")
+    return tag("details", tag("summary", line), inside, open=proved < len(some))
+
+
+def _assumptions(report: Report) -> Markup | None:
+    if not report.assumptions:
+        return None
+    asked = {verdict.statement: verdict for verdict in report.verdicts if verdict.name.startswith("o4.")}
+    rows = []
+    for assumption in report.assumptions:
+        verdict = asked.get(assumption)
+        state = tag("span", "assumed", cls=_classes("open")) if verdict is None else badge(verdict)
+        how = "to be checked on the cell" if verdict is None else "asked of the loop with its machines"
+        rows.append((assumption, state, how))
+    for verdict in asked.values():
+        if verdict.statement not in report.assumptions:
+            rows.append((verdict.statement, badge(verdict), "asked of the loop with its machines"))
+    lead = (
+        "External gates cannot be locked (O4): what a proof relies on, and whether the machines are known to keep it. "
+        "Where one does not hold, the interlock belongs to the machine's own controller."
+    )
+    heads = ("assumption", "status", "how it is known")
+    return together(tag("p", lead, cls="lead"), _table(heads, rows, caption="Assumptions"))
+
+
+# --- Verdicts
+
+
+def _verdict(verdict: Verdict) -> Markup:
+    cost = [counted(n, word) for n, word in ((verdict.cost.markings, "marking"), (verdict.cost.edges, "edge")) if n]
+    how = ", ".join(["by " + verdict.method, *cost])
+    about = verdict.subjects if verdict.status is not Status.PROVED else ()
+    listed = ", ".join(about[:40]) + (f" and {len(about) - 40:,} more" if len(about) > 40 else "")
+    code = f"[{verdict.code}] " if verdict.code else ""
+    return tag(
+        "div",
+        tag("div", badge(verdict)),
+        tag(
+            "div",
+            tag("p", verdict.statement, cls="what"),
+            tag("p", f"{verdict.name}; {how}", cls="code"),
+            tag("p", "about: ", listed) if listed else None,
+            tag("p", "reached: ", verdict.bound) if verdict.bound and verdict.status is Status.UNKNOWN else None,
+            tag("p", code, verdict.hint, cls="hint") if verdict.hint and not verdict.holds else None,
+            tag("p", "evidence: ", ", ".join(verdict.evidence), cls="code") if verdict.evidence else None,
+        ),
+        cls="verdict",
+    )
+
+
+def _others(report: Report) -> Markup | None:
+    """The verdicts that no section above shows."""
+    shown = _shown_above(report)
+    rest = [verdict for verdict in report.verdicts if id(verdict) not in shown]
+    parts: list[Markup] = []
+    for weight, title in _HEADINGS.items():
+        some = [verdict for verdict in rest if verdict.weight is weight]
+        if some:
+            parts.append(tag("h3", title))
+            parts += map(_verdict, some[:LISTED_MAX])
+            if len(some) > LISTED_MAX:
+                parts.append(tag("p", f"and {len(some) - LISTED_MAX:,} more", cls="soft"))
+    return together(*parts) if parts else None
+
+
+def _shown_above(report: Report) -> set[int]:
+    if report.command == "check":
+        return set()
+    from firable.decompose.proofs.families import FAMILIES
+    from firable.decompose.proofs.family import proved_of
+
+    found = {id(verdict) for family in FAMILIES for verdict in proved_of(family, report.verdicts)}
+    return found | {id(verdict) for verdict in report.verdicts if verdict.name.startswith("o4.") and report.assumptions}
+
+
+def _loop(report: Report) -> Markup | None:
+    if not report.loop:
+        return None
+    loop = report.loop
+    rows = []
+    for row in loop["comparison"]:
+        free, closed = Status(row["gates_free"]), Status(row["with_machines"])
+        rows.append(
+            (tag("span", row["question"], cls="code"), status_badge(free), status_badge(closed), row.get("remark", ""))
+        )
+    edges = "" if loop["edges"] is None else f" and {counted(loop['edges'], 'edge')}"
+    lead = (
+        f"The net and its machines ({loop['machines']}) as one: {counted(loop['places'], 'place')}, "
+        f"{counted(loop['transitions'], 'transition')}, {counted(loop['markings'], 'marking')}{edges}. "
+        f"With gates free there are {counted(loop['markings_gates_free'], 'marking')}, and a verdict may hope for a "
+        "gate that never opens."
+    )
+    heads = ("question", "gates free", "with its machines", "")
+    return together(tag("p", lead, cls="lead"), _table(heads, rows, caption="Verdicts side by side"))
+
+
+def refuted(report: Report) -> list[tuple[str, Verdict]]:
+    """The verdicts whose counterexamples are drawn, each with its anchor; those that must hold come first."""
+    some = [v for v in report.verdicts if v.status is Status.VIOLATED and v.witness is not None]
+    some.sort(key=lambda verdict: list(_HEADINGS).index(verdict.weight))
+    return [(f"run-{n}", verdict) for n, verdict in enumerate(some, start=1)]
+
+
+def _counterexamples(report: Report) -> Markup | None:
+    told: dict[tuple[object, ...], tuple[str, str]] = {}
+    parts: list[Markup] = []
+    some = refuted(report)
+    for anchor, verdict in some[:COUNTEREXAMPLES_MAX]:
+        witness = verdict.witness
+        if witness is None:
+            continue
+        key = (id(report.net_of(verdict)), witness.firings, witness.cycle, witness.assignment)
+        head = together(tag("h3", badge(verdict), " ", verdict.statement), tag("p", verdict.name, cls="code soft"))
+        if key in told and (witness.firings or witness.cycle):
+            name, where = told[key]
+            same = tag(
+                "p",
+                "By the same run as ",
+                tag("a", name, href=f"#{where}"),
+                f": {witness.note}" if witness.note else "",
+            )
+            parts.append(tag("div", head, same, cls="counter", id=anchor))
+            continue
+        told[key] = (verdict.name, anchor)
+        hint = tag("p", verdict.hint, cls="hint") if verdict.hint else None
+        drawn = strip(report.net_of(verdict), witness, report.net, report.decomposition)
+        parts.append(tag("div", head, drawn, hint, cls="counter", id=anchor))
+    if not parts:
+        return None
+    if len(some) > COUNTEREXAMPLES_MAX:
+        parts.append(tag("p", f"{len(some) - COUNTEREXAMPLES_MAX:,} more are in the report as JSON", cls="soft"))
+    return together(*parts)
+
+
+# --- The cell and its decomposition
+
+
+def _picture(report: Report) -> Markup | None:
+    from firable.nets.drawing import draw_net
+
+    net = report.net
+    if len(net.transitions) > _DRAWN_TRANSITIONS_MAX:
+        return tag("p", f"{counted(len(net.transitions), 'transition')} are too many for a picture that can be read.")
+    label = f"the net of {net.name or 'the cell'}, a lane for each controller"
+    return tag("div", raw(draw_net(net)), cls="picture", tabindex="0", role="region", aria_label=label)
+
+
+def _coordinator_table(report: Report) -> Markup | None:
+    if not report.table:
+        return None
+    controllers = [c.name for c in report.net.controllers]
+    reasons = dict(_reasons(report.decomposition))
+    rows = []
+    for row in report.table:
+        parts = {part.controller: part.name for part in row.parts}
+        cells = [tag("span", parts[name], cls="code") if name in parts else "" for name in controllers]
+        rows.append((row.name, row.description, *cells, reasons.get(row.name, "")))
+    lead = "The global transitions: each fires when every controller that has a part in it has voted yes."
+    heads = ("", "transition", *controllers, "global because of")
+    return together(tag("p", lead, cls="lead"), _table(heads, rows, caption="Coordinator table"))
+
+
+def _reasons(decomposition: Decomposition | None) -> Iterator[tuple[str, str]]:
+    from firable.nets.knowledge import Because, reasons
+
+    for reason in reasons(decomposition) if decomposition else ():
+        match reason.because:
+            case Because.ARCS:
+                yield reason.transition, "its arcs"
+            case Because.GATE:
+                yield reason.transition, f"gates on {', '.join(reason.gates)}"
+            case Because.CONFLICT:
+                yield reason.transition, f"its conflict with {reason.rival} at {reason.place}"
+
+
+def _groups(report: Report) -> Markup | None:
+    if report.decomposition is None or not report.decomposition.groups:
+        return None
+    rows = []
+    for group in report.decomposition.groups:
+        order = "; then ".join(", ".join(some) for some in (group.sequence, group.rest) if some)
+        rows.append((group.name, tag("span", order, cls="code"), str(group.by), group.controller or "the coordinator"))
+    lead = "Transitions that compete for a place, over any number of steps, are decided together by one arbiter."
+    heads = ("group", "in this order", "by", "decided by")
+    return together(tag("p", lead, cls="lead"), _table(heads, rows, caption="Arbitration groups"))
+
+
+def _knowledge(report: Report) -> Markup | None:
+    from firable.nets.knowledge import knowledge
+
+    if report.decomposition is None or not report.table:
+        return None
+    parts = []
+    for one in knowledge(report.decomposition):
+        facts: tuple[tuple[str, Sequence[str]], ...] = (
+            ("owns the places", one.places),
+            ("owns the signals", one.signals),
+            ("fires alone", one.fires),
+            ("votes for", tuple(f"{row} by {part}" for row, part in one.votes)),
+            ("keeps for others to read", tuple(f"{name} for {row}" for name, row in one.locks)),
+            ("reads from its machines", tuple(f"{name} for {row}" for name, row in one.answers)),
+            ("talks to", one.talks_to),
+        )
+        listed = [together(tag("dt", word), tag("dd", _names(names))) for word, names in facts if names]
+        parts.append(tag("details", tag("summary", tag("b", one.controller)), tag("dl", *listed, cls="facts inside")))
+    return together(*parts)
+
+
+SECTIONS: Final[tuple[Section, ...]] = (
+    Section("needs", "What the running system needs", _standing),
+    Section("obligations", "Obligations", _obligations),
+    Section("assumptions", "Assumptions", _assumptions),
+    Section("machines", "With its machines", _loop),
+    Section("counterexamples", "Counterexamples", _counterexamples),
+    Section("verdicts", "Verdicts", _others),
+    Section("table", "Coordinator table", _coordinator_table),
+    Section("groups", "Arbitration", _groups),
+    Section("controllers", "What each controller must know", _knowledge),
+    Section("cell", "The cell", _picture),
+)
+"""Every section, in the order of the page."""
+
+
+def counts_of(verdicts: Sequence[Verdict]) -> Iterator[tuple[int, str]]:
+    """How many verdicts that must hold ended in each way, and how many warnings there are."""
+    required = [verdict for verdict in verdicts if verdict.weight is Weight.REQUIRED]
+    for status in (Status.VIOLATED, Status.UNKNOWN, Status.PROVED):
+        if n := sum(verdict.status is status for verdict in required):
+            yield n, str(status)
+    warnings = sum(v.weight is Weight.WARNING and not v.holds for v in verdicts)
+    if warnings:
+        yield warnings, "warning" if warnings == 1 else "warnings"
+
+
+def overall_badge(verdicts: Sequence[Verdict]) -> Markup:
+    """How all together ended."""
+    status = overall(verdicts)
+    word = {Status.PROVED: "✓ all hold", Status.VIOLATED: "✗ violated", Status.UNKNOWN: "? not decided"}[status]
+    return tag("span", word, cls=_classes(_TONES[word[0]]))

@@ -1,0 +1,255 @@
+"""The report as a page: whole by itself, escaped, the same bytes every time, and true to the report."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from firable.cli.main import main
+from firable.cli.page.markup import Markup, raw, tag, together
+from firable.cli.page.page import page_of
+from firable.cli.page.runs import STEPS_SHOWN_MAX, strip
+from firable.cli.page.sections import LISTED_MAX, SECTIONS
+from firable.cli.report import Report
+from firable.nets.catalogue import catalogue_net, catalogue_path
+from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.verdict import Status, Verdict, Weight, Witness
+
+VOID = {"br", "meta", "rect", "circle", "path", "line"}
+EVIL = "<script>alert('x')</script>&\"'"
+
+
+class Reading(HTMLParser):
+    """What a browser sees: the elements, whether each is closed where it should be, and the text."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text: list[str] = []
+        self.feed(page)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if "style" not in self.open:
+            self.text.append(data)
+
+    @property
+    def words(self) -> str:
+        return " ".join(" ".join(self.text).split())
+
+
+@pytest.fixture(scope="module")
+def proof(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The page on the one-robot cell with a sensor that flickers."""
+    folder = tmp_path_factory.mktemp("page")
+    text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
+    plant, page = folder / "p.plant.yaml", folder / "page.html"
+    plant.write_text(text.replace("{occupied: mc_table}", "{occupied: mc_table, may_flicker: true}"), "utf-8")
+    assert main(["prove", "catalogue:one_robot", "--machines", str(plant), "--report", str(page)]) == 1
+    return page.read_text("utf-8")
+
+
+def report_with(*verdicts: Verdict, net: Net | None = None) -> Report:
+    return Report("check", "some.firable.yaml", net or catalogue_net("conceptual_one_robot"), verdicts)
+
+
+# --- Markup
+
+
+def test_text_is_escaped_and_markup_is_kept() -> None:
+    assert tag("p", EVIL) == "<p>&lt;script&gt;alert('x')&lt;/script&gt;&amp;\"'</p>"
+    assert tag("p", tag("b", "x"), ["a<", raw("<i>")], None) == "<p><b>x</b>a&lt;<i></p>"
+    assert isinstance(together("a"), Markup)
+
+
+def test_attributes_are_escaped_in_their_quotes() -> None:
+    assert tag("a", title='"><script>', cls="x") == '<a title="&quot;&gt;&lt;script&gt;" class="x"></a>'
+    assert tag("a", title=None, open=False) == "<a></a>"
+
+
+# --- The page
+
+
+def test_the_page_is_well_formed_and_loads_nothing(proof: str) -> None:
+    page = Reading(proof)
+    assert not {"script", "link", "img", "iframe", "object", "use"} & {name for name, _ in page.tags}
+    for _, attributes in page.tags:
+        assert not {"src", "srcset", "onclick", "onload"} & attributes.keys()
+        assert (attributes.get("href") or "#").startswith("#")
+    assert "url(" not in proof
+    assert "@import" not in proof
+    assert set(re.findall(r"https?://[^\"' <]*", proof)) == {"http://www.w3.org/2000/svg"}
+
+
+def test_every_link_of_the_page_leads_somewhere_and_every_anchor_is_one(proof: str) -> None:
+    page = Reading(proof)
+    anchors = [str(attributes["id"]) for _, attributes in page.tags if "id" in attributes]
+    assert len(set(anchors)) == len(anchors)
+    assert {attributes["href"] for _, attributes in page.tags if "href" in attributes} <= {f"#{one}" for one in anchors}
+
+
+def test_the_page_says_what_the_report_says(proof: str) -> None:
+    words = Reading(proof).words
+    for said in ("✗ violated", "1 violated", "91 proved", "Eq. (7)", "15 of 15", "O9", "conflict-1", "G2, G6"):
+        assert said in words
+    assert words.count("t1-21") >= 2, "in the table, and in what the robot's controller must know"
+    assert "'t2-82' had voted yes, and the last firing makes 'mc.part_present' 0" in words
+
+
+def test_the_steps_of_a_counterexample_stand_in_the_lanes_of_its_controllers(proof: str) -> None:
+    table = proof[proof.index('<table class="strip') :]
+    table = table[: table.index("</table>")]
+    rows = re.findall(r"<tr>.*?</tr>", table)
+    assert len(rows) == 1 + 12 + 1, "a head, the steps, the end"
+    fourth = Reading(rows[4]).words
+    assert fourth.startswith("4 G2 start of loading from CV1 t0-2")
+    for said in ("leaves free", "comes to to_cv1", "sends R MOVE to=CV1", "t2-22", "R is at MOVE to=CV1"):
+        assert said in fourth
+    assert "the sensor of mc.part_present drops" in Reading(rows[12]).words
+
+
+def test_the_same_report_gives_the_same_bytes(tmp_path: Path) -> None:
+    pages = []
+    for name in ("a.html", "b.html"):
+        assert main(["check", "catalogue:one_robot_mc_late", "--no-cache", "--report", str(tmp_path / name)]) == 1
+        pages.append((tmp_path / name).read_bytes())
+    assert pages[0] == pages[1]
+
+
+def test_whatever_a_net_is_called_is_text() -> None:
+    net = Net(
+        "x<script>",
+        (Place("p", marked=True, description=EVIL), Place("q", description=EVIL)),
+        (Transition("t<i", ("p",), ("q",), description=EVIL),),
+        description=EVIL,
+    )
+    verdict = Verdict(
+        "a.<b>", Status.VIOLATED, EVIL, EVIL, hint=EVIL, subjects=(EVIL,), witness=Witness((("t<i>",),), note=EVIL)
+    )
+    page = Reading(page_of(report_with(verdict, net=net)))
+    assert "script" not in {name for name, _ in page.tags}
+    assert page.words.count("alert('x')") >= 6
+
+
+def test_a_verdict_of_a_kind_that_nobody_knows_appears_with_its_run() -> None:
+    foreign = Witness((("ask G1",), ("yes t0-1", "yes t3-13")), (("ask G2",),), note="G1 is lost")
+    verdict = Verdict("new-kind.of.thing", Status.VIOLATED, "nothing is lost", "by some method", witness=foreign)
+    unknown = Verdict("other", Status.UNKNOWN, "it ends", "by search", bound="12 markings", hint="more time")
+    words = Reading(page_of(report_with(verdict, unknown))).words
+    for said in ("nothing is lost", "ask G1 yes t0-1, yes t3-13", "and then for ever again", "G1 is lost"):
+        assert said in words
+    for said in ("? unknown", "reached: 12 markings", "more time", "1 violated 1 unknown"):
+        assert said in words
+
+
+def test_values_that_refute_are_a_table() -> None:
+    net = catalogue_net("conceptual_one_robot")
+    witness = Witness(assignment=(("system.mc", True), ("fires(t1)", False)), note="eq7 differs")
+    words = Reading(strip(net, witness, net)).words
+    assert words == "These values of the net's own names refute it: name value system.mc 1 fires(t1) 0 eq7 differs"
+
+
+def test_a_run_that_goes_on_for_ever_shows_its_cycle() -> None:
+    net = catalogue_net("conceptual_one_robot")
+    witness = Witness((("t1",),), (("t2",), ("t3",), ("t4",), ("t5",), ("t6",), ("t1",)))
+    words = Reading(strip(net, witness, net)).words
+    assert re.search(r"1 t1 start of carrying in .* and then for ever again 2 t2", words)
+
+
+def test_of_a_very_long_run_the_middle_is_left_out_and_said_to_be() -> None:
+    net = Net(
+        "long",
+        (Place("c.a", "c", marked=True), Place("c.b", "c")),
+        (Transition("t", ("c.a",), ("c.b",)), Transition("u", ("c.b",), ("c.a",))),
+        controllers=(Controller("c"),),
+    )
+    written = strip(net, Witness((("t",), ("u",)) * 500), net)
+    assert written.count("<tr>") == STEPS_SHOWN_MAX + 3
+    assert "760 steps are left out here" in written
+
+
+def test_of_many_verdicts_the_first_are_listed_and_the_rest_counted() -> None:
+    many = [Verdict(f"v{i}", Status.PROVED, "it holds", "m") for i in range(LISTED_MAX + 5)]
+    words = Reading(page_of(report_with(*many))).words
+    assert words.count("it holds") == LISTED_MAX
+    assert "and 5 more" in words
+    assert f"{LISTED_MAX + 5} proved" in words
+
+
+def test_two_verdicts_with_one_run_share_it() -> None:
+    witness = Witness((("t1",),), note="here")
+    some = [Verdict(name, Status.VIOLATED, name, "m", witness=replace(witness, note=name)) for name in ("one", "two")]
+    page = page_of(report_with(*some))
+    assert page.count('<table class="strip') == 1
+    assert "By the same run as" in page
+
+
+def test_a_warning_is_no_failure_of_the_whole() -> None:
+    witness = Witness((("t1",),))
+    warning = Verdict("w", Status.VIOLATED, "it warns", "m", Weight.WARNING, witness=witness)
+    proved = Verdict("p", Status.PROVED, "it holds", "m")
+    words = Reading(page_of(report_with(warning, proved))).words
+    assert "✓ all hold 1 proved 1 warning" in words
+    assert "! warning it warns" in words
+
+
+def test_sections_without_content_are_left_out() -> None:
+    page = Reading(page_of(report_with(Verdict("p", Status.PROVED, "it holds", "m"))))
+    ids = [attributes["id"] for name, attributes in page.tags if name == "section"]
+    assert ids == ["verdicts", "cell"]
+    assert len({section.anchor for section in SECTIONS}) == len(SECTIONS)
+
+
+def test_the_loop_stands_beside_the_open_net(tmp_path: Path) -> None:
+    path = tmp_path / "page.html"
+    late = "catalogue:one_robot_mc_late"
+    assert main(["check", late, "--machines", late, "--report", str(path)]) == 1
+    words = Reading(path.read_text("utf-8")).words
+    assert "deadlock-free ✗ violated ✗ violated" in words
+    assert "1,838 markings and 5,670 edges" in words
+    assert "from here no transition of the cell ever fires again" in words
+
+
+# --- The command
+
+
+def test_the_json_names_the_page_among_the_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "page.html"
+    assert main(["prove", "catalogue:one_robot", "--report", str(path), "--format", "json"]) == 0
+    assert json.loads(capsys.readouterr().out)["reports"][0]["files"] == [str(path)]
+    assert main(["prove", "catalogue:one_robot", "--report", str(path)]) == 0
+    assert f"the report as a page: {path}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["check", "catalogue:one_robot", "--report", "-"], "cannot go to standard output"),
+        (["check", "catalogue:one_robot", "catalogue:one_robot", "--report", "x"], "--report is a page on one net"),
+        (["prove", "catalogue:one_robot", "--report", "no-such-folder/x.html"], "F1017"),
+    ],
+)
+def test_a_page_that_has_no_place_is_refused(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err + captured.out
