@@ -1,15 +1,19 @@
 """The proof is about something: every action can happen, every demand is needed, every wrong protocol is refuted."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from firable.analysis.induction.smt import Answer
 from firable.decompose.proofs.script import Reader
+from firable.decompose.protocol.parametric.invariant import INVARIANT
 from firable.decompose.protocol.parametric.logic import both
 from firable.decompose.protocol.parametric.proving import start
 from firable.decompose.protocol.parametric.runs import central_marking, find_run, steps_of
 from firable.decompose.protocol.parametric.script import Action, Demand
+from firable.decompose.protocol.parametric.side_conditions import CONDITIONS
 from firable.decompose.protocol.parametric.system import PROTOCOL, Protocol
 from firable.decompose.protocol.parametric.theorem import parametric_obligations
 from firable.decompose.protocol.parametric.wrong import WRONG, Wrong, refute
@@ -86,9 +90,9 @@ def test_no_assumption_on_the_net_can_be_left_out(words: str) -> None:
 
 @pytest.mark.parametrize("wrong", WRONG, ids=[wrong.name for wrong in WRONG])
 def test_wrong_protocol_is_refuted_by_a_run_that_the_reference_player_confirms(wrong: Wrong) -> None:
-    run = refute(wrong)
-    assert run is not None
-    assert len(run.events) == len(steps_of(wrong.run))
+    found = refute(wrong)
+    assert found is not None
+    assert len(found.run.events) == len(steps_of(wrong.run))
 
 
 @pytest.mark.parametrize("wrong", WRONG, ids=[wrong.name for wrong in WRONG])
@@ -112,19 +116,50 @@ def test_every_obligation_is_forgotten_by_some_wrong_protocol() -> None:
     assert forgotten == {"O1", "O2", "O3", "O5", "O6", "Eq. (5)"}
 
 
+PLACE = r"'[abc]\.p[1-9]'"
+# Which places they are is the solver's choice.
+ENDS = {
+    "filled-outputs-not-looked-at": f"the central net cannot fire 'G' then: {PLACE} is full",
+    "given-up-after-the-commit": f"the controllers hold a token on {PLACE}, and the central net does not"
+    f"|the central net holds a token on {PLACE}, and the controllers do not",
+    "late-requests-promise": "every round is closed, and a promise still stands, which nobody will release",
+}
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_end_of_a_run_says_what_is_wrong(name: str) -> None:
+    found = refute(next(wrong for wrong in WRONG if wrong.name == name))
+    assert found is not None
+    assert re.fullmatch(ENDS[name], found.end)
+
+
 def test_run_reads_as_a_story() -> None:
     wrong = next(wrong for wrong in WRONG if wrong.name == "votes-from-before-the-decision")
-    run = refute(wrong)
-    assert run is not None
-    assert run.events == (
+    found = refute(wrong)
+    assert found is not None
+    assert found.end.startswith("the central net cannot fire 'G' then: 'a.")
+    assert found.run.events == (
         "the coordinator asks for 'G' in round 1",
         "'a' promises 'G' in round 1, and votes yes",
         "the coordinator gives round 1 up",
         "the abort of 'G' in round 1 arrives at 'a'",
-        "its home fires the local transition 'l'",
+        "the local transition 'l' fires",
         "the coordinator asks for 'G' in round 2",
         "'b' promises 'G' in round 2, and votes yes",
         "the vote of 'a' for 'G' in round 2 arrives",
         "the vote of 'b' for 'G' in round 2 arrives",
         "the coordinator decides 'G' in round 2: it fires",
     )
+
+
+def test_document_lists_every_action_conjunct_condition_and_wrong_protocol() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "protocol-invariant.md").read_text("utf-8")
+    rows = {tuple(cell.strip() for cell in line.strip("|").split("|")) for line in text.splitlines() if line[:1] == "|"}
+    assert {(conjunct.name, conjunct.words) for conjunct in INVARIANT} <= rows
+    assert {(f"protocol.side.{name}", says) for name, says, _ in CONDITIONS} <= rows
+    assert {(wrong.name, wrong.forgets, wrong.words) for wrong in WRONG} <= rows
+    actions = {" ".join([a.name, *(parameter.name for parameter in a.parameters)]) for a in PROTOCOL.actions}
+    assert actions <= {row[0] for row in rows}
+    families = {o.name.partition(".")[0] for o in parametric_obligations()}
+    assert families <= {family for row in rows for family in row[0].split(", ")}
+    assert f"{len(list(parametric_obligations()))} obligations" in text

@@ -114,7 +114,7 @@ def find_run(
 ) -> Run | None:
     """A run of these steps after which `goal` holds, on a net of so many places; None where there is none.
 
-    `given` holds at the start, and `goal` at the end; a goal of `cannot_follow` speaks of the moment before the last
+    `given` holds at the start, and `goal` at the end; the goal `NOT_FOLLOWED` speaks of the moment before the last
     step. The names in both are those of the steps, as `Variable`s. Errors: `KeyError` for an action that the protocol
     does not have. Some tenths of a second.
     """
@@ -139,15 +139,14 @@ def find_run(
     )
 
 
-def cannot_follow(run: Run) -> bool:
-    """Whether the reference player refuses the last firing of a run, and no other: the central net cannot follow."""
+def before_last(run: Run) -> tuple[str, ...] | None:
+    """The marking of the central net after all firings of a run but the last; None where it cannot fire them."""
     player, marking = Player(run.net), run.net.initial_marking
-    *before, last = (run.net.transition_index[name] for name in run.fired)
-    for fired in before:
-        if fired not in player.may_fire(marking):
-            return False
+    for name in run.fired[:-1]:
+        if (fired := run.net.transition_index[name]) not in player.may_fire(marking):
+            return None
         marking = player.fire(marking, [fired])
-    return last not in player.may_fire(marking)
+    return run.net.names(marking)
 
 
 def central_marking(run: Run) -> tuple[str, ...]:

@@ -336,7 +336,7 @@ FIRE: Final = Action(
         Demand("no promise is disturbed (O1)", undisturbed_locally(t, home(t))),
     ),
     (part_applied(t, home(t)), shadow_fires(t)),
-    "its home fires the local transition {t}",
+    "the local transition {t} fires",
     fires=True,
 )
 

@@ -15,7 +15,7 @@ on is found (`runs`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -23,7 +23,7 @@ from firable.decompose.protocol.parametric.logic import Definition, Formula, Var
 from firable.decompose.protocol.parametric.runs import (
     NOT_FOLLOWED,
     Run,
-    cannot_follow,
+    before_last,
     central_marking,
     find_run,
     steps_of,
@@ -93,18 +93,47 @@ class Wrong:
         return self.change(PROTOCOL)
 
 
-def refute(wrong: Wrong) -> Run | None:
+@dataclass(frozen=True)
+class Refutation:
+    """A run of a wrong protocol, and what is wrong at its end."""
+
+    wrong: Wrong
+    run: Run
+    end: str
+
+
+def refute(wrong: Wrong) -> Refutation | None:
     """A run that shows what is wrong, and that the reference player has confirmed; None where there is none."""
     run = find_run(wrong.protocol, steps_of(wrong.run), wrong.places, wrong.goal, wrong.given)
     if run is None:
         return None
-    if wrong.goal is NOT_FOLLOWED:
-        confirmed = cannot_follow(run)
-    else:
-        central = central_marking(run)
-        confirmed = set(central) == set(run.central) and (wrong.goal is STUCK or set(run.local) != set(central))
-    assert confirmed, f"the reference player does not confirm the run of '{wrong.name}'"
-    return run
+    end = next(_end(wrong.goal, run), "")
+    assert end, f"the reference player does not confirm the run of '{wrong.name}'"
+    return Refutation(wrong, run, end)
+
+
+def _end(goal: Formula, run: Run) -> Iterator[str]:
+    """What the reference player says is wrong at the end."""
+    if goal is NOT_FOLLOWED:
+        if (marking := before_last(run)) is None:
+            return
+        last = run.net.transition(run.fired[-1])
+        wrong = [f"'{p}' is empty" for p in (*last.inputs, *last.permissive) if p not in marking]
+        wrong += [f"'{p}' is full" for p in (*last.outputs, *last.inhibitive) if p in marking]
+        if wrong:
+            yield f"the central net cannot fire '{last.name}' then: {' and '.join(wrong)}"
+        return
+    central = central_marking(run)
+    if set(central) != set(run.central):
+        return
+    if goal is STUCK:
+        yield "every round is closed, and a promise still stands, which nobody will release"
+    for place in run.local:
+        if place not in central:
+            yield f"the controllers hold a token on '{place}', and the central net does not"
+    for place in central:
+        if place not in run.local:
+            yield f"the central net holds a token on '{place}', and the controllers do not"
 
 
 # --- Ways to forget something
