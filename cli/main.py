@@ -21,7 +21,10 @@ from firable.cli import bundle, check, convert, draw, prove, replay, run, schema
 from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
-_EXTRA = frozenset({"z3", "networkx", "numpy", "platformdirs"})
+_EXTRA = {
+    **dict.fromkeys(("z3", "networkx", "numpy", "platformdirs"), ("prove", "all that checking and proving need")),
+    "mtkahypar": ("split", "what looks for owners of large nets"),
+}
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -94,9 +97,10 @@ def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
             show_errors(error.diagnostics)
             return worst(map(exit_code_of, error.diagnostics))
         case ModuleNotFoundError() if error.name and error.name.partition(".")[0] in _EXTRA:
+            extra, what = _EXTRA[error.name.partition(".")[0]]
             click.echo(
                 f"error: this command needs '{error.name}', which is not installed\n"
-                "  hint: pip install 'firable[prove]' installs all that checking and proving need",
+                f"  hint: pip install 'firable[{extra}]' installs {what}",
                 err=True,
             )
             return ExitCode.INPUT_ERROR

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from textwrap import indent
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,9 @@ from firable.cli.report import Report
 
 if TYPE_CHECKING:
     from firable.decompose.splitting.persistence import Persistence
+    from firable.decompose.splitting.suggesting import Suggestion
     from firable.nets.decomposition import Decomposition
+    from firable.nets.net import Net
 
 _NAMES_MAX = 10  # in one line of text
 _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
@@ -23,6 +25,29 @@ _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
 
 @click.command(short_help="Split a net over its controllers: table, arbitration, votes, what each must know.")
 @net_argument
+@click.option(
+    "--own",
+    "own",
+    metavar="CONTROLLER=PATTERNS",
+    multiple=True,
+    help="Give a controller the places and signals so named, such as robot='r_*,free'; repeatable.",
+)
+@click.option("--rules", metavar="FILE", help="Such rules in a file: a mapping of controllers to patterns.")
+@click.option(
+    "--suggest",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Propose owners: N controllers with few global transitions between them.",
+)
+@click.option(
+    "--slack",
+    type=click.FloatRange(min=0),
+    default=0.6,
+    show_default=True,
+    metavar="SHARE",
+    help="By how much the sizes proposed may differ from their average.",
+)
+@click.option("-o", "--output", metavar="FILE", help="Write the net with its new owners as a net file.")
 @click.option("--subnets", "subnet_dir", metavar="DIR", help="Write the subnet of each controller as a net file.")
 @click.option(
     "--max-seconds",
@@ -33,39 +58,91 @@ _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
     help="Give up so late which votes are persistent.",
 )
 @format_option
-def split(net: str, subnet_dir: str | None, max_seconds: float, format_: str) -> int:
+def split(
+    net: str,
+    own: tuple[str, ...],
+    rules: str | None,
+    suggest: int | None,
+    slack: float,
+    output: str | None,
+    subnet_dir: str | None,
+    max_seconds: float,
+    format_: str,
+) -> int:
     """Split NET by ownership and tell what follows from it.
 
     The coordinator table; what became coordinated because of a gate or a conflict; the arbitration groups, and who
     decides each; which parts are persistent, that is, whose yes no other transition takes back, and which may leave
     out the promise; of each controller what it fires alone, votes on, locks for others, and whom it talks to.
 
-    `firable prove` proves the split.
+    Owners stand in the file, or are given by rules (--own, --rules), or proposed (--suggest N): machines stay whole,
+    and as few transitions as possible become global. -o writes the net with them, ready for `firable prove`.
     """
-    return answer("split", format_, lambda: _report(net, subnet_dir, max_seconds), _show)
+    by_rule = bool(own) or rules is not None
+    if by_rule and suggest is not None:
+        raise click.UsageError("--suggest proposes owners, and --own and --rules give them: leave one out")
+    if output is not None and not by_rule and suggest is None:
+        raise click.UsageError("-o writes the net with new owners: give them by --own or --rules, or --suggest them")
+    asked = _Asked(own, rules, suggest, slack, max_seconds)
+    return answer("split", format_, lambda: _report(net, asked, output, subnet_dir), _show)
 
 
-def _report(argument: str, subnet_dir: str | None, max_seconds: float) -> Report:
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """Whose owners are asked for, and how long may be thought of it."""
+
+    own: tuple[str, ...]
+    rules: str | None
+    suggest: int | None
+    slack: float
+    max_seconds: float
+
+
+def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | None) -> Report:
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
+    from firable.cli.options import write_text
     from firable.decompose.splitting.cut import split as split_net
     from firable.decompose.splitting.persistence import persistence
+    from firable.nets.printing import format_net
 
     loaded = load_net(argument)
     with loaded.placing():
-        decomposition = split_net(loaded.net)
-    found = persistence(decomposition, limits=Limits(Deadline.after(max_seconds)))
+        net, suggestion = _owned(loaded.net, asked)
+        decomposition = split_net(net)
+    found = persistence(decomposition, limits=Limits(Deadline.after(asked.max_seconds)))
     files = write_folder(subnet_dir, _subnets(decomposition)) if subnet_dir is not None else ()
+    if output is not None:
+        write_text(output, format_net(net))
+        files = (output, *files)
+    split_json = _split_json(found)
+    if suggestion is not None:
+        split_json["suggestion"] = suggestion.to_json()
     return Report(
         "split",
         argument,
-        loaded.net,
+        net,
         found.verdicts,
         notes=loaded.notes,
         table=decomposition.table,
         files=files,
-        split=_split_json(found),
+        split=split_json,
     )
+
+
+def _owned(net: Net, asked: _Asked) -> tuple[Net, Suggestion | None]:
+    """The net with the owners that were asked for."""
+    from firable.analysis.deadline import Deadline
+    from firable.decompose.splitting.rules import owned_by_rules, read_rules, rules_of_options
+    from firable.decompose.splitting.suggesting import suggest
+
+    if asked.suggest is not None:
+        found = suggest(net, asked.suggest, slack=asked.slack, deadline=Deadline.after(asked.max_seconds))
+        return found.net, found
+    rules = {} if asked.rules is None else read_rules(asked.rules)
+    for controller, patterns in rules_of_options(asked.own).items():
+        rules.setdefault(controller, []).extend(patterns)
+    return (owned_by_rules(net, rules) if rules else net), None
 
 
 def _subnets(decomposition: Decomposition) -> dict[str, str]:
@@ -99,6 +176,7 @@ def _show(report: Report) -> None:
     if not report.table:
         click.echo("  no transition has more than one participant")
     for title, lines in (
+        ("proposed owners", _proposed(report.split.get("suggestion"))),
         ("coordinated because of a gate or a conflict", _because(report.split["coordinated"])),
         ("arbitration", _groups(report)),
         ("votes", _votes(report)),
@@ -109,7 +187,32 @@ def _show(report: Report) -> None:
             for line in told:
                 click.echo(f"  {line}")
     if report.files:
-        click.echo(f"\n{text.counted(len(report.files), 'subnet')} in {Path(report.files[0]).parent}")
+        click.echo("")
+    for file in report.files[:_NAMES_MAX]:
+        click.echo(f"  written: {file}")
+    if len(report.files) > _NAMES_MAX:
+        click.echo(f"  and {len(report.files) - _NAMES_MAX} more beside it")
+
+
+def _proposed(suggestion: Mapping[str, Any] | None) -> Iterator[str]:
+    """What was proposed, what it cuts, and what that compares with."""
+    if suggestion is None:
+        return
+    low, high = suggestion["smallest_allowed"], suggestion["largest_allowed"]
+    best = "no ownership within these sizes has fewer global ones" if suggestion["optimal"] else "fewer may be possible"
+    yield f"by {suggestion['method']}: {best}"
+    for title, key in (("proposed", "proposed"), ("in the file", "given")):
+        if (of := suggestion[key]) is not None:
+            sizes = [f"{name} {size}" for name, size in of["sizes"].items()]
+            yield f"{title:<12} {of['cut']:>4} global, {of['votes']:>4} votes; places and signals: {_listed(sizes)}"
+    least, most = suggestion["fewest"], suggestion["most"]
+    yield f"{'at least':<12} {least:>4} global, as the net hangs together; at most {most}, with an owner for each block"
+    yield f"sizes from {low} to {high} were allowed (--slack); machines stay whole, and completions with their places"
+    cut = suggestion["cut"]
+    for one in cut[:_CONTROLLERS_MAX]:
+        yield f"{one['transition']} joins {_listed(one['controllers'])}"
+    if len(cut) > _CONTROLLERS_MAX:
+        yield f"and {len(cut) - _CONTROLLERS_MAX} more are cut; --format json has them all"
 
 
 def _because(reasons: Sequence[dict[str, Any]]) -> Iterator[str]:

@@ -69,6 +69,7 @@ CODES: Final[dict[str, str]] = {
     "F2020": "a change of the net that would change its meaning",
     "F2021": "unknown source of a gate",
     "F2022": "double gate",
+    "F2023": "more than one owner",
     # F3: analysis
     "F3001": "a machine is started that no command ever stops",
     "F3002": "an output signal on a place marked in M0",
@@ -81,6 +82,7 @@ CODES: Final[dict[str, str]] = {
     "F4001": "the net cannot be split",
     "F4002": "an obligation is refuted",
     "F4003": "the net may not be bundled",
+    "F4004": "no partition was found",
     # F5: running
     "F5001": "the bundle is damaged or has been changed",
     "F5002": "the bundle is not proved",

@@ -78,7 +78,7 @@ def test_json_of_a_split_holds_what_each_controller_must_know(capsys: pytest.Cap
 
 def test_subnets_are_written_as_net_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["split", "catalogue:one_robot", "--subnets", str(tmp_path / "subnets")]) == 0
-    assert "4 subnets in" in capsys.readouterr().out
+    assert f"written: {tmp_path / 'subnets' / 'robot.firable.yaml'}" in capsys.readouterr().out
     assert read_net(tmp_path / "subnets" / "robot.firable.yaml") == split(catalogue_net("one_robot")).subnet("robot")
 
 
@@ -94,3 +94,56 @@ def test_large_split_is_told_in_part(capsys: pytest.CaptureFixture[str]) -> None
     told = capsys.readouterr().out
     assert "and 60 more; --format json has them all" in told
     assert "s1_load may take it back" in told
+
+
+def test_proposed_owners_are_told_with_their_reasons_and_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "owned.firable.yaml"
+    assert main(["split", "catalogue:one_robot", "--suggest", "4", "-o", str(path)]) == 0
+    told = capsys.readouterr().out
+    assert "no ownership within these sizes has fewer global ones" in told
+    assert "proposed        7 global,   16 votes" in told
+    assert "in the file     9 global,   24 votes" in told
+    assert "G3 joins cv1, r" in told
+    assert main(["prove", str(path)]) == 0
+
+
+def test_json_of_a_proposal_fits_the_schema(capsys: pytest.CaptureFixture[str]) -> None:
+    _, data = as_json(capsys, "catalogue:one_robot", "--suggest", "2")
+    suggestion = data["reports"][0]["split"]["suggestion"]
+    assert (suggestion["proposed"]["cut"], suggestion["given"]["cut"], suggestion["fewest"]) == (3, 9, 1)
+
+
+def test_rules_give_a_net_of_pnml_its_owners(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pnml, rules = tmp_path / "cell.pnml", tmp_path / "owners.yaml"
+    assert main(["convert", "catalogue:philosophers-3", "-o", str(pnml)]) == 0
+    rules.write_text('table: "*.fork"\n', encoding="utf-8")
+    people = "people=*.thinking,*.left,*.eating"
+    capsys.readouterr()
+    assert main(["split", str(pnml), "--rules", str(rules), "--own", people]) == 0
+    assert "p1_takes_left:" in capsys.readouterr().out
+    assert main(["split", str(pnml), "--rules", str(rules)]) == 2
+    assert "no rule gives 'p1.thinking' an owner" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--own", "a=*", "--suggest", "2"], "leave one out"),
+        (["-o", "x.yaml"], "give them by --own or --rules"),
+        (["--suggest", "0"], "Invalid value"),
+    ],
+)
+def test_a_wrong_command_line_says_what_is_wrong(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["split", "catalogue:one_robot", *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_a_place_of_two_rules_is_refused_where_it_stands(capsys: pytest.CaptureFixture[str]) -> None:
+    own = ["--own", "a=system*,robot*,conveyor*", "--own", "b=mc*,robot.free"]
+    assert main(["split", "catalogue:one_robot", *own]) == 2
+    said = capsys.readouterr().err
+    assert "one_robot.firable.yaml:20:7: error[F2023]: 'robot.free' is given to each of a, b" in said

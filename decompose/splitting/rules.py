@@ -1,0 +1,132 @@
+"""Ownership by rule: patterns for the names of places and signals, for nets whose files name no owner.
+
+A net that comes from PNML has places and nobody who owns them; often their names tell. A rule gives a controller
+whatever its patterns match (`*`, `?` and `[...]`, as in file names, of the whole name). What is joined needs no rule of
+its own: a completion signal goes with the places that wait for it, and a sensor with the only controller whose
+transitions it gates. Everything else must be matched by exactly one rule: a place that two controllers own, or none,
+has no place in a split, and which of two rules was meant is not guessed by their order.
+
+A file of rules is a mapping, one controller each:
+
+    robot: [r_*, free]
+    mc: m_*
+
+Rejected: regular expressions, which say more than anyone needs here, and fail in ways that take a manual to read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from collections.abc import Mapping as Table
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Final
+
+from firable.nets.diagnostics import Diagnostic, InputError, Subject
+from firable.nets.net import Controller, Net
+from firable.nets.owning import with_owners
+from firable.nets.source import read_source
+from firable.nets.yaml_tree import Mapping, data, node_span, parse_tree
+
+SIZE_BYTES_MAX: Final = 1024 * 1024
+_HINT: Final = "write `CONTROLLER: PATTERN`, or `CONTROLLER: [PATTERN, PATTERN]`"
+
+Rules = Table[str, Sequence[str]]
+"""For each controller, in their order, the patterns of what it owns."""
+
+
+def owned_by_rules(net: Net, rules: Rules) -> Net:
+    """The net with the owners that the rules give, whatever owners it had before, and the controllers of the rules.
+
+    A rule is asked of the name in the file. Raises `InputError` with every reason: F2011 for a place or signal that no
+    rule gives an owner, F2023 for one that two rules do, F2002 for a pattern that matches nothing.
+    """
+    names = [*(place.name for place in net.places), *(signal.name for signal in net.signals)]
+    problems: list[Diagnostic] = []
+    by_rule: dict[str, list[str]] = {name: [] for name in names}
+    for controller, patterns in rules.items():
+        for pattern in patterns:
+            matched = [name for name in names if fnmatchcase(name, pattern)]
+            if not matched:
+                message = f"no place or signal is named like '{pattern}', which shall belong to '{controller}'"
+                problems.append(Diagnostic("F2002", message, "correct the pattern, or take it out"))
+            for name in matched:
+                if controller not in by_rule[name]:
+                    by_rule[name].append(controller)
+    places = {place.name for place in net.places}
+    for name, owners in by_rule.items():
+        if len(owners) > 1:
+            message = f"'{name}' is given to each of {', '.join(owners)}"
+            problems.append(Diagnostic("F2023", message, "narrow one of the rules", _subject(places, name)))
+    _follow(net, by_rule)
+    for name, owners in by_rule.items():
+        if not owners:
+            message = f"no rule gives '{name}' an owner, so no controller would keep it"
+            hint = "add a rule that matches it, or widen one: `--own CONTROLLER='PATTERN'`"
+            problems.append(Diagnostic("F2011", message, hint, _subject(places, name)))
+    if problems:
+        raise InputError(problems)
+    known = {controller.name: controller for controller in net.controllers}
+    controllers = [known.get(name, Controller(name)) for name in rules]
+    return with_owners(net, {name: owners[0] for name, owners in by_rule.items()}, controllers)
+
+
+def _subject(places: set[str], name: str) -> Subject:
+    return ("places" if name in places else "signals", name)
+
+
+def _follow(net: Net, by_rule: dict[str, list[str]]) -> None:
+    """Give what no rule matches to whom it is joined to, where that is one controller."""
+    waiting = {signal.name for signal in net.signals if not by_rule[signal.name]}
+    follows: dict[str, set[str]] = {name: set() for name in waiting}
+    for place in net.places:
+        if place.completion in waiting:
+            follows[place.completion].update(by_rule[place.name])
+    completions = {place.completion for place in net.places}
+    for transition in net.transitions:
+        gates = [gate.signal for gate in transition.external if gate.signal in waiting - completions]
+        for gate in gates:
+            joined = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
+            follows[gate].update(owner for name in joined for owner in by_rule[name])
+    for name, owners in follows.items():
+        if len(owners) == 1:
+            by_rule[name] = list(owners)
+
+
+def rules_of_options(options: Iterable[str]) -> dict[str, list[str]]:
+    """The rules of options `CONTROLLER=PATTERN[,PATTERN]`; raises `InputError` F1010 for any other text.
+
+    >>> rules_of_options(["robot=r_*,free", "mc=m_*"])
+    {'robot': ['r_*', 'free'], 'mc': ['m_*']}
+    """
+    rules: dict[str, list[str]] = {}
+    for option in options:
+        controller, equals, patterns = option.partition("=")
+        found = [pattern.strip() for pattern in patterns.split(",")]
+        if not controller or not equals or not all(found):
+            message = f"'{option}' is no rule of ownership"
+            raise InputError([Diagnostic("F1010", message, "write CONTROLLER='PATTERN', such as robot='r_*,free'")])
+        rules.setdefault(controller, []).extend(found)
+    return rules
+
+
+def read_rules(path: str | Path) -> dict[str, list[str]]:
+    """The rules of a file. Raises `InputError` as for a net file, F1010 for what is no rule."""
+    source = read_source(path, SIZE_BYTES_MAX)
+    tree = parse_tree(source)
+    problems: list[Diagnostic] = []
+    rules: dict[str, list[str]] = {}
+    if not isinstance(tree, Mapping) or not tree.entries:
+        message = "a file of rules is a mapping of controllers to patterns"
+        raise InputError([Diagnostic("F1010", message, _HINT, span=node_span(source, tree))])
+    for controller, (key, said) in tree.entries.items():
+        found = data(said)
+        patterns = [one for one in found if isinstance(one, str) and one] if isinstance(found, list) else [found]
+        if isinstance(found, str) or (isinstance(found, list) and found and len(patterns) == len(found)):
+            rules[controller] = [one for one in patterns if isinstance(one, str)]
+        else:
+            message = f"'{controller}' is given no pattern"
+            problems.append(Diagnostic("F1010", message, _HINT, (controller,), node_span(source, key)))
+    if problems:
+        raise InputError(problems)
+    return rules

@@ -1,0 +1,81 @@
+"""Giving a net owners: the same net, in which each place and signal belongs to a controller and bears its name.
+
+An owned thing is named `controller.thing`, so owning renames it wherever it stands: in arcs, gates, completions and
+formulas. The name within the controller is the one it had before, without its former owner; where two of one
+controller would then have the same name, the former owner stays in it (`robot_free`, `mc_free`). Nothing else changes:
+the net with owners has the same markings under other names.
+
+Rejected: owners beside the names, as a table of their own. A reader of `robot.free` sees whose it is, and so does a
+diff.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+from firable.nets.formula import Count, Holds
+from firable.nets.net import Controller, Net, Place, Signal, Transition
+
+
+def with_owners(net: Net, owner_of: Mapping[str, str], controllers: Sequence[Controller]) -> Net:
+    """The net in which each place and signal belongs to the controller that `owner_of` names for it.
+
+    Raises `KeyError` for a place or signal without an owner there, `InputError` where the new names are none.
+
+    >>> from firable.nets.net import Place
+    >>> with_owners(Net("n", (Place("free"),)), {"free": "robot"}, (Controller("robot"),)).places[0].name
+    'robot.free'
+    """
+    items: list[Place | Signal] = [*net.places, *net.signals]
+    local = {item.name: item.name.removeprefix(f"{item.owner}.") if item.owner else item.name for item in items}
+    taken = Counter((owner_of[item.name], local[item.name]) for item in items)
+    named = {}
+    for item in items:
+        owner, short = owner_of[item.name], local[item.name]
+        if taken[owner, short] > 1 and item.owner:
+            short = f"{item.owner}_{short}"
+        named[item.name] = f"{owner}.{short}"
+
+    def new(names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(named[name] for name in names)
+
+    def moved(t: Transition) -> Transition:
+        external = tuple(replace(gate, signal=named[gate.signal]) for gate in t.external)
+        gates = new(t.permissive), new(t.inhibitive)
+        return Transition(t.name, new(t.inputs), new(t.outputs), *gates, external, t.number, t.description)
+
+    return Net(
+        net.name,
+        tuple(
+            replace(
+                place,
+                name=named[place.name],
+                owner=owner_of[place.name],
+                completion=None if place.completion is None else named[place.completion],
+            )
+            for place in net.places
+        ),
+        tuple(map(moved, net.transitions)),
+        tuple(replace(signal, name=named[signal.name], owner=owner_of[signal.name]) for signal in net.signals),
+        tuple(controllers),
+        net.arbiters,
+        tuple(_renamed(prop, named.__getitem__) for prop in net.properties),
+        net.description,
+    )
+
+
+def _renamed(term: Any, named: Callable[[str], str]) -> Any:
+    """A property or formula with its places renamed."""
+    match term:
+        case Holds(place):
+            return Holds(named(place))
+        case Count(places, added):
+            return Count(tuple(map(named, places)), added)
+        case tuple():
+            return tuple(_renamed(item, named) for item in term)
+    if is_dataclass(term) and not isinstance(term, type):
+        return replace(term, **{one.name: _renamed(getattr(term, one.name), named) for one in fields(term)})
+    return term

@@ -1,0 +1,208 @@
+"""Owners by rule and proposed owners: complete, exact, and compared honestly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.examples import examples
+from support.owned_nets import owned_nets
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.spaces.equivalence import isomorphic
+from firable.analysis.spaces.reachability import explore
+from firable.decompose.splitting import partitioning
+from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.hypergraph import Hypergraph, hypergraph
+from firable.decompose.splitting.partitioning import partition
+from firable.decompose.splitting.rules import owned_by_rules, read_rules, rules_of_options
+from firable.decompose.splitting.suggesting import suggest
+from firable.nets.catalogue import catalogue_net, family_net
+from firable.nets.diagnostics import InputError
+from firable.nets.joining import join
+from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.nets.owning import with_owners
+from firable.nets.printing import format_net, in_file_order
+from firable.nets.text import parse_net
+
+
+def bare(net: Net) -> Net:
+    """The net without owners: names as they were, and nobody's."""
+    return replace(
+        net,
+        places=tuple(replace(place, owner=None) for place in net.places),
+        signals=tuple(replace(signal, owner=None) for signal in net.signals),
+        controllers=(),
+    )
+
+
+def problems(net: Net, rules: dict[str, list[str]]) -> list[tuple[str, tuple[str, ...]]]:
+    with pytest.raises(InputError) as refusal:
+        owned_by_rules(net, rules)
+    assert all(diagnostic.hint for diagnostic in refusal.value.diagnostics)
+    return [(diagnostic.code, diagnostic.subject) for diagnostic in refusal.value.diagnostics]
+
+
+SMALL = Net(
+    "n",
+    (
+        Place("r_go", marked=True, command=Command("R", "GO"), completion="done"),
+        Place("r_free"),
+        Place("m_full"),
+    ),
+    (
+        Transition("t", ("r_go",), ("r_free",), external=(ExternalGate("done"),)),
+        Transition("u", ("r_free",), ("m_full",), external=(ExternalGate("door"),)),
+        Transition("v", ("m_full",), external=(ExternalGate("full"),)),
+    ),
+    (Signal("done", kind=SignalKind.COMPLETION), Signal("door"), Signal("full")),
+)
+
+
+def test_rules_own_what_they_match_and_what_is_joined_follows() -> None:
+    owned = owned_by_rules(SMALL, {"robot": ["r_*", "door"], "mc": ["m_*"]})
+    assert [place.name for place in owned.places] == ["robot.r_go", "robot.r_free", "mc.m_full"]
+    assert [signal.name for signal in owned.signals] == ["robot.done", "robot.door", "mc.full"]
+    assert owned.place("robot.r_go").completion == "robot.done"
+    assert [row.name for row in split(owned).table] == ["u"]
+
+
+def test_a_sensor_that_gates_transitions_of_several_controllers_needs_a_rule() -> None:
+    assert problems(SMALL, {"robot": ["r_*"], "mc": ["m_*"]}) == [("F2011", ("signals", "door"))]
+
+
+def test_a_place_of_no_rule_and_one_of_two_are_refused_together() -> None:
+    found = problems(SMALL, {"robot": ["r_*", "door"], "other": ["*_free"]})
+    assert found == [("F2023", ("places", "r_free")), ("F2011", ("places", "m_full")), ("F2011", ("signals", "full"))]
+
+
+def test_a_pattern_that_matches_nothing_is_refused() -> None:
+    assert ("F2002", ()) in problems(SMALL, {"robot": ["r_*", "door", "x_*"], "mc": ["m_*"]})
+
+
+def test_rules_give_the_cell_back_the_owners_that_its_names_tell() -> None:
+    net = catalogue_net("one_robot")
+    rules = {controller.name: [f"{controller.name}.*"] for controller in net.controllers}
+    owned = owned_by_rules(net, rules)
+    assert owned == net
+    assert [row.name for row in split(owned_by_rules(bare(net), rules)).table] == [f"G{n}" for n in range(1, 10)]
+
+
+def test_rules_are_read_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "owners.yaml"
+    path.write_text("robot: [r_*, door]\nmc: m_*\n", encoding="utf-8")
+    assert read_rules(path) == {"robot": ["r_*", "door"], "mc": ["m_*"]}
+
+
+@pytest.mark.parametrize(("text", "line"), [("robot:\nmc: m_*\n", 1), ("mc: m_*\nrobot: {a: b}\n", 2), ("[a]\n", 1)])
+def test_a_file_that_holds_no_rules_is_refused_where_it_stands(tmp_path: Path, text: str, line: int) -> None:
+    path = tmp_path / "owners.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as refusal:
+        read_rules(path)
+    (problem,) = refusal.value.diagnostics
+    assert (problem.code, problem.span and problem.span.line) == ("F1010", line)
+
+
+@pytest.mark.parametrize("option", ["robot", "=r_*", "robot=", "robot=a,,b"])
+def test_an_option_that_is_no_rule_is_refused(option: str) -> None:
+    with pytest.raises(InputError, match="F1010"):
+        rules_of_options([option])
+
+
+def test_two_things_of_one_name_keep_their_former_owners_in_a_common_controller() -> None:
+    net = Net(
+        "n", (Place("a.p", "a"), Place("b.p", "b"), Place("b.q", "b")), (), (), (Controller("a"), Controller("b"))
+    )
+    owned = with_owners(net, dict.fromkeys(("a.p", "b.p", "b.q"), "c"), (Controller("c"),))
+    assert [place.name for place in owned.places] == ["c.a_p", "c.b_p", "c.q"]
+
+
+@given(owned_nets(), st.integers(1, 3))
+@examples(40)
+def test_a_proposal_owns_everything_once_and_changes_nothing_else(net: Net, n: int) -> None:
+    net = bare(net)
+    if best_by_force(hypergraph(net), n, *hypergraph(net).bounds(n, 2.0)) is None:
+        return
+    found = suggest(net, n, slack=2.0)
+    assert len(found.net.controllers) == n
+    decomposition = split(found.net)
+    numbers = {row.name: row.number for row in decomposition.coordinated}
+    numbered = tuple(replace(t, number=numbers.get(t.name, t.number)) for t in found.net.transitions)
+    assert join(decomposition) == replace(found.net, transitions=numbered)
+    # The count of the hypergraph is that of the split.
+    assert [row.name for row in decomposition.table] == [name for name, _ in found.cut]
+    assert sum(len(row.parts) for row in decomposition.table) == found.proposed.votes
+    assert found.fewest <= found.proposed.n_cut <= found.most
+    assert isomorphic(explore(net), explore(found.net))
+    machines = {(p.command.machine, p.owner) for p in found.net.places if p.command is not None}
+    assert len(dict(machines)) == len(machines)
+
+
+def best_by_force(graph: Hypergraph, n: int, low: int, high: int) -> int | None:
+    """The fewest cut transitions of all partitions, tried one by one."""
+    found = []
+    for of in product(range(n), repeat=len(graph.blocks)):
+        sizes = graph.sizes(of, n)
+        if min(sizes) >= low and max(sizes) <= high:
+            found.append(len(graph.cut(of)))
+    return min(found, default=None)
+
+
+@given(owned_nets(), st.integers(2, 3), st.sampled_from([0.3, 0.6, 1.5]))
+@examples(20)
+def test_what_is_called_optimal_is_what_trying_all_partitions_gives(net: Net, n: int, slack: float) -> None:
+    graph = hypergraph(net)
+    if len(graph.blocks) > 8:
+        return
+    fewest = best_by_force(graph, n, *graph.bounds(n, slack))
+    if fewest is None:
+        with pytest.raises(InputError, match="F4004"):
+            partition(graph, n, slack, Deadline.after(20))
+        return
+    found = partition(graph, n, slack, Deadline.after(20))
+    assert found.optimal
+    assert len(graph.cut(found.partition)) == fewest
+    assert graph.fewest(n) <= fewest
+
+
+def test_four_controllers_proposed_for_the_cell_are_its_machines() -> None:
+    found = suggest(bare(catalogue_net("one_robot")), 4)
+    assert {controller.name for controller in found.net.controllers} == {"r", "mc", "cv1", "cv2"}
+    assert (found.proposed.n_cut, found.proposed.votes, found.optimal, found.given) == (7, 16, True, None)
+    owner = {place.name.partition(".")[2]: place.owner for place in found.net.places}
+    assert (owner["conveyor.cv1"], owner["mc.free"], owner["robot.free"]) == ("cv1", "mc", "r")
+
+
+def test_owners_of_the_file_are_compared_with() -> None:
+    given = suggest(catalogue_net("one_robot"), 4).given
+    assert given is not None
+    assert (given.n_cut, given.votes) == (9, 24)
+    assert dict(given.sizes) == {"system": 5, "robot": 16, "mc": 11, "conveyor": 9}
+
+
+def test_proposed_owners_are_written_as_a_net_file() -> None:
+    net = suggest(catalogue_net("one_robot"), 4).net
+    assert parse_net(format_net(net)) == in_file_order(net)
+
+
+def test_without_time_nothing_is_called_optimal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(partitioning, "find_spec", lambda _: None)
+    with pytest.raises(InputError, match="F4004"):
+        suggest(catalogue_net("one_robot"), 4, deadline=Deadline.after(0))
+
+
+def test_more_controllers_than_there_are_blocks_are_refused() -> None:
+    with pytest.raises(InputError, match="19 blocks"):
+        suggest(catalogue_net("one_robot"), 20)
+
+
+def test_a_large_net_is_partitioned_into_its_lines() -> None:
+    pytest.importorskip("mtkahypar")
+    found = suggest(family_net("manufacturing_cells-200"), 5)
+    assert (found.proposed.n_cut, found.optimal) == (4, False)  # a line cut into five pieces
+    assert suggest(family_net("manufacturing_cells-200"), 5) == found
