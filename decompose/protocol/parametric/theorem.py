@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 from firable.decompose.protocol.parametric.invariant import INVARIANT, invariant
@@ -79,11 +80,31 @@ from firable.decompose.protocol.parametric.system import (
 
 @dataclass(frozen=True)
 class ParametricObligation:
-    """A claim about the protocol, proved iff its `script`, which denies it, cannot be true."""
+    """A claim about the protocol, proved iff its `script`, which denies it, cannot be true.
+
+    What is `given` of the theory implies the claim. With an action `by`, the claim is about the moment after it, and
+    says of the one before it what is marked `earlier`; the demands of the action are given too if `happens`, else to be
+    shown.
+    """
 
     name: str
     statement: str
-    script: Script
+    theory: Script
+    given: tuple[tuple[str, Formula], ...]
+    claim: Formula
+    by: Action | None = None
+    happens: bool = False
+
+    @cached_property
+    def script(self) -> Script:
+        """The theory, what is given, and that the claim does not hold."""
+        script = self.theory.continued()
+        for words, formula in self.given:
+            script.add(formula, f"given: {words}")
+        if self.by is not None:
+            (script.step if self.happens else script.change)(self.by)
+        script.add(~self.claim, "and what is to be shown does not hold")
+        return script
 
     @property
     def block(self) -> str:
@@ -152,6 +173,9 @@ def _may(action: Action) -> Formula:
     return earlier(both(list(action.guard)))
 
 
+_INVARIANT: Final = ("the invariant", invariant())
+
+
 class _Prover:
     """The obligations of one protocol."""
 
@@ -159,42 +183,23 @@ class _Prover:
         self.protocol = protocol
         self.theory = theory(protocol)
 
-    def begin(self) -> Script:
-        """Some configuration of which the invariant holds."""
-        script = self.theory.continued()
-        script.add(invariant(), "given: the invariant")
-        return script
-
     def implied(
         self, name: str, statement: str, given: Formula, claim: Formula, by: Action | None = None
     ) -> ParametricObligation:
-        """In each configuration of the invariant, `given` implies `claim`; or what `claim` says after the action `by`.
+        """In each configuration of the invariant, `given` implies `claim`; or after the action `by`."""
+        return ParametricObligation(name, statement, self.theory, (_INVARIANT, ("besides", given)), claim, by)
 
-        The claim speaks of the moment after the action; what it says of the one before is marked `earlier`.
-        """
-        script = self.begin()
-        script.add(given, "given")
-        if by is not None:
-            script.change(by)
-        _deny(script, claim)
-        return ParametricObligation(name, statement, script)
+    def kept(self, name: str, statement: str, claim: Formula, by: Action) -> ParametricObligation:
+        """From each configuration of the invariant, an action leads to one of which the claim holds."""
+        return ParametricObligation(name, statement, self.theory, (_INVARIANT,), claim, by, happens=True)
 
     # --- The invariant
 
     def starts(self) -> ParametricObligation:
-        statement = "the invariant holds at the start"
-        script = self.theory.continued()
-        for words, formula in INITIAL:
-            script.add(formula, f"start: {words}")
-        _deny(script, invariant())
-        return ParametricObligation("starts", statement, script)
+        return ParametricObligation("starts", "the invariant holds at the start", self.theory, INITIAL, invariant())
 
     def keeps(self, action: Action) -> ParametricObligation:
-        name, statement = f"keeps.{action.name}", f"'{action.name}' keeps the invariant"
-        script = self.begin()
-        script.step(action)
-        _deny(script, invariant())
-        return ParametricObligation(name, statement, script)
+        return self.kept(f"keeps.{action.name}", f"'{action.name}' keeps the invariant", invariant(), action)
 
     # --- Safety
 
@@ -285,12 +290,6 @@ class _Prover:
             yield self.implied(f"complete.{step}", words, given, _may(action) & after, by=action)
 
     def advances(self, action: Action) -> ParametricObligation:
-        name, statement = (
-            f"advances.{action.name}",
-            f"'{action.name}' changes nothing, or makes something known for good",
-        )
-        script = self.begin()
-        script.step(action)
         growing = (vote, heard, decided, obeyed, noted, closed_round)
         known = [begun(s) & relation(*formals_of(relation)) for relation in growing]
         lost_none = both([closed(earlier(fact).implies(fact)) for fact in known])
@@ -298,10 +297,9 @@ class _Prover:
         changed = [update.relation(*formals_of(update.relation)) for update in action.updates]
         unchanged = both([closed(fact.iff(earlier(fact))) for fact in changed])
         asked_no_more = both([closed(fact.implies(earlier(fact))) for fact in (asked(s, u), begun(s))])
-        _deny(script, asked_no_more & (unchanged | (lost_none & gained)))
-        return ParametricObligation(name, statement, script)
-
-
-def _deny(script: Script, formula: Formula) -> None:
-    """Assert that what is to be shown does not hold."""
-    script.add(~formula, "and what is to be shown does not hold")
+        return self.kept(
+            f"advances.{action.name}",
+            f"'{action.name}' changes nothing, or makes something known for good",
+            asked_no_more & (unchanged | (lost_none & gained)),
+            action,
+        )
