@@ -1,10 +1,10 @@
 """Splitting a net over its controllers, proving the parts equal to the whole, and sealing what is proved.
 
-What a program imports from here: `split` gives the `Decomposition` of a net over its controllers;
-`table_text` is its coordinator table as the paper prints it. `prove` discharges the obligations, Eq. (7)-(10) and what
-belongs to them, in a `ProofReport`. `make_bundle` does all this for a net that `firable.analysis` has checked, and
-refuses what is not proved. `explore_protocol` follows every run of a protocol `Variant`, with its kind of `Votes`,
-and says in a `ProtocolVerdict` whether it does what the central net does.
+What a program imports from here: `split` gives the `Decomposition` of a net over its controllers; `table_text` is its
+coordinator table as the paper prints it. `prove` discharges the obligations, Eq. (7)-(10) and what belongs to them, in
+a `ProofReport`. `make_bundle` does all this for a net that `firable.analysis` has checked, and refuses what is not
+proved. `explore_protocol` follows every run of a protocol `Variant`, with its kind of `Votes`, under `Faults`, and says
+in an `Exploration` whether it does what the central net does.
 
     from firable.analysis.check import check
     from firable.decompose import make_bundle
@@ -17,13 +17,15 @@ The rooms within: `splitting`, `proofs`, `protocol`; what is not named here is i
 
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.proving import ProofReport, prove
-from firable.decompose.protocol.exploring import ProtocolVerdict, Variant, Votes, explore_protocol
+from firable.decompose.protocol.exploring import Exploration, explore_protocol
+from firable.decompose.protocol.variant import Faults, Variant, Votes
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.table import table_text
 
 __all__ = [
+    "Exploration",
+    "Faults",
     "ProofReport",
-    "ProtocolVerdict",
     "Variant",
     "Votes",
     "explore_protocol",

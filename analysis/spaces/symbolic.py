@@ -27,7 +27,7 @@ from firable.analysis.compiled import engine_limits, rows
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.space import Derived, Witnesses
-from firable.nets.formula import And, Deadlock, Firable, Formula, Not, Or, Start
+from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Or, Start
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Cost, Witness
 from firable.semantics.algebra import Bitwise, BooleanAlgebra
@@ -148,7 +148,9 @@ class SymbolicSpace(Derived[MarkingSet]):
             case Not(operand):
                 return self.algebra.negation(self.satisfying(operand))
             case And(operands):
-                return self.algebra.conjunction(map(self.satisfying, operands))
+                full, empty, others = _literals(self.net, operands)
+                within = self.engine.having(self.reach, full, empty) if full or empty else self.reach
+                return self.algebra.conjunction([within, *map(self.satisfying, others)])
             case Or(operands):
                 return self.algebra.disjunction(map(self.satisfying, operands))
         return self.where(lambda algebra, holds: evaluate(algebra, self.net, formula, holds))
@@ -279,10 +281,28 @@ class SymbolicSpace(Derived[MarkingSet]):
         return self.witnesses.replayed([(t,) for t in firings], sum(1 << place for place in marked), note)
 
 
-def explore_symbolically(net: Net, limits: Limits | None = None) -> SymbolicSpace:
+def _literals(net: Net, operands: Sequence[Formula]) -> tuple[list[int], list[int], list[Formula]]:
+    """Of a conjunction: the places that must be full, those that must be empty, and the other operands."""
+    full, empty, others = list[int](), list[int](), list[Formula]()
+    for operand in operands:
+        match operand:
+            case Holds(place):
+                full.append(net.place_index[place])
+            case Not(Holds(place)):
+                empty.append(net.place_index[place])
+            case _:
+                others.append(operand)
+    return full, empty, others
+
+
+def explore_symbolically(
+    net: Net, limits: Limits | None = None, *, order: Sequence[int] | None = None
+) -> SymbolicSpace:
     """All reachable markings of a net under interleaving, external gates free.
 
-    Raises `BudgetExceeded` where the limits of memory or time end the search before it has found all.
+    Who knows a good order of the places gives their indexes, from the lowest level of the diagram to the highest; else
+    several orders race each other. Raises `BudgetExceeded` where the limits of memory or time end the search before it
+    has found all.
 
     >>> from firable.nets.catalogue.families import family_net
     >>> space = explore_symbolically(family_net("philosophers_either-100"))
@@ -291,7 +311,10 @@ def explore_symbolically(net: Net, limits: Limits | None = None) -> SymbolicSpac
     """
     limits = limits or Limits()
     diagram = _engine.explore_symbolically(
-        *rows(net), max_memory_bytes=limits.memory_bytes, **engine_limits(limits.deadline)
+        *rows(net),
+        max_memory_bytes=limits.memory_bytes,
+        orders=None if order is None else [list(order)],
+        **engine_limits(limits.deadline),
     )
     reach = diagram.reach()
     return SymbolicSpace(net, diagram, reach.count(), limits.deadline)

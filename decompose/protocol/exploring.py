@@ -1,177 +1,225 @@
-"""Does a distributed protocol do what the central net does? All its runs, explored.
+"""Does a distributed protocol do what the central net does? All its runs, by the project's own engine.
 
-Eq. (7)-(10) hold at one instant; a protocol takes its votes and applies its orders at many. So each variant is explored
-against the central net, configuration by configuration (`model` says what happens in one), and three questions
-are asked:
+Eq. (7)-(10) hold at one instant; a protocol takes its votes and applies its orders at many. So the protocol is a net of
+its own (`building`), and what is asked of it is asked of the markings that this net reaches, in a table where there are
+few and in a decision diagram where there are many:
 
-- *refines*: the firings of every run are a run of the central net, and whenever no message is on its way, the
-  controllers hold the marking that the central net then has. Orders half executed are refuted by the second.
-- *wrong*: the markings displayed while no message is on its way that the central net does not reach at all.
-- *complete*: whatever the central net may fire next, the protocol can still fire next, from every configuration
-  that has followed the central net. Nothing is lost, and there is no new deadlock.
+- `follows`: whatever fires, the central net can fire. With `agrees` (where no order is on its way, the controllers hold
+  the marking that the central net then has) this is *refinement*: every run is, seen from outside, a run of the central
+  net. Of the true protocol also `orders-fit`: an order always finds its part firable, so promises are kept.
+- `complete`: nothing is lost (`completeness`), and so no deadlock is added.
+- `one-token`: contact is where the central net has it, and nowhere else. So no step waits for a place to be empty
+  that it was not told to look at, and every place holds one token at most by what the steps do, not by the rule.
+- `divergence`: which runs are busy for ever (`divergence`).
 
-Each of refining and completeness is proved, violated or, where the budget of configurations ended first, unknown. What
-was found before the end stays found: a refuting run is one whatever follows, and a transition is lost only if it could
-not be next even if every configuration that was not looked at could fire everything.
-
-The variants that fail are here to show that the obligations are needed: a test of `locked` alone would also pass with a
-model that can go wrong nowhere. Source: SEMANTICS, "Decomposition", O1-O6.
+Each is proved, violated with a firing sequence of the protocol net, told in the words of who watches, or unknown.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Final
 
-from firable.decompose.protocol.model import LEFT, Configuration, Event, Model, Variant, Votes
+import numpy as np
+
+from firable.analysis.goal import Limits
+from firable.analysis.question import Answer, Question, listed, no, yes
+from firable.analysis.spaces.reachability import Budget, BudgetExceeded, ReachabilityGraph, explore
+from firable.analysis.spaces.space import StateSpace
+from firable.analysis.spaces.symbolic import explore_symbolically
+from firable.analysis.verdicts.properties import decide_property
+from firable.decompose.protocol.building import AGREES, FIT, FOLLOWS, ProtocolNet, protocol_net
+from firable.decompose.protocol.completeness import IncompleteGraph, Lost, central_markings, first_lost
+from firable.decompose.protocol.divergence import not_falling
+from firable.decompose.protocol.draft import ASTRAY
+from firable.decompose.protocol.variant import NO_FAULTS, PROTOCOL, Faults, Variant
 from firable.decompose.splitting.cut import split
 from firable.nets.decomposition import Decomposition
-from firable.nets.net import Marking, Net
-from firable.nets.verdict import Status
+from firable.nets.formula import And, Holds, Or
+from firable.nets.net import Net, Property
+from firable.nets.verdict import Status, Verdict, Witness
 
-__all__ = ["CONFIGURATIONS_MAX", "ProtocolVerdict", "Variant", "Votes", "explore_protocol"]
+FIRST_MARKINGS: Final = 200_000
+"""How many markings are looked for in a table before a diagram is tried."""
 
-CONFIGURATIONS_MAX: Final = 2_000_000
+STATEMENTS: Final = {
+    FOLLOWS: "whatever the protocol fires, the central net can fire",
+    AGREES: "where no order is on its way, the controllers hold the marking of the central net",
+    FIT: "an order to fire finds its part firable",
+}
+COMPLETE: Final = Question(
+    "protocol.complete",
+    "whatever the central net may fire next, the protocol can still fire next (branching bisimilar, its steps hidden)",
+    code="F4002",
+    hint="the last event of the run is what it is lost by",
+)
+ONE_TOKEN: Final = Question(
+    "protocol.one-token",
+    "no step finds a full place that it would fill, but where the central net has contact",
+    code="F4002",
+)
+DIVERGENCE: Final = Question(
+    "protocol.divergence",
+    "while nothing fires, a run goes on for ever only by repeating requests or orders, or giving rounds up, for ever",
+    code="F4002",
+    method="weights on places that every other hidden step lowers",
+)
 
 
-@dataclass(frozen=True, slots=True)
-class ProtocolVerdict:
-    """What the exploration of all runs says.
+@dataclass(frozen=True)
+class Exploration:
+    """The protocol net of a decomposition, and as many of its markings as could be held."""
 
-    `wrong` holds markings as the names of the places with a token; those that are known to be wrong, if the exploration
-    ended early. `counterexample` is a shortest run that the central net cannot follow, or that ends at rest in another
-    marking than the central net's; `blocked` a shortest run after which the transition `lost` can no longer be the next
-    to fire, though in the central net it may. `bound` says how far was looked where the budget ended (then
-    `blocked` need not be a shortest one); else it is empty.
-    """
+    protocol: ProtocolNet
+    space: StateSpace[Any]
+    limits: Limits = field(default_factory=Limits)
 
-    refines: Status
-    wrong: tuple[tuple[str, ...], ...]
-    complete: Status
-    n_configurations: int
-    bound: str = ""
-    counterexample: tuple[str, ...] = ()
-    blocked: tuple[str, ...] = ()
-    lost: str = ""
+    @cached_property
+    def safety(self) -> tuple[Verdict, ...]:
+        """The verdicts of refinement."""
+        return tuple(
+            self._told(decide_property(self.space, of))
+            for of in self.protocol.net.properties
+            if isinstance(of, Property)
+        )
+
+    @cached_property
+    def complete(self) -> Verdict:
+        """The verdict on completeness; the subject of a violation is what is lost."""
+
+        def find() -> Answer:
+            lost = self.lost
+            return yes() if lost is None else no((lost.transition,), lost.witness)
+
+        return COMPLETE.ask(self.space, find)
+
+    @cached_property
+    def lost(self) -> Lost | None:
+        """What is lost; raises where that is not known."""
+        return first_lost(self.protocol, self.space, self.limits)
+
+    @cached_property
+    def one_token(self) -> Verdict:
+        """The verdict on contact."""
+
+        def find() -> Answer:
+            self.space.require_complete()
+            net, steps = self.protocol.net, self.protocol.steps
+            found = [t for t, count in enumerate(self.space.contacts()) if count]
+            added = [t for t in found if not steps[net.transitions[t].name].fires]
+            if not added:
+                return yes()
+            return no(tuple(net.transitions[t].name for t in added), self.space.witness_of_contact(added))
+
+        return ONE_TOKEN.ask(self.space, find)
+
+    @cached_property
+    def divergence(self) -> Verdict:
+        """The verdict on runs that are busy for ever."""
+        rising = not_falling(self.protocol)
+        return DIVERGENCE.ask(self.space, lambda: no(rising) if rising else yes())
+
+    @cached_property
+    def refines(self) -> Status:
+        """Whether every run is one of the central net."""
+        statuses = {verdict.status for verdict in self.safety}
+        return next(status for status in (Status.VIOLATED, Status.UNKNOWN, Status.PROVED) if status in statuses)
+
+    @cached_property
+    def counterexample(self) -> Witness | None:
+        """A run of the protocol net that the central net cannot follow, or that ends at rest in another marking."""
+        found = [verdict.witness for verdict in self.safety if verdict.witness is not None]
+        return min(found, key=lambda witness: len(witness.firings), default=None)
+
+    @cached_property
+    def wrong(self) -> tuple[tuple[str, ...], ...]:
+        """The markings that are displayed at rest and that the central net does not reach, as names of places.
+
+        Those among the markings that are known; none where they are held in a diagram, or the central net is too large.
+        """
+        if not isinstance(self.space, ReachabilityGraph):
+            return ()
+        protocol, net = self.protocol, self.protocol.parts.net
+        strange = self.space.satisfying(And((protocol.at_rest, Or((protocol.differs, Holds(ASTRAY))))))
+        own = [protocol.net.place_index[place.name] for place in net.places]
+        shown: dict[int, None] = {}
+        for i in np.flatnonzero(strange):
+            marking = self.space.marking(int(i))
+            shown.setdefault(sum(1 << p for p, bit in enumerate(own) if marking >> bit & 1))
+        if not shown:
+            return ()
+        try:
+            reached = central_markings(net, self.limits)
+        except IncompleteGraph:
+            return ()
+        return tuple(net.names(marking) for marking in shown if marking not in reached)
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """All verdicts on the true protocol."""
+        return (*self.safety, self.complete, self.one_token, self.divergence)
+
+    def events(self, witness: Witness | None) -> tuple[str, ...]:
+        """A firing sequence of the protocol net as what happens, in the words of who watches."""
+        return () if witness is None else tuple(str(self.protocol.steps[t]) for (t,) in witness.firings)
+
+    def _told(self, verdict: Verdict) -> Verdict:
+        name = verdict.name.removeprefix("property.")
+        return replace(
+            verdict,
+            name=f"protocol.{name}",
+            statement=STATEMENTS[name],
+            code="F4002" if verdict.status is Status.VIOLATED else verdict.code,
+            witness=None if verdict.witness is None else replace(verdict.witness, note=_note(name)),
+        )
+
+
+def _note(name: str) -> str:
+    return {
+        FOLLOWS: "by the last event something fires that the central net cannot fire",
+        AGREES: "at rest, the controllers hold another marking than the central net",
+        FIT: "the order has arrived, and its part is not firable",
+    }[name]
 
 
 def explore_protocol(
-    net: Net | Decomposition, variant: Variant, *, configurations_max: int = CONFIGURATIONS_MAX
-) -> ProtocolVerdict:
-    """Explore every run of a protocol variant, breadth first, until `configurations_max` configurations are explored.
+    net: Net | Decomposition,
+    variant: Variant = PROTOCOL,
+    faults: Faults = NO_FAULTS,
+    *,
+    budget: Budget | None = None,
+    limits: Limits | None = None,
+) -> Exploration:
+    """All runs of a protocol, exposed to faults: in a table within the budget, else in a diagram within the limits.
 
-    Time and memory grow with the configurations, some 10 microseconds and 1 kB for each move. Raises the errors of
-    `split`.
+    Where neither holds them, the table is as far as it goes. Raises the errors of `split`.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> found = explore_protocol(catalogue_net("conceptual_one_robot"))
+    >>> str(found.refines), str(found.complete.status)
+    ('proved', 'proved')
     """
-    decomposition = split(net) if isinstance(net, Net) else net
-    return _Exploration(Model(decomposition, variant), configurations_max).verdict()
+    protocol = protocol_net(split(net) if isinstance(net, Net) else net, variant, faults)
+    limits = limits or Limits()
+    return Exploration(protocol, _space(protocol, budget or Budget(FIRST_MARKINGS), limits, budget is None), limits)
 
 
-class _Exploration:
-    """The graph of configurations, numbered in the order in which they were found.
+def _space(protocol: ProtocolNet, budget: Budget, limits: Limits, diagram: bool) -> StateSpace[Any]:
+    graph = explore(protocol.net, budget=budget, deadline=limits.deadline)
+    if graph.complete or not diagram:
+        return graph
+    try:
+        return explore_symbolically(protocol.net, limits, order=protocol.order)
+    except BudgetExceeded:
+        return graph
 
-    `edges` may be shorter than `found`: where the budget ended, nobody knows what follows the rest.
-    """
 
-    def __init__(self, model: Model, configurations_max: int) -> None:
-        self.model = model
-        self.configurations_max = configurations_max
-        self.found: list[Configuration] = [model.initial]
-        self.parents: list[tuple[int, Event] | None] = [None]
-        self.edges: list[list[tuple[int, int]]] = []
-        index = {model.initial: 0}
-        for n, now in enumerate(self.found):  # grows while it is walked
-            if n == configurations_max:
-                break
-            edges = []
-            for event, fired, after in model.moves(now):
-                successor = index.setdefault(after, len(self.found))
-                if successor == len(self.found):
-                    self.found.append(after)
-                    self.parents.append((n, event))
-                edges.append((successor, fired))
-            self.edges.append(edges)
-
-    @property
-    def finished(self) -> bool:
-        """Whether every configuration has been explored."""
-        return len(self.edges) == len(self.found)
-
-    def verdict(self) -> ProtocolVerdict:
-        net = self.model.net
-        refuting = None
-        strange: dict[Marking, None] = {}
-        for n, now in enumerate(self.found):
-            astray = now.central == LEFT or (now.quiescent and now.local != now.central)
-            if astray and refuting is None:
-                refuting = n
-            if astray and now.quiescent:
-                strange.setdefault(now.local)
-        blocked = self.blocked()
-        otherwise = Status.PROVED if self.finished else Status.UNKNOWN
-        explored = f"{len(self.edges):,} of at least {len(self.found):,} configurations explored"
-        return ProtocolVerdict(
-            refines=otherwise if refuting is None else Status.VIOLATED,
-            wrong=tuple(net.names(marking) for marking in self.wrong(strange)),
-            complete=otherwise if blocked is None else Status.VIOLATED,
-            n_configurations=len(self.found),
-            bound="" if self.finished else explored,
-            counterexample=() if refuting is None else self.run(refuting),
-            blocked=() if blocked is None else self.run(blocked[0]),
-            lost="" if blocked is None else net.transitions[blocked[1]].name,
-        )
-
-    def wrong(self, markings: Iterable[Marking]) -> list[Marking]:
-        """Those of the markings that the central net does not reach; none where it is too large to know."""
-        wrong = dict.fromkeys(markings)
-        if not wrong:
-            return []
-        reached = {self.model.net.initial_marking}
-        todo = list(reached)
-        for marking in todo:  # grows while it is walked
-            if len(todo) > self.configurations_max:
-                return []
-            for _, successor in self.model.player.successors(marking):
-                if successor not in reached:
-                    reached.add(successor)
-                    todo.append(successor)
-        return [marking for marking in wrong if marking not in reached]
-
-    def run(self, n: int) -> tuple[str, ...]:
-        """The events that lead to a configuration, from the first."""
-        events = []
-        while (parent := self.parents[n]) is not None:
-            n, event = parent
-            events.append(str(event))
-        return tuple(reversed(events))
-
-    def blocked(self) -> tuple[int, int] | None:
-        """The first configuration from which some transition of the central net can no longer be next, and which."""
-        sources: list[list[int]] = [[] for _ in self.found]
-        next_fired = [0] * len(self.edges)
-        # Of what was not explored, everything is taken to be possible: so nothing is called lost that may not be.
-        next_fired += [(1 << len(self.model.net.transitions)) - 1] * (len(self.found) - len(self.edges))
-        for n, edges in enumerate(self.edges):
-            for successor, fired in edges:
-                if fired < 0:
-                    sources[successor].append(n)
-                else:
-                    next_fired[n] |= 1 << fired
-        todo = [n for n, fired in enumerate(next_fired) if fired]
-        while todo:  # what can be next after a move that fires nothing can be next before it
-            n = todo.pop()
-            for source in sources[n]:
-                joined = next_fired[source] | next_fired[n]
-                if joined != next_fired[source]:
-                    next_fired[source] = joined
-                    todo.append(source)
-        may_fire: dict[int, int] = {}
-        for n, now in enumerate(self.found):
-            if now.central == LEFT:
-                continue
-            if now.central not in may_fire:
-                may_fire[now.central] = sum(1 << t for t in self.model.player.may_fire(now.central))
-            if lost := may_fire[now.central] & ~next_fired[n]:
-                return n, lost.bit_length() - 1
-        return None
+def failing(exploration: Exploration) -> Iterator[str]:
+    """Which sentences do not hold, in words."""
+    for verdict in exploration.safety:
+        if verdict.status is Status.VIOLATED:
+            yield verdict.statement
+    if exploration.complete.status is Status.VIOLATED:
+        yield f"{exploration.complete.statement}: {listed(exploration.complete.subjects)} is lost"

@@ -20,7 +20,7 @@ from firable.analysis.verdicts.commands import entries
 from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pair, Steps
 from firable.analysis.verdicts.starvation import eager_run, scan, starved
 from firable.decompose.protocol.exploring import explore_protocol
-from firable.decompose.protocol.model import Variant
+from firable.decompose.protocol.variant import named
 from firable.decompose.splitting.cut import split, unowned
 from firable.decompose.splitting.persistence import nonpersistent
 from firable.nets.diagnostics import InputError
@@ -179,14 +179,14 @@ def decided(holds: bool) -> Status:
 def check_dist(subject: Subject, expected: Mapping[str, Mapping[str, Any]]) -> None:
     decomposition = split(subject.net)
     for variant, wanted in expected.items():
-        found = explore_protocol(decomposition, Variant.named(variant))
+        found = explore_protocol(decomposition, *named(variant))
         if "refines" in wanted:
             assert found.refines is decided(wanted["refines"]), variant
         if "wrong" in wanted:
             spelled = {frozenset(filter(None, marking.strip("{}").split(","))) for marking in wanted["wrong"]}
             assert {frozenset(map(local, marking)) for marking in found.wrong} == spelled, variant
         if "complete" in wanted:
-            assert found.complete is decided(wanted["complete"]), variant
+            assert found.complete.status is decided(wanted["complete"]), variant
         assert not set(wanted) - {"refines", "wrong", "complete"}
 
 

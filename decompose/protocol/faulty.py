@@ -1,0 +1,117 @@
+"""The faults as steps: a message is lost or doubled, a controller or the coordinator crashes and starts again.
+
+A fault that may happen once takes its token from a place of its own, so that all runs with at most one such fault are
+runs of the one net. Delay and overtaking need no step: each message has a channel of its own, and waits there for as
+long as it likes.
+
+A message that is doubled arrives once as it would have, and a copy is *late*. Within its round a second copy is what
+the sender does anyway, by repeating; so a late copy is one that comes when its round is over. With its number it is
+ignored, whatever it says, and so one place holds a token while any such copy is on its way; without, it is taken for a
+message of the present round, and each channel has a place for late copies of its own.
+
+Who crashes does nothing until the restart. Everything that the protocol says of them is in stable storage (O6), so a
+restart changes nothing; messages to them wait, or are lost. A coordinator that starts again may give up what it had not
+decided, and go on with what it had: it may do both at any time anyway. Where promises are not stable, a controller that
+is down may lose any of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from firable.decompose.protocol.draft import COORDINATOR_DOWN, Draft, Step, at, down, late
+from firable.decompose.protocol.parts import Part, Parts
+from firable.decompose.protocol.variant import Faults, Often
+
+WORDS: Final = {
+    "request": "the request for {t} to {c}",
+    "vote": "the yes of {c} on {t}",
+    "commit-order": "the order for {t} to {c}",
+    "abort-order": "the order to give up {t} to {c}",
+    "acknowledgement": "the acknowledgement of {c} on {t}",
+}
+"""What each message is called."""
+
+IGNORED: Final = "late-copy-of-old-round"
+"""A copy of a message of an older round is on its way, and will be ignored."""
+
+
+def declare_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[str]) -> None:
+    """Add the places of the faults that belong to no part: what may still happen, and who is down."""
+    for kind in ("loss", "duplication", "crash", "coordinator"):
+        if getattr(faults, kind) is Often.ONCE:
+            draft.place(budget(kind), marked=True)
+    if faults.duplication and any(is_numbered(parts, channel) for channel in channels):
+        draft.place(IGNORED)
+    if faults.coordinator:
+        draft.place(COORDINATOR_DOWN)
+    if faults.crash:
+        for controller in crashing(parts, faults):
+            draft.place(down(controller))
+
+
+def budget(kind: str) -> str:
+    """The place that holds a token as long as the one fault of a kind may still happen."""
+    return f"may-happen/{kind}"
+
+
+def crashing(parts: Parts, faults: Faults) -> tuple[str, ...]:
+    """The controllers that may crash."""
+    names = tuple(subnet.name for subnet in parts.decomposition.subnets)
+    return (faults.doomed,) if faults.doomed else names
+
+
+def add_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[str]) -> None:
+    """Add the steps of every fault that may happen."""
+
+    def taken(kind: str) -> list[str]:
+        return [budget(kind)] if getattr(faults, kind) is Often.ONCE else []
+
+    for part in (part for its in parts.coordinated.values() for part in its):
+        for channel in channels:
+            message, words = at(channel, part), WORDS[channel].format(t=part.whole, c=part.controller)
+            if faults.loss:
+                draft.step(f"lose/{message}", Step("lose", f"{words} is lost"), [message, *taken("loss")])
+            if faults.duplication:
+                copy = IGNORED if is_numbered(parts, channel) else late(message)
+                twice = Step("double", f"{words} is doubled, and the copy is late")
+                draft.step(f"double/{message}", twice, taken("duplication"), [copy], [message], [copy])
+                if copy != IGNORED:
+                    obeyed = Step("late", f"the late copy of {words} comes, as if it were of this round")
+                    draft.step(f"late-copy/{message}", obeyed, [copy], [message], (), [message])
+    if IGNORED in draft.places:
+        ignored = Step("late", "the late copy arrives, and is ignored for the number of its round")
+        draft.step("late-copy", ignored, [IGNORED])
+    if faults.crash:
+        for controller in crashing(parts, faults):
+            crash = Step("crash", f"{controller} {'stops' if faults.restart else 'stops for ever'}", controller)
+            draft.step(f"crash/{controller}", crash, taken("crash"), [down(controller)], (), [down(controller)])
+            if faults.restart:
+                again = Step("restart", f"{controller} starts again", controller)
+                draft.step(f"restart/{controller}", again, [down(controller)])
+            if not parts.variant.stable:
+                _forget(draft, [part for its in parts.coordinated.values() for part in its], controller)
+    if faults.coordinator:
+        draft.step(
+            "crash",
+            Step("crash", "the coordinator stops"),
+            taken("coordinator"),
+            [COORDINATOR_DOWN],
+            (),
+            [COORDINATOR_DOWN],
+        )
+        if faults.restart:
+            draft.step("restart", Step("restart", "the coordinator starts again"), [COORDINATOR_DOWN])
+
+
+def is_numbered(parts: Parts, channel: str) -> bool:
+    """Whether messages of a kind carry the number of their round."""
+    return parts.variant.vote_rounds if channel in {"request", "vote"} else parts.variant.order_rounds
+
+
+def _forget(draft: Draft, parts: Iterable[Part], controller: str) -> None:
+    for part in parts:
+        if part.controller == controller:
+            forget = Step("forget", f"{controller} forgets in the crash that it promised {part.whole}", controller)
+            draft.step(f"forget/{part.whole}/{controller}", forget, [at("promised", part)], (), [down(controller)])

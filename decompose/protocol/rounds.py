@@ -1,0 +1,179 @@
+"""The steps of the protocol with rounds: ask, promise, hear, decide, order, apply, acknowledge, close.
+
+Each step is a few transitions of the protocol net; `docs/protocol.md` tells the protocol itself. What the net merges,
+and why nothing is lost by it:
+
+- *To send again is to send.* The coordinator may send a request or an order whenever the answer has not come, so the
+  first message and all repetitions are one transition. A channel holds one copy of each message: a second one waits to
+  be sent until the first has arrived, or has been lost; what it would have said, the first has said.
+- *A request that cannot be answered yes waits.* A controller that answers "no" says nothing that the coordinator may
+  rely on, and it may be asked again; so a no is a request that is still on its way.
+- *Whoever ignores a message may do so at once.* A round closes when all its messages have arrived. A message of the
+  round that arrives after the close is ignored, because it carries the number of an older round; and in the net it is
+  ignored just before the close, which is always possible and changes nothing else. So round numbers need no places:
+  there is one round for each group, and what it leaves behind is empty. Where votes or orders carry no number, this is
+  not so, and their channels stay as they are.
+- *A close takes its parts one after the other*, transition by transition of the group, while the group is decided and
+  nothing can be asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from firable.decompose.protocol.draft import CHANNELS, Draft, Effect, Step, at, blind, guarded
+from firable.decompose.protocol.parts import Part, Parts
+
+
+def add_rounds(draft: Draft, parts: Parts) -> None:
+    """Add every step of the rounds; the places are there."""
+    for g, group in enumerate(parts.groups):
+        for t in group:
+            _coordinator(draft, parts, t, group, decided(parts, t))
+            for part in parts.coordinated[t]:
+                _voting(draft, parts, part, decided(parts, t))
+                _ordering(draft, part, decided(parts, t))
+                _obeying(draft, parts, part)
+        if len(group) > 1:
+            close = Step("close", f"the round of {_listed(group)} is closed")
+            draft.step(f"close-round/{g}", close, [decided(parts, group[0])], (), (), [asked(t) for t in group])
+
+
+def asked(t: str) -> str:
+    """The coordinator asks for a transition in the present round of its group."""
+    return f"asked/{t}"
+
+
+def committed(t: str) -> str:
+    """The present round of the group of a transition was decided for it."""
+    return f"committed/{t}"
+
+
+def decided(parts: Parts, t: str) -> str:
+    """The present round of the group of a transition is decided, one way or the other."""
+    return f"decided/{'+'.join(parts.groups[parts.group_of[t]])}"
+
+
+def _coordinator(draft: Draft, parts: Parts, t: str, group: Sequence[str], over: str) -> None:
+    its = parts.coordinated[t]
+    heard = [at("heard", part) for part in its]
+    draft.step(f"ask/{t}", Step("ask", f"the coordinator asks for {t}"), (), [asked(t)], (), [asked(t), over])
+    given_up = Step("give-up", f"the round of {_listed(group)} is given up")
+    draft.step(f"give-up/{t}", given_up, (), [over], [asked(t)], [over])
+    decide = Step("decide", f"{t} is decided", fires=t)
+    draft.fire(f"decide/{t}", decide, heard, [committed(t), over], [asked(t)], [over])
+    if not parts.variant.unanimous and len(its) > 1:
+        for part in its:
+            without = Step("decide", f"{t} is decided without the vote of {part.controller}", fires=t)
+            votes = [at("heard", other) for other in its if other is not part]
+            draft.fire(
+                f"decide/{t}/without/{part.controller}",
+                without,
+                votes,
+                [committed(t), over],
+                [asked(t)],
+                [over, at("heard", part)],
+            )
+    left = [at(channel, part) for part in its for channel in _cleared(parts)]
+    answered = [at(kind, part) for part in its for kind in ("noted", "obeyed")]
+    close = Step("close", f"the round of {t} is closed" if len(group) == 1 else f"{t} is settled in its round")
+    ends, needs = ([over], []) if len(group) == 1 else ([], [over])
+    draft.step(f"close/{t}", close, [asked(t), *answered, *ends, committed(t)], (), needs, left)
+    draft.step(f"close/{t}/aborted", close, [asked(t), *answered, *ends], (), needs, [*left, committed(t)])
+
+
+def _cleared(parts: Parts) -> list[str]:
+    """The channels that are empty when a round closes, because what comes later is known to be of an older round."""
+    kept = set() if parts.variant.vote_rounds else {"request", "vote"}
+    kept |= set() if parts.variant.order_rounds else {"commit-order", "abort-order"}
+    return [channel for channel in CHANNELS if channel not in kept]
+
+
+def _voting(draft: Draft, parts: Parts, part: Part, over: str) -> None:
+    t, c = part.whole, part.controller
+    request, vote, heard, promised, obeyed = (
+        at(kind, part) for kind in ("request", "vote", "heard", "promised", "obeyed")
+    )
+    sent = Step("request", f"the coordinator requests the vote of {c} on {t}")
+    draft.step(f"send-request/{t}/{c}", sent, (), [request], [asked(t)], [over, heard, request])
+    draft.step(
+        f"promise/{t}/{c}",
+        Step("promise", f"{c} votes yes on {t}", c),
+        [request],
+        [promised, vote],
+        [*part.inputs, *part.permissive, *(copy(c, place) for place in part.copied_full)],
+        [
+            *part.outputs,
+            *part.inhibitive,
+            *(copy(c, place) for place in part.copied_empty),
+            *(at("promised", other) for other in parts.excluding(part)),
+            *(promised, vote, obeyed),
+        ],
+    )
+    again = Step("promise", f"{c} repeats its yes on {t}", c)
+    draft.step(f"promise/{t}/{c}/again", again, [request], [vote], [promised], [vote])
+    old = Step("ignore", f"{c} ignores a late request for {t}", c)
+    draft.step(f"ignore-request/{t}/{c}", old, [request], (), [obeyed])
+    draft.step(f"hear/{t}/{c}", Step("hear", f"the yes of {c} on {t} arrives"), [vote], [heard], (), [heard, over])
+    known = Step("hear", f"the yes of {c} on {t} arrives again")
+    draft.step(f"hear/{t}/{c}/again", known, [vote], (), [heard])
+    if parts.variant.vote_rounds:
+        late = Step("ignore", f"the yes of {c} on {t} arrives too late")
+        draft.step(f"ignore-vote/{t}/{c}", late, [vote], (), [over])
+
+
+def _ordering(draft: Draft, part: Part, over: str) -> None:
+    t, c = part.whole, part.controller
+    commit, abort, heard, noted = (at(kind, part) for kind in ("commit-order", "abort-order", "heard", "noted"))
+    order = Step("order", f"the coordinator orders {c} to fire its part of {t}")
+    draft.step(f"order-commit/{t}/{c}", order, (), [commit], [committed(t)], [commit, noted])
+    order = Step("order", f"the coordinator orders {c} to give up its part of {t}")
+    draft.step(f"order-abort/{t}/{c}", order, (), [abort], [asked(t), over], [abort, committed(t), noted, heard])
+    # Its vote was heard, and is of no use any more.
+    draft.step(f"order-abort/{t}/{c}/voted", order, [heard], [abort], [asked(t), over], [abort, committed(t), noted])
+    acknowledgement = at("acknowledgement", part)
+    note = Step("note", f"{c} is known to have obeyed on {t}")
+    draft.step(f"note/{t}/{c}", note, [acknowledgement], [noted], (), [noted])
+    draft.step(f"note/{t}/{c}/again", note, [acknowledgement], (), [noted])
+
+
+def _obeying(draft: Draft, parts: Parts, part: Part) -> None:
+    t, c = part.whole, part.controller
+    commit, abort, promised, obeyed, acknowledgement = (
+        at(kind, part) for kind in ("commit-order", "abort-order", "promised", "obeyed", "acknowledgement")
+    )
+    apply = Step("apply", f"the order for {t} arrives at {c}, which fires its part", c)
+    for effect in effects(parts, part):
+        inputs, outputs = [commit, *effect.inputs], [acknowledgement, *effect.outputs]
+        draft.step(
+            f"apply/{t}/{c}{effect.suffix}", apply, [*inputs, promised], [*outputs, obeyed], effect.full, effect.empty
+        )
+        if not parts.variant.order_rounds:
+            twice = Step("apply", f"the order for {t} arrives at {c} once more, which fires its part again", c)
+            draft.step(
+                f"apply-again/{t}/{c}{effect.suffix}", twice, inputs, outputs, effect.full, [*effect.empty, promised]
+            )
+    known = Step("apply", f"the order for {t} arrives at {c}, which has nothing promised and acknowledges it", c)
+    if parts.variant.order_rounds:
+        draft.step(f"acknowledge-commit/{t}/{c}", known, [commit], [acknowledgement], [obeyed], [acknowledgement])
+        draft.step(
+            f"acknowledge-commit/{t}/{c}/unpromised", known, [commit], [acknowledgement, obeyed], (), [promised, obeyed]
+        )
+    release = Step("release", f"the order to give up {t} arrives at {c}", c)
+    draft.step(f"release/{t}/{c}", release, [abort, promised], [obeyed, acknowledgement])
+    draft.step(f"release/{t}/{c}/unpromised", release, [abort], [obeyed, acknowledgement], (), [promised, obeyed])
+    draft.step(f"acknowledge-abort/{t}/{c}", release, [abort], [acknowledgement], [obeyed], [acknowledgement])
+
+
+def effects(parts: Parts, part: Part) -> list[Effect]:
+    """How a part is applied: where it is firable, which under the true protocol it is, and else blindly."""
+    return [guarded(part)] if parts.variant.is_true else list(blind(part))
+
+
+def copy(reader: str, place: str) -> str:
+    """The place that holds what a controller last heard of a place of another."""
+    return f"copy/{reader}/{place}"
+
+
+def _listed(group: Sequence[str]) -> str:
+    return " and ".join(group)

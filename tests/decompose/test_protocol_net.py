@@ -1,0 +1,162 @@
+"""The protocol as a net of its own: what holds of it on small nets and on the whole cell, with and without faults."""
+
+from dataclasses import replace
+
+import pytest
+from support.reference import load_net
+
+from firable.analysis.spaces.equivalence import branching_bisimilar
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.decompose.protocol.building import ProtocolNet, protocol_net
+from firable.decompose.protocol.divergence import not_falling, weights
+from firable.decompose.protocol.exploring import Exploration, explore_protocol
+from firable.decompose.protocol.variant import ANY_FAULTS, NO_FAULTS, ONE_OF_EACH, PROTOCOL, Faults, Often, Variant
+from firable.decompose.splitting.cut import split
+from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
+from firable.nets.verdict import Status
+
+SMALL = ["ring", "local_conflict", "local_output_conflict", "local_gate", "read_before_order", "remote_gate"]
+A, B = Controller("a"), Controller("b")
+
+
+def statuses(found: Exploration) -> set[Status]:
+    return {verdict.status for verdict in found.verdicts}
+
+
+def visible(protocol: ProtocolNet) -> dict[str, str]:
+    return {name: step.fires for name, step in protocol.steps.items() if step.fires}
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_protocol_refines_and_loses_nothing(name: str) -> None:
+    assert statuses(explore_protocol(load_net(name))) == {Status.PROVED}
+
+
+@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("faults", [ONE_OF_EACH, ANY_FAULTS], ids=["one of each", "any"])
+def test_protocol_refines_and_loses_nothing_under_faults_with_restart(name: str, faults: Faults) -> None:
+    found = explore_protocol(load_net(name), PROTOCOL, faults)
+    assert {*(v.status for v in found.safety), found.complete.status, found.one_token.status} == {Status.PROVED}
+
+
+@pytest.mark.parametrize("name", ["ring", "local_gate"])
+def test_partition_refinement_finds_the_same_bisimulation(name: str) -> None:
+    """By another technique: classes of all configurations, not the relation that the configurations carry."""
+    net = load_net(name)
+    found = explore_protocol(net)
+    assert isinstance(found.space, ReachabilityGraph)
+    labels = {t.name: t.name for t in net.transitions}
+    central = explore(net)
+    assert branching_bisimilar(found.space, central, visible(found.protocol), labels, divergence=False)
+    assert not branching_bisimilar(found.space, central, visible(found.protocol), labels, divergence=True)
+
+
+def test_partition_refinement_and_closures_both_see_what_a_dead_controller_loses() -> None:
+    net = load_net("ring")
+    found = explore_protocol(net, PROTOCOL, Faults(crash=Often.ONCE, restart=False))
+    assert isinstance(found.space, ReachabilityGraph)
+    assert found.refines is Status.PROVED
+    assert found.complete.status is Status.VIOLATED
+    labels = {t.name: t.name for t in net.transitions}
+    assert not branching_bisimilar(found.space, explore(net), visible(found.protocol), labels, divergence=False)
+
+
+def test_whole_cell_is_explored_as_a_diagram_and_refines() -> None:
+    found = explore_protocol(load_net("cell1"))
+    assert statuses(found) == {Status.PROVED}
+    assert found.space.n_markings > 10**33
+
+
+def test_table_and_diagram_agree_on_the_protocol() -> None:
+    net = load_net("local_gate")
+    table = explore_protocol(net)
+    diagram = replace(table, space=_diagram(table.protocol))
+    assert [(v.name, v.status) for v in table.verdicts] == [(v.name, v.status) for v in diagram.verdicts]
+    assert table.space.n_markings == diagram.space.n_markings
+
+
+def _diagram(protocol: ProtocolNet):  # type: ignore[no-untyped-def]
+    from firable.analysis.spaces.symbolic import explore_symbolically
+
+    return explore_symbolically(protocol.net, order=protocol.order)
+
+
+def test_each_transition_is_one_step_and_fires_at_most_one_transition_of_the_central_net() -> None:
+    net = load_net("cell1")
+    protocol = protocol_net(split(net), PROTOCOL, ANY_FAULTS)
+    assert set(protocol.steps) == {t.name for t in protocol.net.transitions}
+    assert {step.fires for step in protocol.steps.values()} - {""} == {t.name for t in net.transitions}
+    assert all(protocol.firing[t.name] for t in net.transitions)
+
+
+def test_hidden_steps_leave_the_copy_of_the_central_marking_alone() -> None:
+    protocol = protocol_net(split(load_net("cell1")), PROTOCOL, ANY_FAULTS)
+    for i in protocol.hidden:
+        t = protocol.net.transitions[i]
+        assert not any(place.startswith("central/") for place in (*t.inputs, *t.outputs)), t.name
+
+
+def test_only_repeating_and_giving_up_can_go_on_for_ever() -> None:
+    protocol = protocol_net(split(load_net("cell1")))
+    assert not_falling(protocol) == ()
+    weight = weights(protocol)
+    assert weight["request/G2/c1"] > weight["promised/G2/c1"] + weight["vote/G2/c1"]
+
+
+def test_step_that_undoes_nothing_of_its_own_is_seen_as_endless() -> None:
+    """A hidden step added to the net, which no weight lowers, is named."""
+    protocol = protocol_net(split(load_net("ring")))
+    idle = Transition("promise/G/c1/idle", (), (), ("asked/G",))
+    steps = {**protocol.steps, idle.name: protocol.steps["promise/G/c1"]}
+    net = replace(protocol.net, transitions=(*protocol.net.transitions, idle))
+    assert not_falling(replace(protocol, net=net, steps=steps)) == (idle.name,)
+
+
+def test_firing_that_changes_no_marking_is_not_taken_for_a_hidden_step() -> None:
+    """`idle` reads gates alone and changes no marking; what is closed must still not go through it."""
+    places = (Place("a.p", "a", marked=True), Place("b.q", "b", marked=True))
+    idle = Transition("idle", permissive=("a.p", "b.q"))
+    net = Net("n", places, (idle, Transition("l", ("a.p",))), (), (A, B))
+    assert statuses(explore_protocol(net)) == {Status.PROVED}
+
+
+def test_net_without_coordinated_transitions_is_its_own_protocol() -> None:
+    net = Net("n", (Place("a.p", "a", marked=True),), (Transition("l", ("a.p",)),), (), (A,))
+    found = explore_protocol(net)
+    assert statuses(found) == {Status.PROVED}
+    assert found.space.n_markings == 2
+
+
+def test_transition_that_no_valuation_opens_has_no_steps() -> None:
+    torn = (ExternalGate("b.s"), ExternalGate("b.s", wanted=False))
+    transition = Transition("G", ("a.p",), external=torn)
+    net = Net("n", (Place("a.p", "a", marked=True),), (transition,), (Signal("b.s", "b"),), (A, B))
+    assert protocol_net(split(net)).net.transitions == ()
+
+
+def test_contact_of_the_central_net_is_no_fault_of_the_protocol() -> None:
+    """G would fill a.e, which is full: contact in the central net, and in its protocol nothing worse."""
+    places = (Place("a.p", "a", marked=True), Place("a.e", "a", marked=True), Place("b.q", "b", marked=True))
+    net = Net("n", places, (Transition("G", ("a.p", "b.q"), ("a.e",)), Transition("l", ("a.e",))), (), (A, B))
+    assert statuses(explore_protocol(net)) == {Status.PROVED}
+
+
+def test_search_that_ends_early_leaves_everything_unknown_but_what_needs_no_search() -> None:
+    found = explore_protocol(load_net("ring"), budget=Budget(50))
+    assert found.refines is Status.UNKNOWN
+    assert {found.complete.status, found.one_token.status} == {Status.UNKNOWN}
+    assert found.divergence.status is Status.PROVED
+
+
+def test_votes_that_are_no_promises_need_the_bare_skeleton() -> None:
+    from firable.decompose.protocol.variant import Votes
+
+    with pytest.raises(ValueError, match="bare"):
+        Variant(Votes.FRESH)
+
+
+def test_no_faults_add_no_steps() -> None:
+    decomposition = split(load_net("ring"))
+    quiet = protocol_net(decomposition, PROTOCOL, NO_FAULTS)
+    assert not any(step.kind in {"lose", "crash", "double"} for step in quiet.steps.values())
+    assert len(protocol_net(decomposition, PROTOCOL, ANY_FAULTS).net.transitions) > len(quiet.net.transitions)
