@@ -25,6 +25,8 @@ LISTED_MAX: Final = 300
 COUNTEREXAMPLES_MAX: Final = 24
 _DRAWN_TRANSITIONS_MAX: Final = 80
 _ROWS_MAX: Final = 400
+_COLUMNS_MAX: Final = 9
+_NAMES_MAX: Final = 200
 _TONES: Final = {"✓": "good", "✗": "bad", "?": "open", "!": "open", "·": None}
 _HEADINGS: Final = {
     Weight.REQUIRED: "must hold",
@@ -58,14 +60,19 @@ def _classes(tone: str | None) -> str:
     return f"badge {tone}" if tone else "badge"
 
 
-def _table(heads: Sequence[str], rows: Iterable[Sequence[Content]], *, caption: str) -> Markup:
-    """A table that becomes a stack of cards on a phone; the first cell of a row is its head."""
+def _table(
+    heads: Sequence[str], rows: Iterable[Sequence[Content]], *, caption: str, count: int | None = None
+) -> Markup:
+    """A table that becomes a stack of cards on a phone; the first cell of a row is its head.
+
+    Of many rows the first are shown; `count` says how many there are where not all are given.
+    """
     body = []
     for row in rows:
         cells = [tag("th", row[0], scope="row")]
         cells += [tag("td", cell, data_of=head) for head, cell in zip(heads[1:], row[1:], strict=True)]
         body.append(tag("tr", *cells))
-    more = len(body) - _ROWS_MAX
+    more = (len(body) if count is None else count) - _ROWS_MAX
     rest = tag("p", f"and {more:,} more", cls="soft") if more > 0 else None
     head = tag("thead", tag("tr", *(tag("th", one, scope="col") for one in heads)))
     hidden = tag("caption", caption, cls="unseen")
@@ -75,7 +82,9 @@ def _table(heads: Sequence[str], rows: Iterable[Sequence[Content]], *, caption: 
 
 
 def _names(names: Iterable[str]) -> Markup:
-    return tag("span", ", ".join(names), cls="code")
+    names = tuple(names)
+    more = len(names) - _NAMES_MAX
+    return tag("span", ", ".join(names[:_NAMES_MAX]), f" and {more:,} more" if more > 0 else None, cls="code")
 
 
 # --- Obligations and assumptions
@@ -280,15 +289,24 @@ def _coordinator_table(report: Report) -> Markup | None:
     if not report.table:
         return None
     controllers = [c.name for c in report.net.controllers]
+    apart = len(controllers) <= _COLUMNS_MAX
     reasons = dict(_reasons(report.decomposition))
-    rows = []
-    for row in report.table:
+    rows: list[Sequence[Content]] = []
+    for row in report.table[:_ROWS_MAX]:
         parts = {part.controller: part.name for part in row.parts}
-        cells = [tag("span", parts[name], cls="code") if name in parts else "" for name in controllers]
+        cells = [tag("span", parts[name], cls="code") if name in parts else "" for name in controllers] if apart else []
+        if not apart:
+            cells = [_names(f"{name} at {controller}" for controller, name in parts.items())]
         rows.append((row.name, row.description, *cells, reasons.get(row.name, "")))
-    lead = "The global transitions: each fires when every controller that has a part in it has voted yes."
-    heads = ("", "transition", *controllers, "global because of")
-    return together(tag("p", lead, cls="lead"), _table(heads, rows, caption="Coordinator table"))
+    lead = f"{_globals(report)}: each fires when every controller that has a part in it has voted yes."
+    heads = ("", "transition", *(controllers if apart else ["parts"]), "global because of")
+    return together(
+        tag("p", lead, cls="lead"), _table(heads, rows, caption="Coordinator table", count=len(report.table))
+    )
+
+
+def _globals(report: Report) -> str:
+    return counted(len(report.table), "global transition")
 
 
 def _reasons(decomposition: Decomposition | None) -> Iterator[tuple[str, str]]:
@@ -308,12 +326,16 @@ def _groups(report: Report) -> Markup | None:
     if report.decomposition is None or not report.decomposition.groups:
         return None
     rows = []
-    for group in report.decomposition.groups:
+    groups = report.decomposition.groups
+    for group in groups[:_ROWS_MAX]:
         order = "; then ".join(", ".join(some) for some in (group.sequence, group.rest) if some)
         rows.append((group.name, tag("span", order, cls="code"), str(group.by), group.controller or "the coordinator"))
-    lead = "Transitions that compete for a place, over any number of steps, are decided together by one arbiter."
+    lead = (
+        f"{counted(len(groups), 'group')}: transitions that compete for a place, directly or through others, are "
+        "decided together by one arbiter."
+    )
     heads = ("group", "in this order", "by", "decided by")
-    return together(tag("p", lead, cls="lead"), _table(heads, rows, caption="Arbitration groups"))
+    return together(tag("p", lead, cls="lead"), _table(heads, rows, caption="Arbitration groups", count=len(groups)))
 
 
 def _knowledge(report: Report) -> Markup | None:
@@ -322,7 +344,8 @@ def _knowledge(report: Report) -> Markup | None:
     if report.decomposition is None or not report.table:
         return None
     parts = []
-    for one in knowledge(report.decomposition):
+    known = knowledge(report.decomposition)
+    for one in known[:_ROWS_MAX]:
         facts: tuple[tuple[str, Sequence[str]], ...] = (
             ("owns the places", one.places),
             ("owns the signals", one.signals),
@@ -334,6 +357,8 @@ def _knowledge(report: Report) -> Markup | None:
         )
         listed = [together(tag("dt", word), tag("dd", _names(names))) for word, names in facts if names]
         parts.append(tag("details", tag("summary", tag("b", one.controller)), tag("dl", *listed, cls="facts inside")))
+    if len(known) > _ROWS_MAX:
+        parts.append(tag("p", f"and {len(known) - _ROWS_MAX:,} more controllers", cls="soft"))
     return together(*parts)
 
 

@@ -253,3 +253,13 @@ def test_a_page_that_has_no_place_is_refused(
     assert main(arguments) == 2
     captured = capsys.readouterr()
     assert message in captured.err + captured.out
+
+
+def test_a_net_of_many_controllers_has_a_page_that_a_browser_can_hold(tmp_path: Path) -> None:
+    path = tmp_path / "page.html"
+    assert main(["prove", "catalogue:workshop-40", "--report", str(path)]) == 0
+    page = path.read_text("utf-8")
+    assert len(page) < 2_000_000
+    words = Reading(page).words
+    assert "transition parts global because of" in words, "no column for each controller"
+    assert "are too many for a picture that can be read" in words

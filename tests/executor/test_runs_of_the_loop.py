@@ -1,0 +1,118 @@
+"""Every run of the executor on the simulated cell is a run of the loop that the check asks its questions of.
+
+The distributed executor sends a command when its own controller has applied the firing, and the simulated cell has
+times; the loop sends it in the firing and has none. If either could do what the loop cannot, verdicts on the loop would
+say nothing of the cell.
+"""
+
+from __future__ import annotations
+
+import io
+from functools import cache
+
+import pytest
+
+from firable.decompose.splitting.cut import split
+from firable.executor.plant import Disturbance, NeverCompletes
+from firable.executor.running import execute
+from firable.executor.situation import State
+from firable.nets.catalogue import catalogue_net, catalogue_plant
+from firable.nets.machines.closing import ClosedLoop, Faults, close
+from firable.nets.net import Marking
+from firable.semantics.player import Player
+from firable.semantics.trace import Fired, SignalChanged, Trace, parse_trace
+
+CELLS = ["one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"]
+
+
+@cache
+def loop_of(cell: str, faults: Faults = Faults.NONE) -> ClosedLoop:
+    return close(catalogue_net(cell), catalogue_plant(cell), faults)
+
+
+def trace_of(cell: str, seed: int, *disturbances: Disturbance) -> tuple[State, Trace]:
+    stream = io.StringIO()
+    report = execute(
+        split(catalogue_net(cell)),
+        catalogue_plant(cell),
+        workpieces=8,
+        seed=seed,
+        trace=stream,
+        disturbances=disturbances,
+    )
+    return report.state, parse_trace(stream.getvalue())
+
+
+class Follower:
+    """The markings that the loop can be in after what was seen of a run."""
+
+    def __init__(self, loop: ClosedLoop) -> None:
+        self.loop, self.net, self.player = loop, loop.net, Player(loop.net)
+        own = {name for some in loop.variants.values() for name in some}
+        self.moves = {t for t, transition in enumerate(self.net.transitions) if transition.name not in own}
+        self.variants = {
+            name: {self.net.transition_index[one] for one in some if one not in loop.accidents}
+            for name, some in loop.variants.items()
+        }
+        self.next: dict[Marking, tuple[int, ...]] = {}
+        self.markings = self.moved({self.net.initial_marking})
+
+    def firable(self, marking: Marking) -> tuple[int, ...]:
+        if marking not in self.next:
+            self.next[marking] = tuple(self.player.firable(marking))
+        return self.next[marking]
+
+    def after(self, markings: set[Marking], transitions: set[int]) -> set[Marking]:
+        return {
+            self.player.fire(marking, [t])
+            for marking in markings
+            for t in self.firable(marking)
+            if t in transitions and self.net.transitions[t].name not in self.loop.accidents
+        }
+
+    def moved(self, markings: set[Marking]) -> set[Marking]:
+        """What the machines can make of some markings by themselves, these among them."""
+        found, new = set(markings), set(markings)
+        while new:
+            new = self.after(new, self.moves) - found
+            found |= new
+        return found
+
+    def fire(self, name: str) -> None:
+        self.markings = self.moved(self.after(self.markings, self.variants[name]))
+        assert self.markings, f"the loop cannot fire {name} here"
+
+    def sees(self, signal: str, *, value: bool) -> None:
+        """Leave out the markings in which a signal has not come to show a value: it did, some moment ago."""
+        place, means = self.loop.shown[signal]
+        bit = 1 << self.net.place_index[place]
+        self.markings = {marking for marking in self.markings if (bool(marking & bit) == means) == value}
+        assert self.markings, f"the loop does not show {signal} = {int(value)} here"
+        self.markings = self.moved(self.markings)
+
+
+def follow(cell: str, trace: Trace, faults: Faults = Faults.NONE) -> int:
+    follower, fired = Follower(loop_of(cell, faults)), 0
+    for event in trace.events:
+        if isinstance(event, Fired):
+            for name in event.transitions:
+                follower.fire(name)
+                fired += 1
+        elif isinstance(event, SignalChanged) and event.value:
+            follower.sees(event.signal, value=True)
+    return fired
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_run_of_the_executor_is_one_of_the_loop(cell: str, seed: int) -> None:
+    state, trace = trace_of(cell, seed)
+    assert state is (State.DEADLOCK if cell == "one_robot_mc_late" else State.DONE)
+    assert follow(cell, trace) > 10
+
+
+@pytest.mark.parametrize(("machine", "command"), [("R", "GRASP"), ("MC", "RUN"), ("CV2", "RUN")])
+def test_a_run_with_a_machine_that_never_completes_is_one_of_the_loop_with_faults(machine: str, command: str) -> None:
+    state, trace = trace_of("one_robot", 0, NeverCompletes(machine, command, 2))
+    assert state is not State.DONE
+    assert follow("one_robot", trace, Faults.FOR_GOOD) > 10
