@@ -73,10 +73,9 @@ def _report(argument: str, smt_dir: str | None, timeout: float, machines: str | 
     found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)))
     verdicts, loop = found.verdicts, None
     if machines is not None:
-        from firable.decompose.proofs.persisting import persistence
-        from firable.nets.machines.closing import close
+        from firable.decompose.proofs.persisting import distributed_loop, persistence
 
-        loop = close(loaded.net, read_machines(machines))
+        loop = distributed_loop(loaded.net, read_machines(machines))
         verdicts += persistence(decomposition, loop)
     files = write_folder(smt_dir, found.files) if smt_dir is not None else ()
     return Report(

@@ -39,8 +39,9 @@ from firable.analysis.spaces.reachability import Budget
 from firable.analysis.temporal.queries import temporal_question
 from firable.analysis.verdicts.properties import statement
 from firable.nets.formula import And, Deadlock, Formula, Holds, Not, Or, format_formula
-from firable.nets.machines.closing import ClosedLoop, close
+from firable.nets.machines.closing import close
 from firable.nets.machines.laws import ACCIDENT, OVERRUN
+from firable.nets.machines.loop import ClosedLoop
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
 from firable.nets.verdict import Status, Verdict, Weight, overall
@@ -213,7 +214,8 @@ def _losses(loop: ClosedLoop) -> Iterator[tuple[str, Formula]]:
     waiting_for = [place for place in loop.cell.places if place.completion is not None]
     for place in waiting_for:
         signal = str(place.completion)
-        there = [loop.at[place.name], signal, *([loop.acknowledged[signal]] if signal in loop.acknowledged else [])]
+        there = [loop.at[place.name], signal]
+        there += [among[of] for among, of in ((loop.acknowledged, signal), (loop.unsent, place.name)) if of in among]
         yield place.name, And((Holds(place.name), *(Not(Holds(name)) for name in there), Not(ENDED)))
     for one, other in combinations(waiting_for, 2):
         if one.completion == other.completion:

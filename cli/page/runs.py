@@ -19,7 +19,7 @@ from typing import Final
 from firable.cli.page.markup import Markup, tag, together
 from firable.nets.decomposition import Decomposition
 from firable.nets.drawing.layout import local_name
-from firable.nets.machines.laws import PLANT
+from firable.nets.machines.laws import PLANT, UNSENT
 from firable.nets.net import Marking, Net, Place
 from firable.nets.verdict import Witness
 from firable.semantics.player import NotFirableError, Player
@@ -183,7 +183,8 @@ def _changes(net: Net, step: _Step, lane: str, parts: tuple[str, ...]) -> list[M
             written += [_word(place)] if after else []
             continue
         written.append(_token(place, comes=bool(after)))
-        if after and place.command is not None:
+        # In a loop where commands are sent late, sending is a step of its own.
+        if after and place.command is not None and f"{UNSENT}.{place.name}" not in net.place_index:
             written.append(tag("span", tag("span", "sends ", cls="unseen"), str(place.command), cls="sends"))
     return written
 

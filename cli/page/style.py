@@ -69,7 +69,7 @@ details:last-child{border-bottom:0}
 summary{cursor:pointer;padding:.55rem .2rem}
 summary:hover{background:var(--shade)}
 details>.inside{padding:.1rem .2rem 1rem 1.2rem}
-.family{display:inline-grid;grid-template-columns:9.5rem 13rem 1fr;gap:.2rem 1rem;width:calc(100% - 1.4rem);
+.family{display:inline-grid;grid-template-columns:9.5rem 17rem 1fr;gap:.2rem 1rem;width:calc(100% - 1.4rem);
 vertical-align:top}
 .family b{overflow-wrap:anywhere}
 .verdict{display:grid;grid-template-columns:7.2rem 1fr;gap:.15rem .9rem;padding:.6rem 0;

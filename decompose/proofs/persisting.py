@@ -11,6 +11,10 @@ proved, for these machines. If there is one, the run to it is shown, with the fi
 Gates of completions are asked as well, all in one verdict: that a completion is cleared only by sending its command,
 which the promise excludes, is what the list of assumptions leaves out by reasoning, and here it is confirmed.
 
+The loop is that of the distributed cell: each controller sends its commands when it comes to apply a firing, which may
+be long after the coordinator decided it, and votes again only then. What was decided at one instant reaches the
+machines at several, so it is also asked, of this loop, that no machine is given what it cannot do.
+
 Rejected: to ask whether the gate can close before the whole transition fires. Votes are taken one by one, so the gate
 is needed from the moment its own part is firable, and the others may take long.
 """
@@ -25,12 +29,15 @@ from firable.analysis.spaces.reachability import Budget
 from firable.decompose.proofs.assumptions import Assumption, assumptions
 from firable.nets.decomposition import Coordinated, Decomposition
 from firable.nets.formula import And, Firable, Formula, Holds, Not, Or
-from firable.nets.machines.closing import ClosedLoop
-from firable.nets.net import SignalKind, Transition
+from firable.nets.machines.closing import close
+from firable.nets.machines.loop import ClosedLoop, Sending
+from firable.nets.machines.plant_file import PlantModel
+from firable.nets.net import Net, SignalKind, Transition
 from firable.nets.verdict import Status, Verdict, Witness
 from firable.semantics.player import Player
 
 COMPLETIONS = "o4.completions"
+COMMANDS = "o4.commands"
 _HINT = "put the interlock into the machine's own controller, or make the signal one that a command clears"
 
 
@@ -39,10 +46,15 @@ def name_of(assumption: Assumption) -> str:
     return f"o4.{assumption.transition}.{assumption.signal}"
 
 
-def persistence(decomposition: Decomposition, loop: ClosedLoop, budget: Budget | None = None) -> tuple[Verdict, ...]:
-    """The verdict on each assumption O4 in the closed loop of the net, and one on the gates of completions.
+def distributed_loop(net: Net, model: PlantModel) -> ClosedLoop:
+    """The loop in which each controller sends its commands when it comes to apply a firing; raises as `close` does."""
+    return close(net, model, sending=Sending.LATE)
 
-    Runs are those of the loop.
+
+def persistence(decomposition: Decomposition, loop: ClosedLoop, budget: Budget | None = None) -> tuple[Verdict, ...]:
+    """The verdict on each assumption O4 in a loop of the net, on the gates of completions, and on late commands.
+
+    Runs are those of the loop; `distributed_loop` makes the one that is meant.
     """
     rows = {row.name: row for row in decomposition.table}
     families = []
@@ -68,8 +80,16 @@ def persistence(decomposition: Decomposition, loop: ClosedLoop, budget: Budget |
             hint=_HINT,
         )
     )
+    families.append(
+        Family(
+            COMMANDS,
+            "no machine is given what it cannot do, however late its controller sends the command",
+            {"": never("o4.command", ENDED)},
+            hint="let a completion of the one machine gate the command to the other",
+        )
+    )
     verdicts = answers(loop, families, budget)[0]
-    every = [(one,) for one in assumptions(decomposition)] + [tuple(completions)]
+    every = [(one,) for one in assumptions(decomposition)] + [tuple(completions), ()]
     return tuple(_shown(loop, decomposition, verdict, ones) for verdict, ones in zip(verdicts, every, strict=True))
 
 
@@ -84,9 +104,9 @@ def _vote(loop: ClosedLoop, part: Transition, one: Assumption) -> Formula:
     """The part is firable and the gate is open, as its owner found them."""
     place, means = loop.shown[one.signal]
     open_ = Holds(place) if means == one.wanted else Not(Holds(place))
-    full = map(Holds, (*part.inputs, *part.permissive))
-    bare = (Not(Holds(name)) for name in (*part.outputs, *part.inhibitive))
-    return And((*full, *bare, open_, Not(ENDED)))
+    read = (*part.inputs, *part.permissive)
+    bare = (*part.outputs, *part.inhibitive, *(loop.unsent[name] for name in read if name in loop.unsent))
+    return And((*map(Holds, read), *(Not(Holds(name)) for name in bare), open_, Not(ENDED)))
 
 
 def _closing(loop: ClosedLoop, part: Transition, one: Assumption) -> Iterator[str]:
@@ -115,6 +135,8 @@ def _shown(loop: ClosedLoop, decomposition: Decomposition, verdict: Verdict, one
     """The verdict with the run led on by the firing that closes the gate."""
     if verdict.status is not Status.VIOLATED or verdict.witness is None:
         return replace(verdict, subjects=())
+    if not ones:
+        return verdict
     rows = {row.name: row for row in decomposition.table}
     player, marking = Player(loop.net), loop.net.marking(verdict.witness.marking)
     may_fire = {loop.net.transitions[t].name: t for t in player.firable(marking)}

@@ -27,15 +27,15 @@ begun.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from enum import StrEnum
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import chain
 from types import MappingProxyType
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.machines.laws import ACCIDENT, OVERRUN, PLANT, Laws, fact
+from firable.nets.machines.laws import ACCIDENT, OVERRUN, PLANT, UNSENT, Laws, fact
+from firable.nets.machines.loop import ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import NOTHING, Case, Literal, Moment, each
 from firable.nets.machines.plant_file import Failure, PlantModel, Stop, misfits
 from firable.nets.net import Controller, Net, Place, SignalKind, Transition
@@ -44,41 +44,7 @@ VARIANTS_MAX: Final = 4096
 """How many variants one transition may have; it doubles with each completion that it clears."""
 
 
-class Faults(StrEnum):
-    """Which commands may fail: none, those that are repaired and then go on, or all that may, for good."""
-
-    NONE = "none"
-    REPAIRED = "repaired"
-    FOR_GOOD = "for good"
-
-
-@dataclass(frozen=True)
-class ClosedLoop:
-    """The net of a cell with its machines, and what its names mean.
-
-    `variants` holds, for each transition of the cell, its transitions in the loop; `accidents` those transitions after
-    which nothing fires; `shown` for each signal the place that shows it, and whether a token there means 1; `at` for
-    each place with a command the place that says that the machine is at it; `failed` the place of each machine that
-    can fail; `acknowledged`, for a completion that waits for its sensor, the place that says so.
-    """
-
-    cell: Net
-    net: Net
-    variants: Mapping[str, tuple[str, ...]]
-    accidents: Mapping[str, str]
-    shown: Mapping[str, Literal]
-    at: Mapping[str, str]
-    failed: Mapping[str, str]
-    acknowledged: Mapping[str, str]
-
-    def of_the_cell(self, firings: Iterable[Iterable[str]]) -> tuple[tuple[str, ...], ...]:
-        """A firing sequence of the loop as one of the cell: the names of its transitions, without the machines."""
-        own = {variant: name for name, variants in self.variants.items() for variant in variants}
-        kept = (tuple(own[name] for name in fired if name in own) for fired in firings)
-        return tuple(fired for fired in kept if fired)
-
-
-def close(net: Net, model: PlantModel, faults: Faults = Faults.NONE) -> ClosedLoop:
+def close(net: Net, model: PlantModel, faults: Faults = Faults.NONE, sending: Sending = Sending.AT_ONCE) -> ClosedLoop:
     """The loop of a net with the machines of a plant.
 
     Raises `InputError`: F5003 where the plant does not fit the net, F3007 where one firing sends more than the loop can
@@ -91,14 +57,16 @@ def close(net: Net, model: PlantModel, faults: Faults = Faults.NONE) -> ClosedLo
     """
     if problems := misfits(model, net):
         raise InputError(problems)
-    return _Closing(net, model, faults).loop()
+    return _Closing(net, model, faults, sending).loop()
 
 
 class _Closing:
     """One net and one plant on their way to a loop."""
 
-    def __init__(self, net: Net, model: PlantModel, faults: Faults) -> None:
+    def __init__(self, net: Net, model: PlantModel, faults: Faults, sending: Sending) -> None:
         self.net, self.model, self.laws = net, model, Laws(model, net)
+        late = self.laws.commanding if sending is Sending.LATE else ()
+        self.unsent = {place.name: f"{UNSENT}.{place.name}" for place in late}
         self.accidents: dict[str, str] = {}
         completions = [signal.name for signal in net.signals if signal.kind is SignalKind.COMPLETION]
         self.sharing = {name: sum(place.completion == name for place in net.places) > 1 for name in completions}
@@ -148,6 +116,7 @@ class _Closing:
             ),
             MappingProxyType(self.failed),
             MappingProxyType(self.acknowledged),
+            MappingProxyType(self.unsent),
         )
 
     def moving(self, place: Place) -> bool:
@@ -162,6 +131,8 @@ class _Closing:
             yield self.bit(name)
         for name, acknowledged in self.acknowledged.items():
             yield fact(acknowledged, f"the command of {name} is acknowledged, and its sensor does not show it yet")
+        for name, unsent in self.unsent.items():
+            yield fact(unsent, f"{self.net.place(name).command} is still to be sent")
         yield from self.laws.places()
         for name, failed in self.failed.items():
             yield fact(failed, f"{name} has failed")
@@ -200,10 +171,10 @@ class _Closing:
             ),
             (*((name, False) for name in transition.inputs), *((name, True) for name in transition.outputs)),
         )
-        moments, ended = each([NOTHING], [own]), list[Moment]()
+        moments, ended = each(each([NOTHING], [own]), [self.applied(transition)]), list[Moment]()
         for name in transition.outputs:
             place = self.net.place(name)
-            if place.command is None:
+            if place.command is None or name in self.unsent:
                 continue
             moments = each(moments, self.cleared(place))
             ended += each(moments, self.laws.refused(place))
@@ -214,6 +185,12 @@ class _Closing:
             yield moment.transition("/".join((transition.name, *moment.tags)), _told(transition, moment))
         for moment in ended:
             yield self.accident("/".join((transition.name, *moment.tags)), _told(transition, moment), moment)
+
+    def applied(self, transition: Transition) -> Case:
+        """With commands that are sent late, what is taken or read was applied before, and what is put will be."""
+        read = [self.unsent[name] for name in (*transition.inputs, *transition.permissive) if name in self.unsent]
+        put = [self.unsent[name] for name in transition.outputs if name in self.unsent]
+        return Case(tuple((name, False) for name in (*read, *put)), tuple((name, True) for name in put))
 
     def cleared(self, place: Place) -> Iterator[Case]:
         """Sending a command clears the completion that it will set."""
@@ -265,8 +242,18 @@ class _Closing:
         for signal, waiting in self.acknowledged.items():
             shows = Case(((waiting, True), (signal, False), self.sensor(signal)), ((waiting, False), (signal, True)))
             yield from self.named(f"{signal}/shown", f"the sensor of {signal} shows it", each(start, [shows]))
+        yield from self.sent_late(start)
         yield from self.workpieces(start)
         yield from self.unsteady(start)
+
+    def sent_late(self, start: list[Moment]) -> Iterator[Transition]:
+        for name, unsent in self.unsent.items():
+            place = self.net.place(name)
+            sending = each(start, [Case(((unsent, True),), ((unsent, False),))])
+            cleared = each(sending, self.cleared(place))
+            sent = chain.from_iterable(map(self.seen, each(cleared, self.laws.sent(place))))
+            yield from self.named(f"sent/{name}", f"{self.words(place)} is sent", sent)
+            yield from self.ended(f"sent/{name}", each(cleared, self.laws.refused(place)))
 
     def workpieces(self, start: list[Moment]) -> Iterator[Transition]:
         entry, exit_ = self.model.arrivals.station, self.model.departures.station

@@ -36,6 +36,7 @@ from firable.nets.net import Command, Net, Place
 
 PLANT = "plant"
 """The owner of what stands for machines and workpieces."""
+UNSENT = f"{PLANT}.unsent"
 ACCIDENT = f"{PLANT}.accident"
 OVERRUN = f"{PLANT}.overrun"
 _RAW, _MACHINED = "raw", "machined"

@@ -16,8 +16,9 @@ from firable.executor.plant import _Busy as Busy
 from firable.executor.plant import _Finish as Finish
 from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.diagnostics import InputError
-from firable.nets.machines.closing import ClosedLoop, Faults, close
+from firable.nets.machines.closing import close
 from firable.nets.machines.laws import ACCIDENT, OVERRUN
+from firable.nets.machines.loop import ClosedLoop, Faults
 from firable.nets.machines.moment import NOTHING, Case, each
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Command, Controller, Net, Place, Signal, SignalKind, Transition
