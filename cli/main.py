@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import click
 
 from firable import __version__
-from firable.cli import bundle, check, convert, draw, prove, replay, run, schema, split, verify
+from firable.cli import bundle, check, convert, draw, prove, refine, replay, run, schema, split, verify
 from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
@@ -46,6 +46,7 @@ def firable(context: click.Context, traceback: bool) -> None:  # noqa: ARG001 - 
 
 for _command in (
     check.check,
+    refine.refine,
     split.split,
     prove.prove,
     bundle.bundle,

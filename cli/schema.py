@@ -9,10 +9,10 @@ from typing import Any
 import click
 
 
-@click.command(short_help="Print the JSON Schema of net files, plant files or reports.")
-@click.argument("kind", type=click.Choice(["net", "plant", "report"]))
+@click.command(short_help="Print the JSON Schema of net files, task files, plant files or reports.")
+@click.argument("kind", type=click.Choice(["net", "tasks", "plant", "report"]))
 def schema(kind: str) -> int:
-    """Print the JSON Schema of a net file, a plant file, or of what --format json prints.
+    """Print the JSON Schema of a net file, a file of tasks, a plant file, or of what --format json prints.
 
     Editors complete and check net files by it.
     """
@@ -26,6 +26,10 @@ def _schema(kind: str) -> Any:
             from firable.nets.document import json_schema
 
             return json_schema()
+        case "tasks":
+            from firable.nets.tasks.document import json_schema as tasks_schema
+
+            return tasks_schema()
         case "plant":
             from firable.nets.machines.plant_file import PlantModel
 

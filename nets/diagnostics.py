@@ -70,6 +70,9 @@ CODES: Final[dict[str, str]] = {
     "F2021": "unknown source of a gate",
     "F2022": "double gate",
     "F2023": "more than one owner",
+    "F2024": "a place that stands for two things",
+    "F2025": "unknown step, sensor or role of a task",
+    "F2026": "a template that cannot be filled",
     # F3: analysis
     "F3001": "a machine is started that no command ever stops",
     "F3002": "an output signal on a place marked in M0",
@@ -83,6 +86,11 @@ CODES: Final[dict[str, str]] = {
     "F4002": "an obligation is refuted",
     "F4003": "the net may not be bundled",
     "F4004": "no partition was found",
+    "F4010": "unknown task",
+    "F4011": "a role or parameter of a task that is not filled, or not rightly",
+    "F4012": "a resource that a task takes twice, keeps or loses",
+    "F4013": "a task that violates a condition of refinement",
+    "F4014": "a place that cannot be opened to its task",
     # F5: running
     "F5001": "the bundle is damaged or has been changed",
     "F5002": "the bundle is not proved",

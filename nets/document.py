@@ -22,7 +22,8 @@ def _as_list(value: object) -> object:
     return [] if value is None else [value] if isinstance(value, str) else value
 
 
-def _as_integer(value: object) -> object:
+def as_integer(value: object) -> object:
+    """A text of digits as the number it is; anything else as it was."""
     # The reader resolves no numbers, so that a name such as `007` stays as it is written.
     return int(value) if isinstance(value, str) and _DIGITS.fullmatch(value) else value
 
@@ -40,7 +41,7 @@ def _as_pair(value: object) -> object:
 Name = Annotated[str, Field(min_length=1)]
 Names = Annotated[list[Name], BeforeValidator(_as_list, json_schema_input_type=Name | list[Name] | None)]
 Text = str
-Integer = Annotated[int, BeforeValidator(_as_integer, json_schema_input_type=int)]
+Integer = Annotated[int, BeforeValidator(as_integer, json_schema_input_type=int)]
 FormulaText = Annotated[str, BeforeValidator(_as_formula, json_schema_input_type=str | bool)]
 
 
@@ -48,34 +49,56 @@ FormulaText = Annotated[str, BeforeValidator(_as_formula, json_schema_input_type
 _NO_NAMES: Final[Any] = ()
 
 
-class _Document(BaseModel):
+class StrictDocument(BaseModel):
+    """A mapping with no keys but its own."""
+
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, populate_by_name=False)
 
 
-class CommandDocument(BaseModel):
-    """The output signal of a place: machine, command, and any further keys as parameters of the command."""
+class _Extensible(BaseModel):
+    """A mapping whose further keys are parameters, each a text."""
 
     model_config = ConfigDict(extra="allow", strict=True, frozen=True)
     # As pydantic's documentation has it; other type checkers object, for the attribute is mutable.
     # ty: ignore[incompatible-mutable-override]
     __pydantic_extra__: dict[str, str]  # pyright: ignore[reportIncompatibleVariableOverride]
 
+
+class CommandDocument(_Extensible):
+    """The output signal of a place: machine, command, and any further keys as parameters of the command."""
+
     machine: Name
     command: Name
 
 
-class PlaceDocument(_Document):
+class TaskUseDocument(_Extensible):
+    """The registered task that a place stands for: its name, and further keys that fill its roles and parameters."""
+
+    name: Name
+
+
+class ResourceDocument(_Extensible):
+    """What a place opens to: an idle place, its machine, and any further keys as parameters for the tasks."""
+
+    to: Name = Field(description="The idle place in the detailed net, by its full name.")
+    machine: Name
+    prefix: Text = Field(default="", description="What comes before the names of the machine's signals.")
+
+
+class PlaceDocument(StrictDocument):
     """A place; nothing after its name is a place without a command."""
 
     send: CommandDocument | None = Field(default=None, description="The command sent when a token enters.")
     until: Name | None = Field(default=None, description="The completion signal that lets the token out.")
+    task: TaskUseDocument | None = Field(default=None, description="The registered task that the place stands for.")
+    opens: ResourceDocument | None = Field(default=None, description="The resource that the place stands for.")
     description: Text = ""
 
 
 Places = dict[Name, PlaceDocument | None]
 
 
-class ControllerDocument(_Document):
+class ControllerDocument(StrictDocument):
     """A controller: what is nested in it is owned by it."""
 
     coordinator: bool = Field(default=False, description="Whether it coordinates the others.")
@@ -85,7 +108,7 @@ class ControllerDocument(_Document):
     places: Places | None = None
 
 
-class TransitionDocument(_Document):
+class TransitionDocument(StrictDocument):
     """A transition; `if` and `unless` name places (internal gates) or signals (external gates)."""
 
     number: Integer | None = Field(default=None, ge=0, description="The number in the coordinator table.")
@@ -96,14 +119,14 @@ class TransitionDocument(_Document):
     description: Text = ""
 
 
-class ArbiterDocument(_Document):
+class ArbiterDocument(StrictDocument):
     """How the conflict between the transitions `among` is decided."""
 
     among: Names
     by: Literal["priority", "order", "rotation"] = "priority"
 
 
-class LeadsToDocument(_Document):
+class LeadsToDocument(StrictDocument):
     """Whenever `from` holds, `to` holds then or later."""
 
     source: FormulaText = Field(alias="from")
@@ -115,7 +138,7 @@ PATTERNS: Final = ("never", "always", "reachable", "leads_to", "always_possible"
 LOGICS: Final = ("ctl", "ltl")
 
 
-class PropertyDocument(_Document):
+class PropertyDocument(StrictDocument):
     """One temporal pattern, or one formula of CTL or LTL."""
 
     model_config = ConfigDict(
@@ -151,10 +174,10 @@ class PropertyDocument(_Document):
         return self
 
 
-class NetDocument(_Document):
+class NetDocument(StrictDocument):
     """A whole file."""
 
-    firable: Annotated[Literal[1], BeforeValidator(_as_integer, json_schema_input_type=Literal[1])] = Field(
+    firable: Annotated[Literal[1], BeforeValidator(as_integer, json_schema_input_type=Literal[1])] = Field(
         description="The version of the format."
     )
     cell: Text = Field(description="The name of the net.")

@@ -7,63 +7,96 @@ hint. Wrong indentation is the mistake that makes the most noise: `places:` one 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from firable.nets import document as doc
 from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean
 from firable.nets.source import Source, quoted
 from firable.nets.text_positions import bounded
-from firable.nets.yaml_tree import Mapping, Node, Path, Scalar, Sequence, node_span, nodes_along
+from firable.nets.yaml_tree import Mapping as MappingNode
+from firable.nets.yaml_tree import Node, Path, Scalar, Sequence, node_span, nodes_along
 
 ERRORS_MAX: Final = 200  # enough to join and to read; a file of noise has millions
 
-_KEYS: Final[dict[tuple[str, ...], tuple[str, ...]]] = {
-    path: tuple(field.alias or name for name, field in model.model_fields.items())
-    for path, model in (
-        ((), doc.NetDocument),
-        (("controllers", "*"), doc.ControllerDocument),
-        (("controllers", "*", "places", "*"), doc.PlaceDocument),
-        (("places", "*"), doc.PlaceDocument),
-        (("transitions", "*"), doc.TransitionDocument),
-        (("arbiters", "*"), doc.ArbiterDocument),
-        (("properties", "*"), doc.PropertyDocument),
-        (("properties", "*", "leads_to"), doc.LeadsToDocument),
-    )
-}
-"""The keys of each mapping of the format whose keys are not names."""
 
-_NOUNS: Final = {"controllers": "controller", "places": "place", "transitions": "transition", "properties": "property"}
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A format of files: its version's key, what such a file is, the keys of each mapping, and what tables hold.
+
+    `keys` has the path of every mapping whose keys are not names; `*` stands for a name. `nouns` says of what the names
+    in a table are the names.
+    """
+
+    version: str
+    file: str
+    keys: Mapping[tuple[str, ...], tuple[str, ...]]
+    nouns: Mapping[str, str]
+
+    def keys_at(self, path: Path) -> tuple[str, ...]:
+        """The keys of the mapping at a path; none where its keys are names."""
+        for pattern, keys in self.keys.items():
+            if len(pattern) == len(path) and all(p in {"*", step} for p, step in zip(pattern, path, strict=True)):
+                return keys
+        return ()
 
 
-def version_problem(source: Source, tree: Node) -> Diagnostic | None:
-    """What is wrong with the line `firable: 1`, which tells that this is a net file and of which version."""
-    hint = "a net file begins with `firable: 1`, the version of the format"
-    if not isinstance(tree, Mapping):
-        return Diagnostic("F1010", "this is not a net file: it has no keys", hint, span=node_span(source, tree))
-    entry = tree.entries.get("firable")
+def keys_of(model: type[BaseModel]) -> tuple[str, ...]:
+    """The keys of the mapping that a model describes."""
+    return tuple(field.alias or name for name, field in model.model_fields.items())
+
+
+NET: Final = Shape(
+    "firable",
+    "net file",
+    {
+        path: keys_of(model)
+        for path, model in (
+            ((), doc.NetDocument),
+            (("controllers", "*"), doc.ControllerDocument),
+            (("controllers", "*", "places", "*"), doc.PlaceDocument),
+            (("places", "*"), doc.PlaceDocument),
+            (("transitions", "*"), doc.TransitionDocument),
+            (("arbiters", "*"), doc.ArbiterDocument),
+            (("properties", "*"), doc.PropertyDocument),
+            (("properties", "*", "leads_to"), doc.LeadsToDocument),
+        )
+    },
+    {"controllers": "controller", "places": "place", "transitions": "transition", "properties": "property"},
+)
+
+
+def version_problem(source: Source, tree: Node, shape: Shape = NET) -> Diagnostic | None:
+    """What is wrong with the line such as `firable: 1`, which tells what file this is and of which version."""
+    wanted = shape.version
+    hint = f"a {shape.file} begins with `{wanted}: 1`, the version of the format"
+    if not isinstance(tree, MappingNode):
+        return Diagnostic("F1010", f"this is not a {shape.file}: it has no keys", hint, span=node_span(source, tree))
+    entry = tree.entries.get(wanted)
     if entry is None:
-        close = next((key for key in tree.entries if did_you_mean(key, ["firable"])), None)
+        close = next((key for key in tree.entries if did_you_mean(key, [wanted])), None)
         span = node_span(source, tree.entries[close][0]) if close else source.span(tree.line, tree.column)
         found = f": {quoted(close)} is not it" if close else ""
-        return Diagnostic("F1009", f"the key 'firable' is missing{found}", hint, span=span)
+        return Diagnostic("F1009", f"the key '{wanted}' is missing{found}", hint, span=span)
     value = entry[1]
     if not isinstance(value, Scalar) or value.text != "1":
         found = quoted(value.text) if isinstance(value, Scalar) else "this"
         return Diagnostic(
-            "F1011", f"{found} is not a version of the format that this release reads", "write `firable: 1`",
+            "F1011", f"{found} is not a version of the format that this release reads", f"write `{wanted}: 1`",
             span=node_span(source, value),
         )  # fmt: skip
     return None
 
 
-def document_problems(source: Source, tree: Node, error: ValidationError) -> list[Diagnostic]:
+def document_problems(source: Source, tree: Node, error: ValidationError, shape: Shape = NET) -> list[Diagnostic]:
     """The errors of a validation as diagnostics in the order of the text."""
     problems: dict[tuple[int, int, str], Diagnostic] = {}
     for one in error.errors(include_url=False, include_input=False)[:ERRORS_MAX]:
-        problem = _problem(source, tree, tuple(one["loc"]), one["type"], one["msg"], one.get("ctx", {}))
+        context = one.get("ctx", {})
+        problem = _problem(source, tree, shape, tuple(one["loc"]), one["type"], one["msg"], context)
         span = problem.span
         if span is not None:
             problems.setdefault((span.line, span.column, problem.code), problem)
@@ -79,13 +112,15 @@ def _first_misplaced(problems: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
         seen.add(problem.subject)
 
 
-def _problem(source: Source, tree: Node, path: Path, kind: str, message: str, context: dict[str, Any]) -> Diagnostic:
-    if misplaced := _misplaced(source, tree, path, kind):
+def _problem(
+    source: Source, tree: Node, shape: Shape, path: Path, kind: str, message: str, context: dict[str, Any]
+) -> Diagnostic:
+    if misplaced := _misplaced(source, tree, shape, path, kind):
         return misplaced
     found = list(nodes_along(tree, path))
     key, node = found[-1]
     if kind == "extra_forbidden":
-        known = _keys_at(path[:-1])
+        known = shape.keys_at(path[:-1])
         hint = f"The keys here are {', '.join(known)}; check the indentation too"
         if isinstance(node, Scalar) and node.plain and not node.text and len(found) > 1:
             hint += ", and write a text with a comma in double quotes"
@@ -119,17 +154,17 @@ def _problem(source: Source, tree: Node, path: Path, kind: str, message: str, co
     )
 
 
-def _misplaced(source: Source, tree: Node, path: Path, kind: str) -> Diagnostic | None:
+def _misplaced(source: Source, tree: Node, shape: Shape, path: Path, kind: str) -> Diagnostic | None:
     """The one diagnostic for a key that indentation has made a name, such as a controller named "places"."""
     deepest = len(path) + 1 if kind in {"model_type", "model_attributes_type"} else len(path)
     for length in range(2, deepest):
         name = str(path[length - 1])
-        outer, inner = _keys_at(path[: length - 2]), _keys_at(path[:length])
-        if path[length - 2] not in _NOUNS or not inner or name not in {*outer, *inner}:
+        outer, inner = shape.keys_at(path[: length - 2]), shape.keys_at(path[:length])
+        if path[length - 2] not in shape.nouns or not inner or name not in {*outer, *inner}:
             continue
         key = list(nodes_along(tree, path[:length]))[-1][0]
         if key is not None:
-            noun = _NOUNS[str(path[length - 2])]
+            noun = shape.nouns[str(path[length - 2])]
             return Diagnostic(
                 "F1008",
                 f"'{name}' stands where the name of a {noun} is expected",
@@ -138,13 +173,6 @@ def _misplaced(source: Source, tree: Node, path: Path, kind: str) -> Diagnostic 
                 span=node_span(source, key),
             )
     return None
-
-
-def _keys_at(path: Path) -> tuple[str, ...]:
-    for pattern, keys in _KEYS.items():
-        if len(pattern) == len(path) and all(p in {"*", step} for p, step in zip(pattern, path, strict=True)):
-            return keys
-    return ()
 
 
 def _inside(path: Path) -> str:
@@ -158,7 +186,7 @@ def _where(path: Path) -> str:
 
 def _found(node: Node) -> str:
     match node:
-        case Mapping():
+        case MappingNode():
             return "a mapping"
         case Sequence():
             return "a list"

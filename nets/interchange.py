@@ -30,8 +30,10 @@ from firable.nets.net import (
     Place,
     Property,
     PropertyKind,
+    Resource,
     Signal,
     SignalKind,
+    TaskUse,
     TemporalProperty,
     Transition,
 )
@@ -67,6 +69,17 @@ def net_to_json(net: Net) -> dict[str, Any]:
                 },
                 "completion": place.completion,
                 "description": place.description,
+                "task": None
+                if place.task is None
+                else {"name": place.task.name, "arguments": [list(pair) for pair in place.task.arguments]},
+                "resource": None
+                if place.resource is None
+                else {
+                    "idle": place.resource.idle,
+                    "machine": place.resource.machine,
+                    "prefix": place.resource.prefix,
+                    "parameters": [list(pair) for pair in place.resource.parameters],
+                },
             }
             for place in net.places
         ],
@@ -129,6 +142,10 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
                 Command(p.command.machine, p.command.command, tuple(p.command.parameters)) if p.command else None,
                 p.completion,
                 p.description,
+                TaskUse(p.task.name, tuple(p.task.arguments)) if p.task else None,
+                Resource(p.resource.idle, p.resource.machine, p.resource.prefix, tuple(p.resource.parameters))
+                if p.resource
+                else None,
             )
             for p in record.places
         ),
@@ -231,10 +248,25 @@ class _ControllerRecord(_Record):
     description: str
 
 
+_Pairs = list[Annotated[tuple[str, str], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v)]]
+
+
 class _CommandRecord(_Record):
     machine: str
     command: str
-    parameters: list[Annotated[tuple[str, str], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v)]]
+    parameters: _Pairs
+
+
+class _TaskUseRecord(_Record):
+    name: str
+    arguments: _Pairs
+
+
+class _ResourceRecord(_Record):
+    idle: str
+    machine: str
+    prefix: str
+    parameters: _Pairs
 
 
 class _PlaceRecord(_Record):
@@ -244,6 +276,8 @@ class _PlaceRecord(_Record):
     command: _CommandRecord | None
     completion: str | None
     description: str
+    task: _TaskUseRecord | None
+    resource: _ResourceRecord | None
 
 
 class _SignalRecord(_Record):

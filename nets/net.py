@@ -55,11 +55,39 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
+class TaskUse:
+    """The registered task that a place of a conceptual net stands for.
+
+    The arguments fill the roles and parameters of the task: a role with the name of a resource place, local to the
+    controller of the task's place or full.
+    """
+
+    name: str
+    arguments: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Resource:
+    """What a place of a conceptual net opens to: the idle place of a machine in the detailed net, by its full name.
+
+    `prefix` comes before the names of the machine's signals where its controller has several machines; tasks may ask
+    for further parameters.
+    """
+
+    idle: str
+    machine: str
+    prefix: str = ""
+    parameters: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Place:
     """A place: at most one token, marked or not in M0.
 
     `completion` names the completion signal of the place's command: the driver clears it when the command is sent
-    and sets it when the machine is done; every transition that takes the token out is gated by it.
+    and sets it when the machine is done; every transition that takes the token out is gated by it. `task` and
+    `resource` belong to a conceptual net and say what `firable refine` puts in the place's stead; the firing rule
+    knows neither.
     """
 
     name: str
@@ -68,6 +96,8 @@ class Place:
     command: Command | None = None
     completion: str | None = None
     description: str = ""
+    task: TaskUse | None = None
+    resource: Resource | None = None
 
 
 class SignalKind(StrEnum):

@@ -123,6 +123,11 @@ def _notes(net: Net, ids: dict[str, str]) -> Iterator[Diagnostic]:
         (len(net.signals), "signals are left out", "keep the net file"),
         (owned, "places and signals lose their owner", "keep the net file: only it can be split"),
         (sum(place.command is not None for place in net.places), "places lose their command", "keep the net file"),
+        (
+            sum((p.task or p.resource) is not None for p in net.places),
+            "places lose what they open to",
+            "keep the net file",
+        ),
         (sum(t.number is not None for t in net.transitions), "transitions lose their number", "keep the net file"),
         (len(net.arbiters), "arbiters are left out", "the file leaves conflicts open"),
         (len(net.properties), "properties are left out", "keep the net file"),

@@ -26,6 +26,7 @@ from firable.nets.net import (
     Place,
     Property,
     PropertyKind,
+    Resource,
     Signal,
     SignalKind,
     TemporalProperty,
@@ -168,14 +169,26 @@ def _scope(places: list[Place], inputs: list[Signal], prefix: str, indent: str) 
             entries.append(("send", _command(place.command)))
         if place.completion:
             entries.append(("until", _text(local(place.completion))))
+        if place.task:
+            entries.append(("task", _flow(_pairs(("name", place.task.name), *place.task.arguments))))
+        if place.resource:
+            entries.append(("opens", _resource(place.resource)))
         if place.description:
             entries.append(("description", _text(place.description)))
         yield from _entry(local(place.name), entries, indent + "  ")
 
 
 def _command(command: Command) -> str:
-    pairs = (("machine", command.machine), ("command", command.command), *command.parameters)
-    return _flow((_text(key), _text(value)) for key, value in pairs)
+    return _flow(_pairs(("machine", command.machine), ("command", command.command), *command.parameters))
+
+
+def _resource(resource: Resource) -> str:
+    prefix = [("prefix", resource.prefix)] if resource.prefix else []
+    return _flow(_pairs(("to", resource.idle), ("machine", resource.machine), *prefix, *resource.parameters))
+
+
+def _pairs(*pairs: tuple[str, str]) -> Iterator[tuple[str, str]]:
+    return ((_text(key), _text(value)) for key, value in pairs)
 
 
 def _transition(net: Net, transition: Transition) -> list[tuple[str, str]]:

@@ -37,8 +37,10 @@ from firable.nets.net import (
     Place,
     Property,
     PropertyKind,
+    Resource,
     Signal,
     SignalKind,
+    TaskUse,
     TemporalProperty,
     Transition,
 )
@@ -170,7 +172,7 @@ class _Reading:
             marked.add(local)
         for local, body in scope.places.items():
             place = body or doc.PlaceDocument()
-            send = place.send
+            send, task, opens = place.send, place.task, place.opens
             yield Place(
                 scope.full(local),
                 scope.owner,
@@ -178,6 +180,10 @@ class _Reading:
                 Command(send.machine, send.command, tuple((send.model_extra or {}).items())) if send else None,
                 scope.full(place.until) if place.until else None,
                 place.description,
+                TaskUse(task.name, tuple((task.model_extra or {}).items())) if task else None,
+                Resource(opens.to, opens.machine, opens.prefix, tuple((opens.model_extra or {}).items()))
+                if opens
+                else None,
             )
 
     def signals(self, scope: _Scope) -> Iterator[Signal]:

@@ -127,6 +127,9 @@ class Positions:
         declared: set[str] = set()
         for local, key, place in _entries(scope, "places"):
             yield ("places", prefix + local), key
+            for meaning in ("task", "opens"):
+                for part, _, value in _entries(place, meaning):
+                    yield ("places", prefix + local, meaning, part), value
             until = _value(place, "until")
             if isinstance(until, Scalar):
                 yield ("places", prefix + local, "until"), until

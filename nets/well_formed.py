@@ -43,6 +43,7 @@ def problems(net: Net) -> Iterator[Diagnostic]:
             ("controllers", coordinators[1]),
         )
     yield from _completions(net)
+    yield from _meanings(net)
     known = _Known(
         {place.name for place in net.places},
         {transition.name for transition in net.transitions},
@@ -155,6 +156,44 @@ def _completions(net: Net) -> Iterator[Diagnostic]:
                 raise ValueError(
                     f"'{transition.name}' takes the token of '{place.name}' without the gate '{place.completion}'"
                 )
+
+
+def _meanings(net: Net) -> Iterator[Diagnostic]:
+    """What `task` and `opens` say of places: one thing each, and no idle place twice.
+
+    That the controllers of idle places are there is asked of the net that is refined: a subnet has only its own.
+    """
+    opened: dict[str, str] = {}
+    for place in net.places:
+        if (place.task or place.resource) is None:
+            continue
+        subject: Subject = ("places", place.name)
+        said = {"task": place.task, "opens": place.resource, "send": place.command, "until": place.completion}
+        keys = [key for key, value in said.items() if value is not None]
+        if len(keys) > 1:
+            yield Diagnostic(
+                "F2024",
+                f"'{place.name}' has {' and '.join(f'`{key}`' for key in keys)}",
+                "a place stands for a task, or for a resource, or sends a command: leave one of them",
+                subject,
+            )
+        if place.resource is None:
+            continue
+        idle = place.resource.idle
+        if not idle.partition(".")[2] or not FORBIDDEN_IN_NAMES.isdisjoint(idle) or not idle.isprintable():
+            yield Diagnostic(
+                "F2012",
+                f"{idle!r} is not the full name of a place",
+                "write `to: CONTROLLER.PLACE`, such as `to: robot.free`",
+                (*subject, "opens", "to"),
+            )
+        elif (other := opened.setdefault(idle, place.name)) != place.name:
+            yield Diagnostic(
+                "F2001",
+                f"'{other}' and '{place.name}' both open to '{idle}'",
+                "give each resource an idle place of its own",
+                (*subject, "opens", "to"),
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -76,9 +76,9 @@ def weakly_bisimilar(
     Raises `IncompleteGraph` where one of the graphs is not whole.
     """
     union: nx.MultiDiGraph[int] = nx.MultiDiGraph()
-    for node, moves in enumerate(_joined(a, b, visible_a, visible_b)):
+    for node, some in enumerate(_joined(a, b, visible_a, visible_b)):
         union.add_node(node)
-        union.add_edges_from((node, target, {"label": label}) for label, target in moves)
+        union.add_edges_from((node, target, {"label": label}) for label, target in some)
     weak = _saturated(union)
     block = dict.fromkeys(weak, 0)
     n_blocks = 1

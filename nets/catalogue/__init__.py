@@ -1,25 +1,37 @@
 """The catalogue: example cells in the net format, and parametric families, installed with the package.
 
 A cell of the catalogue is a file beside this module, `NAME.firable.yaml`, and nothing else: to add one, add the file.
-They are read by the same reader as a user's file, so that the examples cannot drift from the format; the alternative,
-nets built by Python code, shows nobody how to write one. The families are built by code all the same
+`*.tasks.yaml` holds the tasks that the conceptual ones name. They are read by the same readers as a user's files, so
+that the examples cannot drift from the format; the alternative, nets built by Python code, shows nobody how to write
+one. The families are built by code all the same
 (`families.py`), because their nets have any size: they are there to measure and to test with.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from firable.nets.catalogue.families import FAMILIES, family_net
 from firable.nets.net import Net
+from firable.nets.tasks.model import Task
+from firable.nets.tasks.text import read_tasks
 from firable.nets.text import read_net
 
 if TYPE_CHECKING:
     from firable.nets.machines.plant_file import PlantModel
 
-__all__ = ["FAMILIES", "catalogue_names", "catalogue_net", "catalogue_path", "catalogue_plant", "family_net"]
+__all__ = [
+    "FAMILIES",
+    "catalogue_names",
+    "catalogue_net",
+    "catalogue_path",
+    "catalogue_plant",
+    "catalogue_tasks",
+    "family_net",
+]
 
 _SUFFIX = ".firable.yaml"
 
@@ -59,6 +71,17 @@ def catalogue_plant(name: str) -> PlantModel:
     if not path.exists():
         raise KeyError(name)
     return read_plant(path)
+
+
+@cache
+def catalogue_tasks() -> Mapping[str, Task]:
+    """The registered tasks of the catalogue's cells, by name: those of every `*.tasks.yaml` beside this module.
+
+    >>> sorted(catalogue_tasks())
+    ['carry_in', 'carry_out', 'load', 'process', 'unload']
+    """
+    files = sorted(Path(__file__).parent.glob("*.tasks.yaml"))
+    return {name: task for file in files for name, task in read_tasks(file).items()}
 
 
 @cache

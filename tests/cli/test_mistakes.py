@@ -122,6 +122,7 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         (["draw", "catalogue:machines-5000"], "20,000 places and transitions make no picture"),
         (["draw", "catalogue:one_robot", "--marking", "robot.fre"], "no place 'robot.fre'"),
         (["draw", "catalogue:one_robot", "--marking", "robot.free", "--trace", "x"], "leave one out"),
+        (["refine", "catalogue:conceptual_one_robot", "-o", "-"], "cannot go to standard output"),
         (["convert", "catalogue:one_robot", "-o", "net.docx"], "cannot tell the format"),
         (["schema", "everything"], "is not one of"),
     ],
@@ -143,12 +144,38 @@ def test_an_output_that_cannot_be_written_leaves_nothing_behind(
             assert "error[F1017]" in refused(capsys, *command, "-o", output)
     said = refused(capsys, "convert", "catalogue:one_robot", "-o", str(tmp_path / "no" / "x.pnml"))
     assert "error[F1017]" in said
+    said = refused(capsys, "refine", "catalogue:conceptual_one_robot", "-o", str(tmp_path / "no" / "x.firable.yaml"))
+    assert "error[F1017]" in said
     for option, maker in (("--trace-dir", "check"), ("--smt-dir", "prove")):
         said = refused(capsys, maker, "catalogue:one_robot_mc_late", option, str(tmp_path / "file"))
         assert "error[F1017]" in said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
     assert (tmp_path / "file").read_text() == "kept"
     assert list((tmp_path / "folder").iterdir()) == []
+
+
+def test_a_mistake_in_a_file_of_tasks_or_in_its_use_is_one_clear_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tasks = tmp_path / "own.tasks.yaml"
+    for text, code, words in (
+        ("", "F1002", "own.tasks.yaml:1:1"),
+        ("tasks: {}\n", "F1009", "begins with `firable_tasks: 1`"),
+        ("firable_tasks: 1\ntasks: {rest: {rols: {}}}\n", "F1008", "did you mean 'roles'?"),
+        ("firable_tasks: 1\ntasks: {rest: {roles: {r: {steps: {a: {place: '{s}'}}}}}}\n", "F2026", "own.tasks.yaml:2:"),
+    ):
+        tasks.write_text(text)
+        said = refused(capsys, "refine", "catalogue:conceptual_one_robot", "--tasks", str(tasks))
+        assert f"error[{code}]" in said
+        assert words in said
+    assert "error[F1001]" in refused(
+        capsys, "refine", "catalogue:conceptual_one_robot", "--tasks", str(tmp_path / "no")
+    )
+    assert "error[F4010]" in refused(capsys, "refine", "catalogue:one_robot")  # there is nothing to open
+    said = refused(capsys, "refine", "catalogue:conceptual_one_robot_mc_late", "-o", str(tmp_path / "late.yaml"))
+    assert "error[F4012]" in said
+    assert "add 'system.mc' to `from`" in said
+    assert not (tmp_path / "late.yaml").exists()
 
 
 def test_a_plant_that_does_not_fit_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -113,6 +113,7 @@ TWINS = (
     Twin("conceptual_one_robot", "conceptual1", CONCEPTUAL, ("system",)),
     Twin("conceptual_one_robot_mc_late", "conceptual1_mc_late", CONCEPTUAL, ("system",)),
     Twin("conceptual_two_robots", "conceptual2", CONCEPTUAL, ("system",)),
+    Twin("conceptual_two_robots_shared", "conceptual2", CONCEPTUAL, ("system",)),
 )
 
 
@@ -131,7 +132,10 @@ def parts(net: Net, names: Mapping[str, str], owners: Mapping[str, str]) -> dict
     return {
         "places": {(name(p.name), owner(p.owner), p.marked, command(p.command)) for p in net.places},
         "signals": {(name(s.name), owner(s.owner)) for s in net.signals},
-        "controllers": [(owner(c.name), c.coordinator) for c in net.controllers],
+        # A conceptual cell also names the controllers that its resources open to, which own nothing yet.
+        "controllers": [
+            (owner(c.name), c.coordinator) for c in net.controllers if any(p.owner == c.name for p in net.places)
+        ],
         "transitions": {
             (
                 t.name,

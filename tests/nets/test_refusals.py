@@ -151,6 +151,13 @@ TABLE = (
         "rename one of them"),
     net("signal twice", "inputs: [a, a]\n", "F2001 3:13", "rename one of them"),
     net("not a name", "places: {'a b': }\n", "F2012 3:10", "use letters, digits"),
+    net("opens to no place", ROBOT + "places: {r: {opens: {to: robot, machine: R}}}\n", "F2012 10:26", "write `to:"),
+    net("opened twice", ROBOT + "places:\n  r: {opens: {to: robot.a, machine: R}}\n"
+        "  s: {opens: {to: robot.a, machine: S}}\n", "F2001 12:19", "give each resource an idle place of its own"),
+    net("task and command", ROBOT + "places: {p: {task: {name: load}, send: {machine: R, command: M}}}\n",
+        "F2024 10:10", "a place stands for a task, or for a resource"),
+    net("task without a name", "places: {p: {task: {robot: r}}}\n", "F1009 3:14", "add `name:`"),
+    net("resource without a machine", "places: {p: {opens: {to: r.free}}}\n", "F1009 3:14", "add `machine:`"),
     net("invisible name", 'places: {"a\\u200bb": }\n', "F2012 3:10", "use letters, digits"),
     net("empty name", 'places: {"": }\n', "F2012 3:10", "write a name before the colon"),
     net("two coordinators", "controllers: {a: {coordinator: true}, b: {coordinator: true}}\n", "F2015 3:39",

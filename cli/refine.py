@@ -1,0 +1,223 @@
+"""`firable refine`: open the tasks of a conceptual net, and carry over what was proved of it."""
+
+from __future__ import annotations
+
+from textwrap import indent
+from typing import TYPE_CHECKING
+
+import click
+
+from firable.cli import text
+from firable.cli.options import analysis_options, answer, budget, format_option, load_net, net_argument, write_text
+from firable.cli.report import Report
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from firable.analysis.spaces.reachability import Budget
+    from firable.decompose.refinement.closed import BlockProof
+    from firable.decompose.refinement.refining import Refinement
+    from firable.nets.decomposition import Coordinated
+    from firable.nets.diagnostics import Diagnostic
+    from firable.nets.net import Net
+    from firable.nets.tasks.model import Catalogue
+    from firable.nets.verdict import Verdict
+
+_METHODS = ("exploration of the task, closed", "the arcs and gates of the conceptual net")
+"""What conditions are decided by."""
+
+
+@click.command(short_help="Open the tasks of a conceptual net to a detailed net, and carry over its verdicts.")
+@net_argument
+@click.option(
+    "--tasks",
+    "files",
+    metavar="FILE",
+    multiple=True,
+    help="A file of registered tasks (*.tasks.yaml); may be given again. They come before those of the catalogue.",
+)
+@click.option("-o", "--output", metavar="FILE", help="Write the detailed net there, as a net file (*.firable.yaml).")
+@click.option("--cell", metavar="NAME", default="", help="The name of the detailed net; by default that of NET.")
+@click.option(
+    "--confirm/--no-confirm",
+    default=None,
+    help="Compare both nets by exploring them, whatever their size or not at all; by default where they are small.",
+)
+@analysis_options
+@format_option
+def refine(
+    net: str,
+    files: tuple[str, ...],
+    output: str | None,
+    cell: str,
+    confirm: bool | None,
+    max_markings: int,
+    max_memory: int,
+    max_seconds: float | None,
+    format_: str,
+) -> int:
+    """Open every place of NET that names a registered task to the steps of that task.
+
+    Each task is checked alone, with nothing around it: that it always can end, leaves nothing behind and has no
+    contact. What is proved of NET then holds of the detailed net too, which is not explored for it; a task that keeps
+    not to the conditions is refused with a firing sequence in its own names.
+    """
+    if output == "-":
+        raise click.UsageError("the net cannot go to standard output, where the report goes: name a file")
+    most = budget(max_markings, max_memory, max_seconds)
+    return answer("refine", format_, lambda: _report(net, files, output, cell, confirm, most), _show)
+
+
+def _report(
+    argument: str, files: tuple[str, ...], output: str | None, cell: str, confirm: bool | None, most: Budget
+) -> Report:
+    from firable.analysis.check import check
+    from firable.decompose.refinement.carrying import carried, not_carried
+    from firable.decompose.refinement.refining import proved_tasks
+    from firable.decompose.refinement.refining import refine as refine_net
+    from firable.nets.printing import format_net
+
+    loaded = load_net(argument)
+    catalogue = _catalogue(files)
+    with loaded.placing():
+        blocks = proved_tasks(loaded.net, catalogue)
+        unsound = next((block for block in blocks if not block.sound), None)
+        if unsound is not None:
+            return _refused(argument, unsound)
+        refinement = refine_net(loaded.net, catalogue, cell)
+    report = check(loaded.net, budget=most)
+    verdicts = [
+        *refinement.conditions,
+        _contact_free(report.verdict("contact-free")),
+        *carried(refinement.correspondence, blocks, report),
+        *_confirmed(refinement, report.verdict("contact-free"), confirm, most),
+    ]
+    table, more = _table(refinement.net)
+    if output is not None:
+        write_text(output, format_net(refinement.net))
+    return Report(
+        "refine",
+        argument,
+        refinement.net,
+        verdicts,
+        discipline="interleaving",
+        course=(*_told(refinement), f"of the detailed net alone, `firable check` decides: {not_carried()}"),
+        notes=(*loaded.notes, *refinement.notes, *more),
+        table=table,
+        files=() if output is None else (output,),
+    )
+
+
+def _catalogue(files: tuple[str, ...]) -> Catalogue:
+    from firable.nets.catalogue import catalogue_tasks
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.tasks.text import read_tasks
+
+    own: dict[str, str] = {}
+    tasks = dict(catalogue_tasks())
+    for file in files:
+        for name, task in read_tasks(file).items():
+            if (other := own.setdefault(name, file)) != file:
+                message = f"the task '{name}' stands in '{other}' and in '{file}'"
+                raise InputError([Diagnostic("F2001", message, "rename one of them", span=task.span)])
+            tasks[name] = task
+    return tasks
+
+
+def _refused(argument: str, block: BlockProof) -> Report:
+    """The report on a task that may not stand for a place: its net alone, and what it violates."""
+    course = (f"the task '{block.task.name}' is refused: it cannot stand for a place", "nothing was opened or written")
+    return Report("refine", argument, block.net, block.verdicts, discipline="interleaving", course=course)
+
+
+def _contact_free(of: Verdict) -> Verdict:
+    """What the theorem asks of the conceptual net. Its witness has the names of that net, which are not at hand."""
+    from dataclasses import replace
+
+    hint = "" if of.holds else "the theorem asks it; `firable check` of the conceptual net shows where"
+    statement = f"in the conceptual net {of.statement}"
+    return replace(of, name="conceptual.contact-free", statement=statement, witness=None, subjects=(), hint=hint)
+
+
+def _confirmed(refinement: Refinement, contact_free: Verdict, confirm: bool | None, most: Budget) -> list[Verdict]:
+    from firable.decompose.refinement.confirming import confirmed
+
+    if confirm is False:
+        return []
+    return list(
+        confirmed(
+            refinement.correspondence,
+            contact_free=contact_free.holds,
+            settles=refinement.settles,
+            budget=most if confirm else None,
+        )
+    )
+
+
+def _table(net: Net) -> tuple[tuple[Coordinated, ...], tuple[Diagnostic, ...]]:
+    """The coordinator table of a net whose parts all have an owner; else nothing, or why there is none."""
+    from dataclasses import replace
+
+    from firable.decompose.splitting.cut import split
+    from firable.nets.diagnostics import InputError, Severity
+
+    owners = {*(place.owner for place in net.places), *(signal.owner for signal in net.signals)}
+    if None in owners:
+        return (), ()
+    try:
+        return split(net).table, ()
+    except InputError as error:
+        return (), tuple(replace(one, severity=Severity.WARNING, span=None) for one in error.diagnostics)
+
+
+def _told(refinement: Refinement) -> list[str]:
+    """What was opened, a line for each place that names a task, subtasks with the path that leads to them."""
+    lines = []
+    for path, binding in refinement.bound.items():
+        roles = ", ".join(f"{role} {resource.rpartition('.')[2]}" for role, resource in binding.resources.items())
+        task = binding.task
+        early = f", {' and '.join(sorted(task.released))} released inside" if task.released else ""
+        size = f"{text.counted(len(task.steps), 'step')}, {text.counted(len(task.moves), 'move')}"
+        lines.append(f"{path} is opened by {task.name} ({roles}): {size}{early}")
+    return lines
+
+
+def show_conditions(verdicts: Sequence[Verdict]) -> set[str]:
+    """Print the conditions of each task on one line, and which places are opened as they must; returns what is told.
+
+    What is violated or unknown is left to be told in full.
+    """
+    lines: dict[str, list[Verdict]] = {}
+    for verdict in verdicts:
+        if verdict.method in _METHODS:
+            lines.setdefault(verdict.name.partition(".")[0], []).append(verdict)
+    told = set[str]()
+    width = max(map(len, lines), default=0)
+    for subject, some in lines.items():
+        proved = [verdict for verdict in some if verdict.holds]
+        required = [verdict for verdict in some if verdict.weight.value == "required"]
+        symbol, colour = ("✓", "green") if all(verdict.holds for verdict in required) else ("✗", "red")
+        words = ", ".join(verdict.name.partition(".")[2] for verdict in proved)
+        click.echo(f"  {click.style(symbol, fg=colour)} {subject:<{width}}  {words}")
+        told |= {verdict.name for verdict in some if verdict.holds or verdict.weight.value == "information"}
+    return told
+
+
+def _show(report: Report) -> None:
+    from firable.decompose.splitting.table import table_text
+
+    for note in report.notes:
+        text.show_diagnostic(note)
+    text.heading(report.net, report.input)
+    click.echo(f"\n{click.style('tasks', bold=True)}")
+    for line in report.course:
+        click.echo(f"  {line}")
+    if report.table:
+        click.echo(f"\n{click.style('coordinator table', bold=True)}")
+        click.echo(indent(table_text(report.table), "  "), nl=False)
+    click.echo(f"\n{click.style('conditions', bold=True)}")
+    shown = show_conditions(report.verdicts)
+    text.show_verdicts(report.net, [verdict for verdict in report.verdicts if verdict.name not in shown])
+    text.show_summary(report)
+    for file in report.files:
+        click.echo(f"  the detailed net is in {file}")

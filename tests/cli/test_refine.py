@@ -1,0 +1,119 @@
+"""`firable refine`, as an engineer sees it."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import jsonschema
+import pytest
+from support.published import COORDINATOR_TABLE
+
+from firable.cli.main import main
+from firable.nets import catalogue_net, read_net
+from firable.semantics.player import Player
+
+OWN = """\
+firable_tasks: 1
+tasks:
+  process:
+    parameters: {program: }
+    roles: {machine: {steps: {run: , stop: , stuck: }}}
+    moves:
+      a: {from: machine.run, to: machine.stop}
+      b: {from: machine.run, to: machine.stuck, description: the tool breaks}
+    end: {from: machine.stop}
+"""
+
+
+def refined(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:
+    code = main(["refine", *arguments])
+    return code, capsys.readouterr().out
+
+
+def test_refining_prints_what_was_opened_the_table_and_what_carries_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "cell.firable.yaml"
+    code, said = refined(capsys, "catalogue:conceptual_one_robot", "-o", str(output), "--cell", "one-robot")
+    assert code == 0
+    assert "system.loading is opened by load (robot robot, target mc, source cv1): 8 steps, 4 moves" in said
+    assert all(line in said for line in COORDINATOR_TABLE.splitlines())
+    assert "✓ load       ends, ends-clean, contact-free, complete, settles, orderly" in said
+    assert "proved    deadlock-free" in said
+    assert "bisimilar.branching" in said
+    assert f"the detailed net is in {output}" in said
+    assert len(read_net(output).transitions) == len(catalogue_net("one_robot").transitions)
+    assert main(["check", str(output)]) == 0
+    assert main(["prove", str(output)]) == 0
+
+
+def test_a_task_that_can_get_stuck_is_refused_with_its_trace_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tasks, output = tmp_path / "own.tasks.yaml", tmp_path / "cell.firable.yaml"
+    tasks.write_text(OWN)
+    code, said = refined(capsys, "catalogue:conceptual_one_robot", "--tasks", str(tasks), "-o", str(output))
+    assert code == 1
+    assert not output.exists()
+    assert "process.ends" in said
+    assert "2. b      the tool breaks" in said
+    assert "from here the task can never end" in said
+    assert "nothing was opened or written" in said
+
+
+def test_the_json_of_refining_has_the_shape_of_every_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    schema = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+    late = "catalogue:conceptual_one_robot_mc_late"
+    for argument, code in (("catalogue:conceptual_two_robots", 0), (late, 2)):
+        found, said = refined(capsys, argument, "--format", "json")
+        assert found == code
+        document = json.loads(said)
+        jsonschema.validate(document, schema)
+        assert document["command"] == "refine"
+        assert bool(document["errors"]) is (code == 2)
+
+
+def test_own_tasks_come_before_those_of_the_catalogue_and_two_of_one_name_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one, two = tmp_path / "one.tasks.yaml", tmp_path / "two.tasks.yaml"
+    one.write_text(OWN.replace("      b: {from: machine.run, to: machine.stuck, description: the tool breaks}\n", ""))
+    code, said = refined(capsys, "catalogue:conceptual_one_robot", "--tasks", str(one), "--no-confirm")
+    assert code == 0
+    assert "process (machine mc): 3 steps, 1 move" in said
+    assert "bisimilar" not in said
+    two.write_text(one.read_text())
+    assert main(["refine", "catalogue:conceptual_one_robot", "--tasks", str(one), "--tasks", str(two)]) == 2
+    assert "error[F2001]" in capsys.readouterr().err
+
+
+def test_a_budget_that_ends_leaves_unknown(capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = refined(capsys, "catalogue:conceptual_one_robot", "--confirm", "--max-markings", "30")
+    assert code == 0
+    assert "? unknown   bisimilar.weak" in said
+
+
+def test_a_violated_property_of_the_conceptual_net_is_told_in_the_detailed_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "net.firable.yaml"
+    path.write_text(
+        "firable: 1\ncell: c\ncontrollers:\n  s:\n    coordinator: true\n    start: [m, n]\n    places:\n"
+        "      work: {task: {name: process, machine: m, program: O1}}\n      m: {opens: {to: mc.free, machine: MC}}\n"
+        "      n:\n  mc: {description: machine}\ntransitions:\n  begin: {from: s.m, to: s.work}\n"
+        "  end: {from: [s.work, s.n], to: s.m}\n"
+    )
+    output = tmp_path / "out.firable.yaml"
+    code, said = refined(capsys, str(path), "-o", str(output))
+    assert code == 1
+    assert "t1-a  fixed" in said
+    net = read_net(output)
+    player = Player(net)
+    assert any(player.deadlocked(marking) for marking in player.reachable())
+
+
+def test_the_schema_of_files_of_tasks_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema", "tasks"]) == 0
+    assert json.loads(capsys.readouterr().out)["title"] == "firable file of tasks"
