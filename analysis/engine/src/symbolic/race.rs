@@ -7,6 +7,10 @@
 //! saturation has its own stack and can be left and gone on with, so nothing is done twice, and the race costs some
 //! times the search of the winner, against a good chance to be a thousand times faster. Where memory becomes short, the
 //! largest search is given up first. The rejected alternative, to go by the levels done alone, drops most winners early.
+//!
+//! The candidates come as an order and its reverse. Where the direction matters, it soon shows, and then it is everything;
+//! where it does not, the two are *twins*: the net looks the same from both ends, and one search says what the other
+//! would. So where the two stand at the same level with as many nodes after two rounds in succession, the second drops out.
 
 use super::cache::ANY;
 use super::order::{Order, candidates};
@@ -26,15 +30,26 @@ const PATIENCE: u64 = 7;
 const FINALISTS: usize = 2;
 const RUNNER_UP: u64 = 4;
 
+/// Twins differ in their nodes by at most one in so many, after so many rounds.
+const TWINS_APART: usize = 20;
+const ROUNDS_ALIKE: u32 = 2;
+
 /// A search in one order, which may be left and gone on with.
 struct Racer {
     order: Order,
     begun: Option<(Ordered, Saturation, Node)>,
     /// The level that was reached before the last round.
     before: u32,
+    /// How many rounds in succession it has stood where the search in the reverse order stands, if that is before it.
+    alike: u32,
 }
 
 impl Racer {
+    /// Whether the order of another one is the reverse of this one's.
+    fn is_reverse_of(&self, other: &Racer) -> bool {
+        self.order.iter().eq(other.order.iter().rev())
+    }
+
     fn bytes(&self) -> usize {
         self.begun.as_ref().map_or(0, |(ordered, ..)| ordered.diagram.store.memory.used())
     }
@@ -92,6 +107,25 @@ fn thin_out(field: &mut Vec<Racer>) {
     *field = kept;
 }
 
+/// Whether two searches, both begun, stand at the same level with about as many nodes.
+fn stand_alike(one: &Racer, other: &Racer) -> bool {
+    let ((level, nodes), (other_level, other_nodes)) = (one.standing(), other.standing());
+    let begun = one.begun.is_some() && other.begun.is_some();
+    begun && level == other_level && nodes.abs_diff(other_nodes) <= nodes.max(other_nodes) / TWINS_APART
+}
+
+/// Takes out the second of each two that have been twins for long enough.
+fn drop_twins(field: &mut Vec<Racer>) {
+    for at in (1..field.len()).rev() {
+        let Some(twin) = field[..at].iter().find(|first| field[at].is_reverse_of(first)) else { continue };
+        let alike = stand_alike(twin, &field[at]);
+        field[at].alike = if alike { field[at].alike + 1 } else { 0 };
+        if field[at].alike >= ROUNDS_ALIKE && field.len() > FINALISTS {
+            field.remove(at);
+        }
+    }
+}
+
 impl Symbolic {
     /// The reachable markings, or why they were not found; `orders` replaces the candidates of `order`.
     pub fn explore(
@@ -103,7 +137,8 @@ impl Symbolic {
         watch: &mut Watch<'_>,
     ) -> Result<Self, Stop> {
         let orders = orders.unwrap_or_else(|| candidates(places, &transitions));
-        let mut field: Vec<Racer> = orders.into_iter().map(|order| Racer { order, begun: None, before: 0 }).collect();
+        let racer = |order| Racer { order, begun: None, before: 0, alike: 0 };
+        let mut field: Vec<Racer> = orders.into_iter().map(racer).collect();
         let first = FUEL + FUEL_PER_LEVEL * places as u64;
         let (mut fuel, mut spent) = (first, 0);
         while !field.is_empty() {
@@ -130,6 +165,7 @@ impl Symbolic {
                 }
             }
             spent += fuel;
+            drop_twins(&mut field);
             if spent >= PATIENCE * first {
                 thin_out(&mut field);
             }
@@ -137,5 +173,78 @@ impl Symbolic {
             fuel *= 2;
         }
         Err(Stop::Memory)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+
+    const ROOM: usize = 1 << 26;
+
+    /// Searches for the markings of a ring on which tokens go either way, one for each order of its places.
+    fn field(orders: &[Order]) -> (Vec<Racer>, Vec<Transition>) {
+        let places = orders[0].len() as u32;
+        let moves = |from: u32, to: u32| Transition::new(&[from % places], &[to % places], &[], &[], &[]);
+        let racer = |order: &Order| Racer { order: order.clone(), begun: None, before: 0, alike: 0 };
+        (
+            orders.iter().map(racer).collect(),
+            (0..places).flat_map(|at| [moves(at, at + 1), moves(at + 1, at)]).collect(),
+        )
+    }
+
+    fn round(field: &mut Vec<Racer>, transitions: &[Transition], fuel: impl Fn(usize) -> u64) {
+        // The same from both ends of the ring.
+        let marked: Vec<u32> = (1..transitions.len() as u32 / 2).step_by(3).collect();
+        for (at, racer) in field.iter_mut().enumerate() {
+            let mut poll = unwatched;
+            let ended = racer.run(transitions, &marked, ROOM, fuel(at), &mut Watch::new(None, &mut poll));
+            assert_eq!(ended, Ok(None));
+        }
+        drop_twins(field);
+    }
+
+    fn orders() -> [Order; 4] {
+        let along: Order = (0..90).collect();
+        let across: Order = (0..90).map(|at| at * 7 % 90).collect();
+        [along.clone(), along.into_iter().rev().collect(), across.clone(), across.into_iter().rev().collect()]
+    }
+
+    #[test]
+    fn of_two_orders_that_stand_alike_twice_the_second_drops_out() {
+        let [along, back, across, _] = orders();
+        let (mut racers, transitions) = field(&[along.clone(), back, across.clone()]);
+        round(&mut racers, &transitions, |_| 200);
+        assert_eq!(racers.len(), 3);
+        round(&mut racers, &transitions, |_| 400);
+        assert_eq!(racers.iter().map(|racer| &racer.order).collect::<Vec<_>>(), [&along, &across]);
+    }
+
+    #[test]
+    fn two_orders_that_stand_apart_are_both_kept() {
+        let (mut racers, transitions) = field(&orders());
+        for _ in 0..4 {
+            // The reverse orders get on less far.
+            round(&mut racers, &transitions, |at| if at % 2 == 0 { 400 } else { 200 });
+        }
+        assert_eq!(racers.len(), 4);
+    }
+
+    #[test]
+    fn orders_that_are_no_reverses_are_no_twins_and_the_last_two_stay() {
+        let [along, back, across, _] = orders();
+        for two in [[along.clone(), along.clone(), across], [along.clone(), back.clone(), along]] {
+            let (mut racers, transitions) = field(&two);
+            (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
+            assert_eq!(racers.len(), if two.contains(&back) { 2 } else { 3 });
+        }
+    }
+
+    #[test]
+    fn searches_that_have_not_begun_are_no_twins() {
+        let (mut racers, _) = field(&orders());
+        (0..4).for_each(|_| drop_twins(&mut racers));
+        assert_eq!(racers.len(), 4);
     }
 }

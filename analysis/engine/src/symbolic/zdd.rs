@@ -28,8 +28,11 @@ const NIL: u32 = 0;
 const NODES_MAX: usize = (1 << 31) - 1;
 /// Below this number of nodes nothing is collected.
 const COLLECT_FROM: usize = 1 << 20;
-/// How many nodes there are for each that is remembered as the last of its hash.
-const PER_LAST: usize = 4;
+/// How many chains there are for each node that is remembered as the last of its hash.
+const PER_LAST: usize = 2;
+/// How many chains there are at least for each node: to look into one that does not hold what is wanted costs a miss of
+/// the processor's caches for each node in it.
+const CHAINS: usize = 2;
 
 #[derive(Clone, Copy, Debug)]
 struct Cell {
@@ -192,7 +195,7 @@ impl Store {
         };
         self.used += 1;
         self.buckets.all_mut()[bucket] = at;
-        if self.used > self.buckets.all().len() {
+        if CHAINS * self.used > self.buckets.all().len() {
             self.rehash(self.buckets.all().len() * 2)?;
         }
         Ok(at)
