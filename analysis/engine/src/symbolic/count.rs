@@ -108,21 +108,27 @@ impl Sums {
         }
         let mut values: Vec<Natural> = vec![Natural::new(); number as usize + 1];
         values[ONE as usize] = vec![1];
-        let mut held = 0;
+        let mut held = 8;
         for at in 2..=number as usize {
             if uses[at] == 0 {
                 continue;
             }
             let [a, b] = self.terms[at].map(|term| term as usize);
-            let sum = plus(&values[a], &values[b]);
+            let (long, short) = if values[a].len() >= values[b].len() { (a, b) } else { (b, a) };
+            uses[long] -= 1;
+            uses[short] -= 1;
+            // A number that nothing else needs becomes the sum.
+            let mut sum = if uses[long] == 0 && long != short {
+                std::mem::take(&mut values[long])
+            } else {
+                held += 8 * values[long].len();
+                values[long].clone()
+            };
+            held += 8 * add(&mut sum, &values[short]);
             watch.tick(1 + sum.len() / 8)?;
-            held += 8 * sum.len();
             values[at] = sum;
-            for term in [a, b] {
-                uses[term] -= 1;
-                if uses[term] == 0 && term > 1 {
-                    held -= 8 * std::mem::take(&mut values[term]).len();
-                }
+            if uses[short] == 0 && short > 1 {
+                held -= 8 * std::mem::take(&mut values[short]).len();
             }
             if memory.claim(held).is_err() {
                 return Err(Stop::Memory);
@@ -133,20 +139,26 @@ impl Sums {
     }
 }
 
-fn plus(a: &[u64], b: &[u64]) -> Natural {
-    let (long, short) = if a.len() >= b.len() { (a, b) } else { (b, a) };
-    let mut sum = Natural::with_capacity(long.len() + 1);
+/// Adds a number that is not longer; how many words the sum is longer.
+fn add(sum: &mut Natural, short: &[u64]) -> usize {
+    let (same, rest) = sum.split_at_mut(short.len());
     let mut carry = false;
-    for (at, &word) in long.iter().enumerate() {
-        let (word, first) = word.overflowing_add(short.get(at).copied().unwrap_or(0));
-        let (word, second) = word.overflowing_add(u64::from(carry));
-        carry = first || second;
-        sum.push(word);
+    for (word, &more) in same.iter_mut().zip(short) {
+        let (once, first) = word.overflowing_add(more);
+        let (twice, second) = once.overflowing_add(u64::from(carry));
+        *word = twice;
+        carry = first | second;
+    }
+    for word in rest {
+        if !carry {
+            return 0;
+        }
+        (*word, carry) = word.overflowing_add(1);
     }
     if carry {
         sum.push(1);
     }
-    sum
+    usize::from(carry)
 }
 
 /// How many markings a set holds.
@@ -295,3 +307,39 @@ impl Counting<'_> {
 }
 
 const _: () = assert!(TERMINAL == 0);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+
+    #[test]
+    fn a_carry_goes_through_all_words() {
+        for (sum, short, wanted) in [
+            (vec![u64::MAX, u64::MAX], vec![1], vec![0, 0, 1]),
+            (vec![u64::MAX, 5, 7], vec![1], vec![0, 6, 7]),
+            (vec![u64::MAX, u64::MAX], vec![u64::MAX, u64::MAX], vec![u64::MAX - 1, u64::MAX, 1]),
+            (vec![0, u64::MAX], vec![u64::MAX, 0], vec![u64::MAX, u64::MAX]),
+        ] {
+            let mut found = sum.clone();
+            let more = add(&mut found, &short);
+            assert_eq!((found.len(), &found), (sum.len() + more, &wanted));
+        }
+    }
+
+    #[test]
+    fn numbers_without_limit_are_powers_of_two_where_each_is_doubled() {
+        // 2^n by doubling, and 2^n - 1 by adding up all smaller powers, each of which is needed twice.
+        let mut sums = Sums::new();
+        let (mut power, mut all) = (ONE, ONE);
+        for _ in 0..300 {
+            power = sums.add(power, power);
+            all = sums.add(power, all);
+        }
+        let (memory, mut poll) = (Memory::new(1 << 20), unwatched);
+        let value = sums.value(all, &memory, &mut Watch::new(None, &mut poll));
+        let mut wanted = vec![u64::MAX; 4];
+        wanted.push((1 << (301 - 4 * 64)) - 1);
+        assert_eq!((value, memory.used()), (Ok(wanted), 0));
+    }
+}
