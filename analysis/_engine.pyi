@@ -17,6 +17,10 @@ raises, comes out. An exploration that is ended so is incomplete; any other work
 from collections.abc import Callable
 from typing import final
 
+_Row = tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]
+_Ends = tuple[bytes, bytes]
+_Transitions = list[_Row] | tuple[_Ends, _Ends, _Ends, _Ends, _Ends]
+
 class BudgetExceeded(RuntimeError):  # noqa: N818 - what happened is no error of anybody's, and so not named one
     """The answer needs more memory or time than is allowed, or is no longer needed."""
 
@@ -25,7 +29,7 @@ class IncompleteGraph(RuntimeError):  # noqa: N818 - likewise
 
 def explore(
     n_places: int,
-    transitions: list[tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]],
+    transitions: _Transitions,
     initial: list[int],
     *,
     step: bool = False,
@@ -40,10 +44,10 @@ def explore(
     """Explore the reachability graph from the marking `initial`, external gates free.
 
     A transition is (inputs, outputs, permissive, inhibitive, external literals): places by index, literals as
-    (signal, wanted value). Under interleaving an edge fires one transition that is firable (Eq. 1) and whose
-    literals do not contradict each other; under `step` it fires a maximal set F of E(v), for some valuation v of
-    the signals, in which a place has at most one consumer and one producer; each F is one edge, the empty one is
-    left out.
+    (signal, wanted value); all may be given end to end, as `compiled.flat` makes them. Under interleaving an edge
+    fires one transition that is firable (Eq. 1) and whose literals do not contradict each other; under `step` it
+    fires a maximal set F of E(v), for some valuation v of the signals, in which a place has at most one consumer and
+    one producer; each F is one edge, the empty one is left out.
 
     Running out of a budget, and Ctrl-C, give an incomplete graph with its `reason`. `max_memory_bytes` counts all
     that the engine holds, copies while a table grows included; time is looked at every few thousand edges. `progress`
@@ -231,7 +235,7 @@ class Components:
 
 def explore_compactly(
     n_places: int,
-    transitions: list[tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]],
+    transitions: _Transitions,
     initial: list[int],
     goals: list[list[tuple[int, list[int]]]],
     *,
@@ -308,7 +312,7 @@ class Compact:
 
 def explore_symbolically(
     n_places: int,
-    transitions: list[tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]],
+    transitions: _Transitions,
     initial: list[int],
     *,
     max_memory_bytes: int,
@@ -427,7 +431,7 @@ class Stubborn:
     def __new__(
         cls,
         n_places: int,
-        transitions: list[tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]],
+        transitions: _Transitions,
         initial: list[int],
     ) -> Stubborn: ...
     def deadlocks(

@@ -21,7 +21,7 @@ from typing import Final
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded
-from firable.analysis.compiled import Node, engine_limits, nodes_of, rows
+from firable.analysis.compiled import Node, engine_limits, flat, nodes_of
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.question import Answer, Known, no, yes
 from firable.analysis.spaces.reachability import REASONS
@@ -88,7 +88,7 @@ def known_by_counting(net: Net, limits: Limits) -> Mapping[str, Known]:
 
 def _search(net: Net, goals: list[list[Node]], limits: Limits, *, until_met: bool) -> _engine.Compact:
     return _engine.explore_compactly(
-        *rows(net), goals, until_met=until_met, max_memory_bytes=limits.memory_bytes, **engine_limits(limits.deadline)
+        *flat(net), goals, until_met=until_met, max_memory_bytes=limits.memory_bytes, **engine_limits(limits.deadline)
     )
 
 

@@ -10,8 +10,11 @@ Nothing recurses over the formula: one that a program has built may be deeper th
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import chain
+from operator import attrgetter
 from typing import Any, Final
 
 from firable.analysis.deadline import Deadline
@@ -21,6 +24,10 @@ from firable.semantics.formulas import evaluate
 
 Row = tuple[list[int], list[int], list[int], list[int], list[tuple[int, bool]]]
 """A transition of the engine: inputs, outputs, permissive and inhibitive gate places, external literals."""
+Ends = tuple[bytes, bytes]
+"""How many ends each transition has, and which they are, all end to end: native unsigned numbers of 32 bits."""
+Flat = tuple[Ends, Ends, Ends, Ends, Ends]
+"""The parts of all rows, end to end; an external literal is twice the signal, and one more where it is wanted."""
 Node = tuple[int, list[int]]
 """A node of a formula of the engine: an operator, and a place or earlier nodes."""
 
@@ -30,8 +37,39 @@ ALL: Final = 2
 ANY: Final = 3
 
 
+def flat(net: Net) -> tuple[int, Flat, list[int]]:
+    """The number of places, the transitions and the marked places of a net, by index, as the engine reads them fastest.
+
+    In time linear in the arcs, and with no object for each: a row is six of them, which the interpreter has to make and
+    to look through for cycles.
+
+    >>> from firable.nets.net import Place, Transition
+    >>> net = Net("n", (Place("p", marked=True), Place("q")), (Transition("t", ("p",), ("q",)),))
+    >>> n_places, (inputs, outputs, *_), marked = flat(net)
+    >>> n_places, list(memoryview(inputs[1]).cast("I")), list(memoryview(outputs[1]).cast("I")), marked
+    (2, [0], [1], [0])
+    """
+    place, signal = net.place_index, net.signal_index
+
+    def ends(part: str) -> Ends:
+        sets = list(map(attrgetter(part), net.transitions))
+        return _uint32(map(len, sets)), _uint32(map(place.__getitem__, chain.from_iterable(sets)))
+
+    literals = [transition.external for transition in net.transitions]
+    external = (
+        _uint32(map(len, literals)),
+        _uint32(2 * signal[gate.signal] + gate.wanted for gate in chain.from_iterable(literals)),
+    )
+    transitions = (ends("inputs"), ends("outputs"), ends("permissive"), ends("inhibitive"), external)
+    return len(net.places), transitions, [i for i, of in enumerate(net.places) if of.marked]
+
+
+def _uint32(numbers: Iterable[int]) -> bytes:
+    return array("I", numbers).tobytes()
+
+
 def rows(net: Net) -> tuple[int, list[Row], list[int]]:
-    """The number of places, the transitions and the marked places of a net, by index.
+    """The same with a row for each transition, to be read or to have others added.
 
     >>> from firable.nets.net import Place, Transition
     >>> rows(Net("n", (Place("p", marked=True), Place("q")), (Transition("t", ("p",), ("q",)),)))

@@ -27,7 +27,7 @@ from time import perf_counter
 from typing import Any, Final
 
 from firable.analysis._engine import BudgetExceeded, Search, Stubborn
-from firable.analysis.compiled import engine_limits, nodes_of, rows
+from firable.analysis.compiled import engine_limits, flat, nodes_of
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.question import Known, no, yes
 from firable.analysis.spaces.reachability import REASONS
@@ -345,7 +345,7 @@ class _Runs:
         self.net = net
         self.limits = limits
         self.witnesses = Witnesses(net, Discipline.INTERLEAVING)
-        self.engine = Stubborn(*rows(net))
+        self.engine = Stubborn(*flat(net))
         self.markings = self.edges = 0
         self.began = perf_counter()
 

@@ -16,7 +16,7 @@ from time import perf_counter
 from typing import Final
 
 from firable.analysis._engine import Stubborn
-from firable.analysis.compiled import engine_limits, nodes_of, rows
+from firable.analysis.compiled import engine_limits, flat, nodes_of
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.nets.formula import Deadlock, Formula
@@ -46,7 +46,7 @@ def decide_by_walk(
     True
     """
     start, witnesses = perf_counter(), Witnesses(net, Discipline.INTERLEAVING)
-    engine = Stubborn(*rows(net))
+    engine = Stubborn(*flat(net))
     nodes = None if isinstance(goal, Deadlock) else nodes_of(net, goal)
     path, steps = engine.walk(nodes, seed=seed, max_steps=firings, **engine_limits(limits.deadline))
     cost = Cost(edges=steps, seconds=perf_counter() - start)

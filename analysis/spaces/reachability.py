@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
-from firable.analysis.compiled import engine_limits, rows
+from firable.analysis.compiled import engine_limits, flat
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.spaces.space import Derived, Witnesses
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -360,7 +360,7 @@ def _explored(
     limits = engine_limits(deadline)
     limits["max_seconds"] = min((t for t in (limits["max_seconds"], budget.seconds) if t is not None), default=None)
     return _engine.explore(
-        *rows(net),
+        *flat(net),
         step=discipline is Discipline.STEP,
         max_markings=budget.markings,
         max_memory_bytes=budget.memory_bytes,

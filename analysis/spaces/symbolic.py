@@ -23,7 +23,7 @@ from typing import Any
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, MarkingSet
-from firable.analysis.compiled import engine_limits, rows
+from firable.analysis.compiled import engine_limits, flat
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.space import Derived, Witnesses
@@ -311,7 +311,7 @@ def explore_symbolically(
     """
     limits = limits or Limits()
     diagram = _engine.explore_symbolically(
-        *rows(net),
+        *flat(net),
         max_memory_bytes=limits.memory_bytes,
         orders=None if order is None else [list(order)],
         **engine_limits(limits.deadline),

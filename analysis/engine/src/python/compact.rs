@@ -5,8 +5,9 @@ use std::time::Instant;
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
+use super::rows::Rows;
 use super::stubborn::formula;
-use super::{BudgetExceeded, Patience, Row, answered, but_ctrl_c, detached, net};
+use super::{BudgetExceeded, Patience, answered, but_ctrl_c, detached};
 use crate::budget::Stop;
 use crate::compact::{self, Hit, Outcome};
 
@@ -131,7 +132,7 @@ impl Compact {
 pub(crate) fn explore_compactly(
     py: Python<'_>,
     n_places: usize,
-    transitions: Vec<Row>,
+    transitions: Rows,
     initial: Vec<u32>,
     goals: Vec<Nodes>,
     until_met: bool,
@@ -143,7 +144,7 @@ pub(crate) fn explore_compactly(
     let begun = Instant::now();
     let patience = Patience::new(max_seconds, cancelled)?.telling(progress);
     let goals = goals.into_iter().map(|nodes| formula(nodes, n_places)).collect::<PyResult<Vec<_>>>()?;
-    let net = net(n_places, &transitions, &initial).map_err(PyValueError::new_err)?;
+    let net = transitions.net(n_places, &initial).map_err(PyValueError::new_err)?;
     let mut raised = None;
     let left = patience.time.map(|time| time.saturating_sub(begun.elapsed()));
     let found = detached(py, &patience, &mut raised, |poll| {

@@ -14,7 +14,8 @@ use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 use pyo3::types::{PyBytes, PyInt};
 
-use super::{Patience, Row, answered};
+use super::rows::Rows;
+use super::{Patience, answered};
 use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 use crate::symbolic::algebra::Binary;
@@ -315,7 +316,7 @@ impl Diagram {
 pub(crate) fn explore_symbolically(
     py: Python<'_>,
     n_places: usize,
-    transitions: Vec<Row>,
+    transitions: Rows,
     initial: Vec<u32>,
     max_memory_bytes: usize,
     max_seconds: Option<f64>,
@@ -334,14 +335,14 @@ pub(crate) fn explore_symbolically(
     if orders.as_ref().is_some_and(Vec::is_empty) {
         return Err(PyValueError::new_err("there is no order to search in"));
     }
-    let named = transitions.iter().flat_map(|(i, o, p, h, _)| [i, o, p, h]).chain([&initial]).flatten();
-    if let Some(place) = named.copied().find(|&place| place as usize >= n_places) {
+    let transitions = py.detach(|| transitions.transitions()).map_err(PyValueError::new_err)?;
+    let sets = |t: &Transition| [&t.inputs, &t.outputs, &t.permissive, &t.inhibitive].map(|set| set.last().copied());
+    let named = transitions.iter().flat_map(sets).flatten().chain(initial.iter().copied());
+    if let Some(place) = { named }.find(|&place| place as usize >= n_places) {
         return Err(PyValueError::new_err(format!("place {place} is not one of the {n_places} places")));
     }
     let n_transitions = transitions.len();
     let space = answered(py, &patience, |watch| {
-        // Each row is freed as it is read: half a million of them take as much as the diagram.
-        let transitions = transitions.into_iter().map(|(i, o, p, h, x)| Transition::new(&i, &o, &p, &h, &x)).collect();
         Symbolic::explore(n_places, transitions, initial, max_memory_bytes, orders, watch)
     })?;
     let n_nodes = space.nodes;

@@ -7,7 +7,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::graph::Graph;
-use super::{BudgetExceeded, Patience, Row, but_ctrl_c, detached, net};
+use super::rows::Rows;
+use super::{BudgetExceeded, Patience, but_ctrl_c, detached};
 use crate::explore::{Limits, Space};
 
 /// Explores the reachability graph from a marking, breadth first.
@@ -18,7 +19,7 @@ use crate::explore::{Limits, Space};
 pub(crate) fn explore(
     py: Python<'_>,
     n_places: usize,
-    transitions: Vec<Row>,
+    transitions: Rows,
     initial: Vec<u32>,
     step: bool,
     max_markings: usize,
@@ -40,7 +41,7 @@ pub(crate) fn explore(
     let mut raised = None;
     let space = detached(py, &patience, &mut raised, |poll| {
         let two = (threads == 2).then_some(free);
-        net(n_places, &transitions, &initial).map(|net| Space::explore_by(two, net, limits, poll))
+        transitions.net(n_places, &initial).map(|net| Space::explore_by(two, net, limits, poll))
     })
     .map_err(PyValueError::new_err)?;
     but_ctrl_c(py, raised)?;

@@ -10,6 +10,7 @@ pub(crate) mod components;
 pub(crate) mod diagram;
 pub(crate) mod explore;
 pub(crate) mod graph;
+pub(crate) mod rows;
 pub(crate) mod stubborn;
 
 use std::sync::Arc;
@@ -22,7 +23,6 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyInt};
 
 use crate::budget::{Found, Stop, Watch};
-use crate::net::{Net, Transition};
 
 create_exception!(
     firable.analysis._engine,
@@ -36,15 +36,6 @@ create_exception!(
     PyRuntimeError,
     "The question needs the whole reachability graph, and the exploration ended early."
 );
-
-/// A transition from Python: inputs, outputs, permissive and inhibitive gate places, external literals.
-pub(crate) type Row = (Vec<u32>, Vec<u32>, Vec<u32>, Vec<u32>, Vec<(u32, bool)>);
-
-/// Checks and compiles a net from Python.
-pub(crate) fn net(n_places: usize, transitions: &[Row], initial: &[u32]) -> Result<Net, String> {
-    let transitions = transitions.iter().map(|(i, o, p, h, x)| Transition::new(i, o, p, h, x)).collect();
-    Net::new(n_places, transitions, initial)
-}
 
 /// What ends long work early, as the arguments of a Python function name it.
 pub(crate) struct Patience {

@@ -6,7 +6,8 @@ use std::time::Instant;
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
-use super::{BudgetExceeded, Patience, Row, but_ctrl_c, detached, mask, net};
+use super::rows::Rows;
+use super::{BudgetExceeded, Patience, but_ctrl_c, detached, mask};
 use crate::budget::{Stop, Watch};
 use crate::stubborn::cover;
 use crate::stubborn::dependencies::literal;
@@ -79,8 +80,8 @@ impl Stubborn {
 #[pymethods]
 impl Stubborn {
     #[new]
-    fn new(py: Python<'_>, n_places: usize, transitions: Vec<Row>, initial: Vec<u32>) -> PyResult<Self> {
-        let net = py.detach(|| net(n_places, &transitions, &initial)).map_err(PyValueError::new_err)?;
+    fn new(py: Python<'_>, n_places: usize, transitions: Rows, initial: Vec<u32>) -> PyResult<Self> {
+        let net = py.detach(|| transitions.net(n_places, &initial)).map_err(PyValueError::new_err)?;
         Ok(Stubborn { prepared: Arc::new(Prepared::new(net)) })
     }
 

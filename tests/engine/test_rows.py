@@ -1,0 +1,82 @@
+"""The two forms in which the engine takes a net: a row for each transition, and all of them end to end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from support.dense_nets import dense_nets
+
+from firable.analysis import _engine
+from firable.analysis.compiled import flat, rows
+from firable.nets.catalogue import family_net
+from firable.nets.net import ExternalGate, Net, Place, Signal, Transition
+
+LIMITS: dict[str, Any] = {"max_markings": 10_000, "max_memory_bytes": 1 << 26, "max_seconds": None}
+NOTHING = (b"", b"")
+
+
+def graph_of(compiled: tuple[Any, Any, Any], *, step: bool) -> tuple[Any, ...]:
+    graph = _engine.explore(*compiled, step=step, **LIMITS)
+    return graph.n_markings, graph.n_edges, graph.markings_bytes(), graph.fired(), graph.contacts()
+
+
+@given(net=dense_nets(signals=True))
+def test_both_forms_are_the_same_net(net: Net) -> None:
+    for step in (False, True):
+        assert graph_of(flat(net), step=step) == graph_of(rows(net), step=step)
+
+
+def test_the_forms_agree_on_gates_and_on_what_is_wanted_of_signals() -> None:
+    gates = (ExternalGate("a"), ExternalGate("b", wanted=False))
+    net = Net(
+        "gated",
+        tuple(Place(f"p{i}", marked=i % 2 == 0) for i in range(6)),
+        (
+            Transition("never", ("p0",), ("p1",), external=(ExternalGate("a"), ExternalGate("a", wanted=False))),
+            Transition("t", ("p0",), ("p1",), ("p2",), ("p3",), gates),
+            Transition("u", ("p2",), ("p3",), inhibitive=("p0",)),
+            Transition("v", ("p4",), ("p5",), permissive=("p1", "p2"), external=(ExternalGate("b"),)),
+        ),
+        (Signal("a"), Signal("b")),
+    )
+    for step in (False, True):
+        assert graph_of(flat(net), step=step) == graph_of(rows(net), step=step)
+
+
+def test_the_diagram_and_the_search_by_stubborn_sets_take_both_forms() -> None:
+    net = family_net("philosophers-4")
+    counts = [
+        _engine.explore_symbolically(*compiled, max_memory_bytes=1 << 24).reach().count()
+        for compiled in (flat(net), rows(net))
+    ]
+    searches = [_engine.Stubborn(*compiled).deadlocks(**LIMITS).n_markings for compiled in (flat(net), rows(net))]
+    assert counts[0] == counts[1]
+    assert searches[0] == searches[1]
+
+
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        (4 * [NOTHING], "5 parts"),
+        ([(bytes(4), b""), NOTHING, NOTHING, NOTHING, NOTHING], "different numbers"),
+        ([(b"\1\0\0\0", b""), *4 * [(bytes(4), b"")]], "shorter"),
+        ([(b"\0\0\0\0", bytes(4)), *4 * [(bytes(4), b"")]], "longer"),
+    ],
+)
+def test_parts_that_do_not_fit_each_other_are_refused(parts: list[tuple[bytes, bytes]], words: str) -> None:
+    five: Any = tuple(parts)
+    with pytest.raises(ValueError, match=words):
+        _engine.explore(1, five, [], **LIMITS)
+    with pytest.raises(ValueError, match=words):
+        _engine.explore_symbolically(1, five, [], max_memory_bytes=1 << 20)
+
+
+def test_a_place_out_of_range_is_refused_in_either_form() -> None:
+    one, four = (b"\1\0\0\0", b"\7\0\0\0"), 4 * [(bytes(4), b"")]
+    five: Any = (one, *four)
+    with pytest.raises(ValueError, match="place 7"):
+        _engine.explore(3, five, [], **LIMITS)
+    with pytest.raises(ValueError, match="place 7"):
+        _engine.explore_symbolically(3, five, [], max_memory_bytes=1 << 20)
