@@ -107,7 +107,9 @@ def add_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[st
 
 def is_numbered(parts: Parts, channel: str) -> bool:
     """Whether messages of a kind carry the number of their round."""
-    return parts.variant.vote_rounds if channel in {"request", "vote"} else parts.variant.order_rounds
+    if channel in {"request", "vote"}:
+        return parts.variant.vote_rounds
+    return parts.variant.order_rounds or channel != "commit-order"
 
 
 def _forget(draft: Draft, parts: Iterable[Part], controller: str) -> None:

@@ -85,7 +85,7 @@ def _coordinator(draft: Draft, parts: Parts, t: str, group: Sequence[str], over:
 def _cleared(parts: Parts) -> list[str]:
     """The channels that are empty when a round closes, because what comes later is known to be of an older round."""
     kept = set() if parts.variant.vote_rounds else {"request", "vote"}
-    kept |= set() if parts.variant.order_rounds else {"commit-order", "abort-order"}
+    kept |= set() if parts.variant.order_rounds else {"commit-order"}
     return [channel for channel in CHANNELS if channel not in kept]
 
 

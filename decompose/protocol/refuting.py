@@ -1,0 +1,249 @@
+"""The protocols that are known to be wrong, and how they go wrong.
+
+Each leaves out one thing that an obligation of SEMANTICS demands, and is refuted by a run, told in the net's own names.
+Who changes the protocol will find his idea here, or should add it: a check that refutes none of these would have shown
+nothing by proving the true one. Each comes with the smallest net on which it fails; asked of the net of a cell, the
+answer says which obligations this cell lives on. That one "cannot go wrong here" is no licence: the next edit of the
+net may need what this one does not.
+
+A run is looked for where it is cheapest and told best: in the first markings, breadth first, where it is a shortest
+one; else on a random walk, which meets what is many steps away and is cut down to what it needs; else in a diagram of
+all markings, which also shows that there is none. Every run is replayed by the reference player on the protocol's net.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+from firable.analysis.goal import Limits
+from firable.analysis.spaces.reachability import Budget, BudgetExceeded, explore
+from firable.analysis.spaces.symbolic import explore_symbolically
+from firable.analysis.verdicts.properties import decide_property
+from firable.analysis.walk import decide_by_walk
+from firable.decompose.protocol.building import ProtocolNet, protocol_net
+from firable.decompose.protocol.draft import ASTRAY, central
+from firable.decompose.protocol.exploring import FIRST_MARKINGS
+from firable.decompose.protocol.variant import BARE, NO_FAULTS, Faults, Lock, Often, Variant
+from firable.decompose.splitting.cut import split
+from firable.nets.catalogue import catalogue_net
+from firable.nets.decomposition import Decomposition
+from firable.nets.formula import And, Formula, Holds, Or
+from firable.nets.net import Controller, Net, Place, Property, PropertyKind, Transition
+from firable.nets.verdict import Status, Verdict, Weight, Witness
+
+WALK_SECONDS_MAX: Final = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class WrongProtocol:
+    """A protocol known to be wrong: what it leaves out, against which obligation, and a net on which it fails."""
+
+    name: str
+    obligation: str
+    says: str
+    variant: Variant
+    example: str
+    faults: Faults = NO_FAULTS
+
+
+WRONG: Final = (
+    WrongProtocol(
+        "cached-votes", "O1", "a yes is kept until it is used, and promises nothing", BARE["stale_serial"], "one_robot"
+    ),
+    WrongProtocol(
+        "old-votes",
+        "O5",
+        "a yes from before the decision counts in the next round",
+        Variant(vote_rounds=False),
+        "scrap",
+    ),
+    WrongProtocol(
+        "unlocked-conflicts",
+        "O2",
+        "conflicting transitions have deciders of their own",
+        Variant(arbitrated=False),
+        "scrap",
+    ),
+    WrongProtocol(
+        "cached-gates",
+        "O3",
+        "a gate elsewhere is read from a copy, its owner takes no part",
+        Variant(gate_copies=True),
+        "doors",
+    ),
+    WrongProtocol(
+        "orders-twice", "O5", "an order that is repeated is applied again", Variant(order_rounds=False), "shuttle"
+    ),
+    WrongProtocol(
+        "missing-vote",
+        "Eq. (7)",
+        "a transition is decided though one vote is missing",
+        Variant(unanimous=False),
+        "shuttle",
+    ),
+    WrongProtocol(
+        "unlocked-reads",
+        "O1",
+        "a promise does not cover the places that a part only reads",
+        Variant(lock=Lock.WRITES),
+        "hood",
+    ),
+    WrongProtocol(
+        "forgotten-promises",
+        "O6",
+        "a promise is not in stable storage",
+        Variant(stable=False),
+        "shuttle",
+        Faults(crash=Often.ONCE),
+    ),
+    WrongProtocol(
+        "sent-once",
+        "O5",
+        "an order is sent once, and nobody acknowledges it",
+        BARE["locked"],
+        "shuttle",
+        Faults(loss=Often.ONCE),
+    ),
+)
+"""Every protocol that must be refuted."""
+
+
+@dataclass(frozen=True)
+class Refutation:
+    """What came of trying to refute a wrong protocol on one net.
+
+    `status` is VIOLATED with a `witness` where it goes wrong, PROVED where it cannot on this net. `events` tells the
+    run; `sentence` says what does not hold at its end.
+    """
+
+    wrong: WrongProtocol
+    protocol: ProtocolNet
+    status: Status
+    method: str
+    witness: Witness | None = None
+    bound: str = ""
+
+    @property
+    def events(self) -> tuple[str, ...]:
+        """The run as what happens, in the words of who watches."""
+        return () if self.witness is None else tuple(str(self.protocol.steps[t]) for (t,) in self.witness.firings)
+
+    @property
+    def sentence(self) -> str:
+        """What does not hold at the end of the run; empty without one."""
+        if self.witness is None:
+            return ""
+        marked = set(self.witness.marking)
+        if ASTRAY in marked:
+            return "something has fired that the central net cannot fire"
+        names = [place.name for place in self.protocol.parts.net.places]
+        wrong = [name for name in names if (name in marked) != (central(name) in marked)]
+        told = ", ".join(f"{name} is {'full' if name in marked else 'empty'}" for name in wrong)
+        return f"no order is on its way, and unlike in the central net {told}"
+
+    @property
+    def verdict(self) -> Verdict:
+        """As a verdict, for information: it is on another protocol than the one that runs."""
+        holds = {Status.PROVED: "cannot go wrong on this net", Status.VIOLATED: self.sentence}.get(self.status, "")
+        return Verdict(
+            f"wrong.{self.wrong.name}",
+            self.status,
+            f"the central net can follow a protocol in which {self.wrong.says} ({self.wrong.obligation})",
+            self.method,
+            Weight.INFORMATION,
+            hint=holds,
+            bound=self.bound,
+            witness=None if self.witness is None else replace(self.witness, note=self.sentence),
+        )
+
+
+def refute(wrong: WrongProtocol, net: Net | Decomposition | None = None, limits: Limits | None = None) -> Refutation:
+    """Try to refute a wrong protocol on a net, or on its own example.
+
+    Raises the errors of `split`. Cost: that of 200,000 markings, a walk of some seconds, and a diagram.
+
+    >>> found = refute(next(wrong for wrong in WRONG if wrong.name == "cached-gates"))
+    >>> print(*found.events, sep="; ")
+    guard fires open; press fires close, though in the central net guard.opened is full
+    """
+    of = example(wrong.example) if net is None else net
+    limits = limits or Limits()
+    protocol = protocol_net(split(of) if isinstance(of, Net) else of, wrong.variant, wrong.faults)
+    goal = Or((Holds(ASTRAY), And((protocol.at_rest, protocol.differs))))
+    graph = explore(protocol.net, budget=Budget(FIRST_MARKINGS, limits.memory_bytes), deadline=limits.deadline)
+    if (witness := graph.witness(graph.satisfying(goal))) is not None:
+        return Refutation(wrong, protocol, Status.VIOLATED, graph.method, witness)
+    if graph.complete:
+        return Refutation(wrong, protocol, Status.PROVED, graph.method)
+    met = decide_by_walk(protocol.net, goal, replace(limits, deadline=limits.deadline.within(WALK_SECONDS_MAX)))
+    if met.witness is not None:
+        return Refutation(wrong, protocol, Status.VIOLATED, met.method, met.witness)
+    return _in_diagram(wrong, protocol, goal, limits, graph.bound)
+
+
+def _in_diagram(wrong: WrongProtocol, protocol: ProtocolNet, goal: Formula, limits: Limits, bound: str) -> Refutation:
+    try:
+        space = explore_symbolically(protocol.net, limits, order=protocol.order)
+        verdict = decide_property(space, Property("refines", PropertyKind.NEVER, goal))
+    except BudgetExceeded as error:
+        return Refutation(wrong, protocol, Status.UNKNOWN, "decision diagram", bound=f"{bound}; {error}")
+    return Refutation(wrong, protocol, verdict.status, verdict.method, verdict.witness, verdict.bound)
+
+
+def example(name: str) -> Net:
+    """The net of an example: one of those here, or of the catalogue."""
+    return _EXAMPLES[name] if name in _EXAMPLES else catalogue_net(name)
+
+
+_ROBOT, _LATHE, _PRESS, _GUARD = Controller("robot"), Controller("lathe"), Controller("press"), Controller("guard")
+_HANDED = ("robot.free", "lathe.full")
+
+
+def _places(marked: tuple[str, ...], empty: tuple[str, ...]) -> tuple[Place, ...]:
+    return tuple(Place(name, name.partition(".")[0], name in marked) for name in (*marked, *empty))
+
+
+_EXAMPLES: Final = {
+    "shuttle": Net(
+        "shuttle",
+        _places(("robot.part", "lathe.empty"), _HANDED),
+        (
+            Transition("hand_over", ("robot.part", "lathe.empty"), _HANDED),
+            Transition("fetch", ("robot.free",), ("robot.part",)),
+            Transition("unload", ("lathe.full",), ("lathe.empty",)),
+        ),
+        controllers=(_ROBOT, _LATHE),
+        description="the robot hands a part to the lathe, and either goes on by itself",
+    ),
+    "scrap": Net(
+        "scrap",
+        _places(("robot.part", "lathe.empty"), (*_HANDED, "robot.scrapped")),
+        (
+            Transition("hand_over", ("robot.part", "lathe.empty"), _HANDED),
+            Transition("scrap", ("robot.part",), ("robot.scrapped",)),
+        ),
+        controllers=(_ROBOT, _LATHE),
+        description="the robot hands its part to the lathe, or scraps it",
+    ),
+    "hood": Net(
+        "hood",
+        _places(("robot.part", "lathe.empty", "lathe.shut"), (*_HANDED, "lathe.open")),
+        (
+            Transition("hand_over", ("robot.part", "lathe.empty"), _HANDED, inhibitive=("lathe.open",)),
+            Transition("open", ("lathe.shut",), ("lathe.open",)),
+        ),
+        controllers=(_ROBOT, _LATHE),
+        description="the robot hands its part to the lathe unless the hood is open",
+    ),
+    "doors": Net(
+        "doors",
+        _places(("press.ready", "guard.shut"), ("press.closed", "guard.opened")),
+        (
+            Transition("close", ("press.ready",), ("press.closed",), inhibitive=("guard.opened",)),
+            Transition("open", ("guard.shut",), ("guard.opened",), inhibitive=("press.closed",)),
+        ),
+        controllers=(_PRESS, _GUARD),
+        description="the press closes unless the door is open, the door opens unless the press is closed",
+    ),
+}
