@@ -51,7 +51,7 @@ def loop_report(argument: str, machines: str, allowed: Budget, loop_file: str | 
     faults = check_faults(report, model, allowed)
     files: tuple[str, ...] = ()
     if loop_file is not None:
-        write_text(loop_file, format_net(report.loop.net))
+        write_text(loop_file, format_net(report.closed.net))
         files = (loop_file,)
     figures = report.closed.figures
     return Report(

@@ -11,7 +11,7 @@ moves any more, neither cell nor machines.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Final, TypeVar
 
@@ -19,7 +19,7 @@ from firable.analysis.check import check
 from firable.analysis.question import listed
 from firable.analysis.report import CheckReport
 from firable.analysis.spaces.reachability import Budget
-from firable.nets.formula import And, Firable, Formula, Holds, Not, Or, Start
+from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or, Start
 from firable.nets.machines.laws import ACCIDENT, OVERRUN
 from firable.nets.machines.loop import ClosedLoop
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
@@ -47,9 +47,21 @@ class Family:
     note: str = ""
 
 
+def any_of(formulas: Iterable[Formula]) -> Formula:
+    """One of them holds, as a net file would say it: without a disjunction of one, or of none."""
+    some = tuple(formulas)
+    return some[0] if len(some) == 1 else Or(some) if some else Constant(value=False)
+
+
+def all_of(formulas: Iterable[Formula]) -> Formula:
+    """All of them hold, said in the same way."""
+    some = tuple(formulas)
+    return some[0] if len(some) == 1 else And(some) if some else Constant(value=True)
+
+
 def fires(loop: ClosedLoop, transition: str) -> Formula:
     """A transition of the cell may fire: one of its variants may."""
-    return Or(tuple(map(Firable, loop.variants[transition])))
+    return any_of(map(Firable, loop.variants[transition]))
 
 
 def firable_in_cell(net: Net, transition: str) -> Formula:
@@ -57,12 +69,12 @@ def firable_in_cell(net: Net, transition: str) -> Formula:
     one = net.transition(transition)
     full = (*one.inputs, *one.permissive)
     bare = (*one.outputs, *one.inhibitive)
-    return And((*map(Holds, full), *(Not(Holds(name)) for name in bare)))
+    return all_of((*map(Holds, full), *(Not(Holds(name)) for name in bare)))
 
 
 def possible(name: str, formula: Formula) -> Property:
     """From everywhere the formula can come to hold, unless the run ends in an accident."""
-    return Property(name, PropertyKind.ALWAYS_POSSIBLE, Or((formula, ENDED)))
+    return Property(name, PropertyKind.ALWAYS_POSSIBLE, any_of((formula, ENDED)))
 
 
 def never(name: str, formula: Formula) -> Property:
@@ -78,10 +90,11 @@ def in_loop(loop: ClosedLoop, formula: T) -> T:
             case Firable(transition):
                 return fires(loop, transition)
             case Fires(transition):
-                return TemporalOr(tuple(map(Fires, loop.variants[transition])))
+                some = tuple(map(Fires, loop.variants[transition]))
+                return some[0] if len(some) == 1 else TemporalOr(some) if some else Constant(value=False)
             case Start():
                 places = loop.cell.places
-                return And(tuple(Holds(p.name) if p.marked else Not(Holds(p.name)) for p in places))
+                return all_of(Holds(p.name) if p.marked else Not(Holds(p.name)) for p in places)
             case tuple():
                 return tuple(map(put, part))
         if is_dataclass(part) and not isinstance(part, type):

@@ -28,6 +28,7 @@ from firable.analysis.loop.families import (
     ENDED,
     Family,
     answers,
+    any_of,
     firable_in_cell,
     fires,
     in_loop,
@@ -38,7 +39,7 @@ from firable.analysis.report import CheckReport
 from firable.analysis.spaces.reachability import Budget
 from firable.analysis.temporal.queries import temporal_question
 from firable.analysis.verdicts.properties import statement
-from firable.nets.formula import And, Deadlock, Formula, Holds, Not, Or, format_formula
+from firable.nets.formula import And, Deadlock, Formula, Holds, Not, format_formula
 from firable.nets.machines.closing import close
 from firable.nets.machines.laws import ACCIDENT, OVERRUN
 from firable.nets.machines.loop import ClosedLoop
@@ -135,7 +136,7 @@ def _families(loop: ClosedLoop) -> Iterator[Family]:
     yield Family(
         "loop.deadlock-free",
         "from every reachable marking some transition of the cell can fire, as its machines allow",
-        {"": possible("loop.hang", Or(tuple(fires(loop, name) for name in names)))},
+        {"": possible("loop.hang", any_of(fires(loop, name) for name in names))},
         hint="the machines wait for the cell, and the cell waits for what no machine will do",
         note=_HANGS,
     )
@@ -143,7 +144,7 @@ def _families(loop: ClosedLoop) -> Iterator[Family]:
         "loop.gates-open",
         "every gate that a transition waits for can still open",
         {
-            name: possible(f"loop.gate.{i}", Or((fires(loop, name), Not(firable_in_cell(loop.cell, name)))))
+            name: possible(f"loop.gate.{i}", any_of((fires(loop, name), Not(firable_in_cell(loop.cell, name)))))
             for i, name in enumerate(gated)
         },
         hint="no machine will ever make the signal what the gate wants: check which command or sensor is to drive it",
@@ -169,7 +170,7 @@ def _family_of(loop: ClosedLoop, of: Property | TemporalProperty) -> Family:
     if isinstance(of, TemporalProperty):
         put = replace(of, name=name, formula=in_loop(loop, of.formula))
     elif of.kind is PropertyKind.NEVER and of.formula == Deadlock():
-        put = possible(name, Or(tuple(fires(loop, t.name) for t in loop.cell.transitions)))
+        put = possible(name, any_of(fires(loop, t.name) for t in loop.cell.transitions))
         note = _HANGS
     else:
         then = None if of.then is None else in_loop(loop, of.then)

@@ -60,6 +60,9 @@ def test_the_loop_is_written_as_a_net_that_is_checked_like_any_other(
     assert main(["check", str(path), "--query", "AG not (plant.accident or plant.overrun)"]) == 1
     told = capsys.readouterr().out
     assert "746 markings, 1,976 edges" in told
+    # The questions stand in it as properties, so that evidence of the answers can be had and checked.
+    assert "✓ proved    property.loop.accident" in told
+    assert "✓ proved    property.cell.restart" in told
     assert "✓ proved    query.query-1" in told
 
 
