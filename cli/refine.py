@@ -59,8 +59,8 @@ def refine(
     """Open every place of NET that names a registered task to the steps of that task.
 
     Each task is checked alone, with nothing around it: that it always can end, leaves nothing behind and has no
-    contact. What is proved of NET then holds of the detailed net too, which is not explored for it; a task that keeps
-    not to the conditions is refused with a firing sequence in its own names.
+    contact. What is proved of NET then holds of the detailed net too, which is not explored for it. A task that violates
+    a condition is refused, with a firing sequence in its own names.
     """
     if output == "-":
         raise click.UsageError("the net cannot go to standard output, where the report goes: name a file")
@@ -198,6 +198,8 @@ def show_conditions(verdicts: Sequence[Verdict]) -> set[str]:
         required = [verdict for verdict in some if verdict.weight.value == "required"]
         symbol, colour = ("✓", "green") if all(verdict.holds for verdict in required) else ("✗", "red")
         words = ", ".join(verdict.name.partition(".")[2] for verdict in proved)
+        if missing := [verdict.name.partition(".")[2] for verdict in some if not verdict.holds]:
+            words += f"{'; ' if words else ''}not {', '.join(missing)}"
         click.echo(f"  {click.style(symbol, fg=colour)} {subject:<{width}}  {words}")
         told |= {verdict.name for verdict in some if verdict.holds or verdict.weight.value == "information"}
     return told

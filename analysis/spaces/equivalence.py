@@ -61,8 +61,8 @@ def isomorphic(a: ReachabilityGraph, b: ReachabilityGraph) -> bool:
 
 
 def _labelled(graph: ReachabilityGraph, index: int) -> dict[Label, int]:
-    names = [transition.name for transition in graph.net.transitions]
-    return {frozenset(names[t] for t in fired): target for fired, target in graph.successors(index)}
+    transitions = graph.net.transitions
+    return {frozenset(transitions[t].name for t in fired): target for fired, target in graph.successors(index)}
 
 
 def weakly_bisimilar(

@@ -127,7 +127,6 @@ def _problems_at_place(net: Net, place: Place, use: TaskUse, catalogue: Catalogu
             "a subtask must be a task that does not come back", (*subject, "name"),
         )  # fmt: skip
         return
-    known = [name for name in net.place_index if net.place(name).resource]
     yield from _arguments(use, task, where, subject)
     taken: dict[str, str] = {}
     for role in task.roles:
@@ -137,7 +136,7 @@ def _problems_at_place(net: Net, place: Place, use: TaskUse, catalogue: Catalogu
         full = resource_of(net, place, name)
         at: Subject = (*subject, role.name)
         if full is None:
-            close = did_you_mean(name, [one.rpartition(".")[2] for one in known])
+            close = did_you_mean(name, [one.name.rpartition(".")[2] for one in net.places if one.resource])
             yield Diagnostic(
                 "F4011", f"'{name}', in the role '{role.name}' {where}, opens to no resource",
                 f"{close}Name a place that says `opens: {{to: CONTROLLER.PLACE, machine: NAME}}`.", at,

@@ -141,7 +141,8 @@ class _Naming:
         """The name of each transition, and the numbers of those that get one."""
         transitions = self.opened.transitions
         rows = [key for key in self.flow if len(self.participants(transitions[key])) > 1]
-        local = [key for key in self.flow if key not in {*rows}]
+        coordinated = frozenset(rows)
+        local = [key for key in self.flow if key not in coordinated]
         kept = {key for key in local if not transitions[key].path}
         free = (name for name in (f"G{n}" for n in count(1)) if name not in kept)
         titles = {key: next(free) for key in rows}

@@ -91,6 +91,8 @@ class _Opening:
         self.moves: dict[str, list[str]] = {}
         self.bound: dict[str, Binding] = {}
         self.released = set[str]()
+        self.starting: dict[str, list[OpenTransition]] = {}
+        self.ending: dict[str, list[OpenTransition]] = {}
         for place in net.places:
             local = place.name if place.owner is None else place.name.removeprefix(f"{place.owner}.")
             owner, full = place.owner, place.name
@@ -103,11 +105,11 @@ class _Opening:
             )  # fmt: skip
         for t in net.transitions:
             gates = [(net.signal(gate.signal), gate.wanted) for gate in t.external]
-            self.transitions[t.name] = OpenTransition(
+            self.add(OpenTransition(
                 t.name, t.name, list(t.inputs), list(t.outputs), list(t.permissive), list(t.inhibitive),
                 [(signal.owner, _local(signal.name, signal.owner) or "", wanted) for signal, wanted in gates],
                 t.number, t.description,
-            )  # fmt: skip
+            ))  # fmt: skip
 
     def opened(self, bound: Mapping[str, Binding]) -> Opened:
         todo = deque(bound.items())
@@ -123,23 +125,22 @@ class _Opening:
         self.bound[path] = binding
         early = {binding.resources[role] for role in task.released - {*task.start.releases}}
         self.released |= {binding.resources[role] for role in task.released}
-        for t in self.transitions.values():
-            if path in t.outputs:
-                t.starts.append(path)
-                t.outputs[:] = [one for one in t.outputs if one not in early]
-                t.outputs += [f"{path}/{step}" for step in task.start.targets]
-                t.external += self.gates(binding, task.start)
-                t.words.append(binding.text(task.start.description))
-            if path in t.inputs:
-                t.inputs += [f"{path}/{step}" for step in task.end.sources]
-                t.external += self.gates(binding, task.end)
-                t.words.insert(0, binding.text(task.end.description))
+        for t in self.starting.get(path, ()):
+            t.starts.append(path)
+            t.outputs[:] = [one for one in t.outputs if one not in early]
+            self.lead(t, into=[f"{path}/{step}" for step in task.start.targets])
+            t.external += self.gates(binding, task.start)
+            t.words.append(binding.text(task.start.description))
+        for t in self.ending.get(path, ()):
+            self.lead(t, out_of=[f"{path}/{step}" for step in task.end.sources])
+            t.external += self.gates(binding, task.end)
+            t.words.insert(0, binding.text(task.end.description))
         self.steps(path, binding)
         self.moves[path] = []
         for move in task.moves:
             key = f"{path}/{move.name}"
             self.moves[path].append(key)
-            self.transitions[key] = OpenTransition(
+            t = OpenTransition(
                 key,
                 move.name,
                 [f"{path}/{step}" for step in move.sources],
@@ -150,7 +151,23 @@ class _Opening:
                 description=binding.text(move.description),
                 path=path,
             )
+            self.add(t)
         return {f"{path}/{subtask.name}": binding.within(subtask, self.catalogue) for subtask in task.subtasks}
+
+    def add(self, t: OpenTransition) -> None:
+        self.transitions[t.key] = t
+        inputs, outputs = t.inputs, t.outputs
+        t.inputs, t.outputs = [], []
+        self.lead(t, outputs, inputs)
+
+    def lead(self, t: OpenTransition, into: Sequence[str] = (), out_of: Sequence[str] = ()) -> None:
+        """Give a transition more arcs, and remember what it may start and end."""
+        t.outputs += into
+        t.inputs += out_of
+        for place in into:
+            self.starting.setdefault(place, []).append(t)
+        for place in out_of:
+            self.ending.setdefault(place, []).append(t)
 
     def steps(self, path: str, binding: Binding) -> None:
         for name, (role, step) in binding.task.steps.items():

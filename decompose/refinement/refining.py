@@ -102,7 +102,7 @@ def refine(net: Net, catalogue: Catalogue, cell: str = "") -> Refinement:
         detailed,
         {place.name: found.places[place.name] for place in net.places},
         {t.name: found.transitions[t.name] for t in net.transitions},
-        {place: tuple(found.transitions[key] for key in _moves_under(opened, place)) for place in bound},
+        {place: tuple(found.transitions[key] for key in keys) for place, keys in _moves_under(opened).items()},
         {place: tuple(found.places[key] for key in opened.lasts[place]) for place in bound},
         opened.released,
     )
@@ -161,9 +161,12 @@ def _closed_gates(net: Net, opened: Opened, found: Named) -> Iterator[Diagnostic
             )  # fmt: skip
 
 
-def _moves_under(opened: Opened, place: str) -> Sequence[str]:
-    """The keys of the moves of a task and of its subtasks."""
-    return [key for path, keys in opened.moves.items() if path.partition("/")[0] == place for key in keys]
+def _moves_under(opened: Opened) -> Mapping[str, Sequence[str]]:
+    """The keys of the moves of each task that the net names, with those of its subtasks."""
+    found: dict[str, list[str]] = {}
+    for path, keys in opened.moves.items():
+        found.setdefault(path.partition("/")[0], []).extend(keys)
+    return found
 
 
 def _without_misfits(net: Net) -> tuple[Net, list[Diagnostic]]:

@@ -24,7 +24,7 @@ from firable.nets.net import (
     TaskUse,
     Transition,
 )
-from firable.nets.tasks.model import Catalogue, Gate, Move, Role, Step, Task
+from firable.nets.tasks.model import Catalogue, Gate, Move, Role, Step, Subtask, Task
 
 
 def random_task(draw: random.Random, name: str, spoil: float = 0.3) -> Task:
@@ -72,6 +72,37 @@ def random_task(draw: random.Random, name: str, spoil: float = 0.3) -> Task:
         Move("end", tuple(chains[role][-1] for role in kept), ()),
         tuple(moves),
     )
+
+
+def nested(draw: random.Random, task: Task, catalogue: Catalogue) -> Task:
+    """The task with a subtask put into one of its moves, if one of the catalogue fits the roles that move there."""
+    moves = [move for move in task.moves if not {*move.sources, *move.targets} & {one.name for one in task.subtasks}]
+    draw.shuffle(moves)
+    for move in moves:
+        movers = {one.partition(".")[0] for one in move.sources}
+        fitting = [
+            inner
+            for inner in catalogue.values()
+            if len(inner.roles) == len(movers) == len(move.sources) and len(inner.released) == len(move.releases)
+        ]
+        if not fitting:
+            continue
+        inner = draw.choice(fitting)
+        kept = sorted(movers - {*move.releases})
+        draw.shuffle(kept)
+        arguments = {
+            **dict(zip(inner.kept, kept, strict=True)),
+            **dict(zip(sorted(inner.released), move.releases, strict=True)),
+        }
+        name = f"sub{len(task.subtasks)}"
+        into = replace(move, targets=(name,), external=())
+        out_of = Move(f"{move.name}_", (name,), move.targets, external=move.external)
+        return replace(
+            task,
+            subtasks=(*task.subtasks, Subtask(name, TaskUse(inner.name, tuple(arguments.items())))),
+            moves=(*(one for one in task.moves if one is not move), into, out_of),
+        )
+    return task
 
 
 def _step(name: str) -> Step:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from support.examples import examples
-from support.random_tasks import random_conceptual, random_task
+from support.random_tasks import nested, random_conceptual, random_task
 
 import firable.decompose.refinement.confirming
 from firable.analysis import Budget, branching_bisimilar, explore, report_on, weakly_bisimilar
@@ -23,7 +23,7 @@ from firable.decompose.refinement.opening import open_tasks
 from firable.decompose.refinement.refining import Refinement, refine
 from firable.nets import Net, Status, Verdict, catalogue_net, parse_net
 from firable.nets.catalogue import catalogue_tasks
-from firable.nets.tasks.model import Catalogue
+from firable.nets.tasks.model import Catalogue, Task
 from firable.nets.tasks.text import parse_tasks
 from firable.semantics.player import Player
 
@@ -39,9 +39,15 @@ def alike(net: Net, detailed: Net, names: dict[str, str], *, divergence: bool) -
 
 
 def random_tasks(draw: random.Random) -> Catalogue:
-    """Up to three random tasks that are sound."""
-    tasks = (random_task(draw, f"task{i}") for i in range(3))
-    return {task.name: task for task in tasks if not list(task_problems(task, {})) and prove_block(task).sound}
+    """Up to four random tasks that are sound, some of which hold earlier ones."""
+    tasks: dict[str, Task] = {}
+    for i in range(4):
+        task = random_task(draw, f"task{i}")
+        for _ in range(draw.randint(0, 2)):
+            task = nested(draw, task, tasks)
+        if not list(task_problems(task, tasks)) and prove_block(task).sound:
+            tasks[task.name] = task
+    return tasks
 
 
 @examples(40)
