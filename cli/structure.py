@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from firable.analysis.deadline import Deadline
-    from firable.analysis.structure.invariants import Invariants
+    from firable.analysis.structure.invariants import Invariant, Invariants
     from firable.nets.net import Net
 
 T = TypeVar("T")
@@ -26,13 +26,15 @@ def structure_json(
     """Net class, invariants, siphons and traps as JSON data; `contact_free` is what is known of that verdict.
 
     The `discipline` is the one under which deadlock is spoken of.
-    Where it is not known, invariants may prove it. All together take `seconds`, by default 30, each a fair part of what
-    is left. Where that is too short, or at Ctrl-C, `ended_early` says so and the lists not finished are not `complete`.
+    Where it is not known, invariants may prove it. The minimal invariants may be too many to list; a basis of all, with
+    integer weights of either sign, is looked for first and stands beside them. All together take `seconds`, by default
+    30, each a fair part of what is left. Where that is too short, or at Ctrl-C, `ended_early` says so and the lists not
+    finished are not `complete`.
     """
     from firable.analysis.deadline import Deadline
     from firable.analysis.structure.commoner import DeadlockTrap, deadlock_trap
     from firable.analysis.structure.contact import contact_proof
-    from firable.analysis.structure.invariants import Invariants, p_invariants, t_invariants
+    from firable.analysis.structure.invariants import Invariants, p_basis, p_invariants, t_basis, t_invariants
     from firable.analysis.structure.net_class import net_class
     from firable.analysis.structure.siphons import PlaceSets, minimal_traps
     from firable.semantics.trace import Discipline
@@ -59,8 +61,9 @@ def structure_json(
     contact_free = found(proved_contact_free, contact_free)
     kind = net_class(net, contact_free=contact_free)
     no_vectors, no_sets = Invariants((), None, complete=False), PlaceSets((), complete=False)
-    of_places = found(lambda until: p_invariants(net, deadline=until), no_vectors)
-    of_transitions = found(lambda until: t_invariants(net, deadline=until), no_vectors)
+    none: tuple[tuple[Invariant, ...] | None, Invariants] = (None, no_vectors)
+    of_places = found(lambda until: (p_basis(net, deadline=_half(until)), p_invariants(net, deadline=until)), none)
+    of_transitions = found(lambda until: (t_basis(net, deadline=_half(until)), t_invariants(net, deadline=until)), none)
     siphons = found(
         lambda until: deadlock_trap(net, contact_free=contact_free, discipline=Discipline(discipline), deadline=until),
         DeadlockTrap(None, no_sets, (), ()),
@@ -72,8 +75,8 @@ def structure_json(
         "connected": kind.connected,
         "strongly_connected": kind.strongly_connected,
         "outside_of_its_theorems": list(kind.outside),
-        "p_invariants": _invariants(of_places, [place.name for place in net.places]),
-        "t_invariants": _invariants(of_transitions, [transition.name for transition in net.transitions]),
+        "p_invariants": _invariants(*of_places, [place.name for place in net.places]),
+        "t_invariants": _invariants(*of_transitions, [transition.name for transition in net.transitions]),
         "siphons": {"minimal": [list(s) for s in siphons.siphons.minimal], "complete": siphons.siphons.complete},
         "traps": {"minimal": [list(trap) for trap in traps.minimal], "complete": traps.complete},
         "siphons_without_marked_trap": [list(siphon) for siphon in siphons.without_marked_trap],
@@ -82,8 +85,13 @@ def structure_json(
     }
 
 
-def _invariants(found: Invariants, names: Sequence[str]) -> dict[str, Any]:
+def _half(deadline: Deadline) -> Deadline:
+    return deadline.within((deadline.left_seconds or 0.0) / 2)
+
+
+def _invariants(basis: Sequence[Invariant] | None, found: Invariants, names: Sequence[str]) -> dict[str, Any]:
     return {
+        "basis": None if basis is None else [dict(invariant.weights) for invariant in basis],
         "minimal": [dict(invariant.weights) for invariant in found.minimal],
         "dimension": found.dimension,
         "complete": found.complete,
@@ -96,6 +104,8 @@ _ENDED_EARLY = {"time": "the time for the structure is over", "interrupted": "in
 
 def structure_lines(structure: Mapping[str, Any]) -> Iterator[str]:
     """The same for a person, from the JSON data."""
+    from firable.analysis.structure.invariants import Invariant
+
     yield f"class         {structure['net_class']}"
     for reason in structure["outside_of_its_theorems"]:
         yield f"              outside of its theorems: {reason}"
@@ -108,6 +118,9 @@ def structure_lines(structure: Mapping[str, Any]) -> Iterator[str]:
         found = structure[key]
         dimension = "" if found["dimension"] is None else f", dimension {found['dimension']}"
         yield f"{words}  {_count(found)}{dimension}{_cover(found, of)}"
+        if found["basis"] and not found["complete"]:
+            shortest = Invariant(tuple(min(found["basis"], key=len).items()))
+            yield f"              a basis of all is known: {len(found['basis'])} in integers, as {shortest}"
     siphons, bare = structure["siphons"], structure["siphons_without_marked_trap"]
     held = ""
     if bare:

@@ -87,6 +87,49 @@ def test_a_list_that_takes_long_leaves_time_to_the_others(monkeypatch: pytest.Mo
     monkeypatch.setattr("firable.analysis.structure.invariants.t_invariants", gives_up)
     found = structure_json(catalogue_net("one_robot"), contact_free=True, seconds=1e6)
     assert 2.0e5 < given[0] <= 2.5e5 < given[1] <= 3.4e5  # a quarter, and a third of what was hardly used
-    assert found["p_invariants"] == {"minimal": [], "dimension": None, "complete": False, "uncovered": ANY}
+    assert found["p_invariants"] == {
+        "basis": ANY,
+        "minimal": [],
+        "dimension": None,
+        "complete": False,
+        "uncovered": ANY,
+    }
     assert found["siphons"]["complete"]
     assert found["ended_early"] == ""
+
+
+def test_where_the_minimal_invariants_are_too_many_a_basis_stands_in_for_them(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def gives_up(net: Net, *, deadline: Deadline) -> Invariants:
+        return Invariants((), None, complete=False)
+
+    net = catalogue_net("one_robot")
+    monkeypatch.setattr("firable.analysis.structure.invariants.p_invariants", gives_up)
+    found = report_of(capsys)["figures"]["structure"]["p_invariants"]
+    assert len(found["basis"]) == 14
+    changes = [
+        sum(weights.get(name, 0) for name in transition.outputs)
+        - sum(weights.get(name, 0) for name in transition.inputs)
+        for weights in found["basis"]
+        for transition in net.transitions
+    ]
+    assert not any(changes)
+    main(["check", "catalogue:one_robot", "--structure"])
+    told = capsys.readouterr().out
+    assert "P-invariants  0 minimal so far\n                a basis of all is known: 14 in integers, as " in told
+    assert told.count("a basis of all") == 1  # the T-invariants are all listed
+
+
+def test_a_basis_that_takes_long_leaves_half_of_the_time_to_the_minimal_invariants(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given: list[float] = []
+
+    def gives_up(net: Net, *, deadline: Deadline) -> None:
+        given.append(deadline.left_seconds or 0.0)
+
+    monkeypatch.setattr("firable.analysis.structure.invariants.p_basis", gives_up)
+    found = structure_json(catalogue_net("one_robot"), contact_free=True, seconds=1e6)
+    assert 1.0e5 < given[0] <= 1.25e5
+    assert (found["p_invariants"]["basis"], len(found["p_invariants"]["minimal"])) == (None, 68)
