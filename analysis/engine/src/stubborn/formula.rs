@@ -111,6 +111,14 @@ impl Formula {
         if self.price[self.price.len() - 1] >= never {
             return false;
         }
+        let price = std::mem::take(&mut self.price);
+        self.chosen(into, |any| any.iter().copied().min_by_key(|&o| (price[o as usize], random.below(1 << 16))));
+        self.price = price;
+        true
+    }
+
+    /// The literals below the formula, where one operand is chosen of each disjunction.
+    fn chosen(&mut self, into: &mut Vec<Literal>, mut choose: impl FnMut(&[u32]) -> Option<u32>) {
         self.todo.push(self.nodes.len() as u32 - 1);
         let mut next = 0;
         while let Some(&node) = self.todo.get(next) {
@@ -121,14 +129,10 @@ impl Formula {
             match &self.nodes[node as usize] {
                 Node::Literal(l) => into.push(*l),
                 Node::All(operands) => self.todo.extend(operands),
-                Node::Any(operands) => {
-                    let cheapest = operands.iter().min_by_key(|&&o| (self.price[o as usize], random.below(1 << 16)));
-                    self.todo.extend(cheapest);
-                }
+                Node::Any(operands) => self.todo.extend(choose(operands)),
             }
         }
         self.todo.drain(..).for_each(|node| self.seen[node as usize] = false);
-        true
     }
 
     /// Literals that are true at a marking which satisfies the formula, and enough to make it true.
@@ -137,20 +141,9 @@ impl Formula {
         if !self.holds(marking) {
             return;
         }
-        self.todo.push(self.nodes.len() as u32 - 1);
-        let mut next = 0;
-        while let Some(&node) = self.todo.get(next) {
-            next += 1;
-            if std::mem::replace(&mut self.seen[node as usize], true) {
-                continue;
-            }
-            match &self.nodes[node as usize] {
-                Node::Literal(l) => into.push(*l),
-                Node::All(operands) => self.todo.extend(operands),
-                Node::Any(operands) => self.todo.extend(operands.iter().find(|&&o| self.truth[o as usize])),
-            }
-        }
-        self.todo.drain(..).for_each(|node| self.seen[node as usize] = false);
+        let truth = std::mem::take(&mut self.truth);
+        self.chosen(into, |any| any.iter().copied().find(|&o| truth[o as usize]));
+        self.truth = truth;
     }
 
     /// What the makers of a false literal cost, for the choice among false operands of conjunctions; after `holds`, of
