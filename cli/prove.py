@@ -71,13 +71,16 @@ def _report(argument: str, smt_dir: str | None, timeout: float, machines: str | 
     with loaded.placing():
         decomposition = split(loaded.net)
     found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)))
-    verdicts, loop = found.verdicts, None
+    verdicts, loop, evidence = found.verdicts, None, dict[str, str | bytes](found.files)
     if machines is not None:
-        from firable.decompose.proofs.persisting import distributed_loop, persistence
+        from firable.decompose.proofs.held_gates import distributed_loop, held_gates
 
         loop = distributed_loop(loaded.net, read_machines(machines))
-        verdicts += persistence(decomposition, loop)
-    files = write_folder(smt_dir, found.files) if smt_dir is not None else ()
+        held = held_gates(decomposition, loop)
+        verdicts += held.verdicts
+        if smt_dir is not None:
+            evidence |= held.evidence()
+    files = write_folder(smt_dir, evidence) if smt_dir is not None else ()
     return Report(
         "prove",
         argument,
@@ -119,7 +122,10 @@ def _show(report: Report) -> None:
     if report.files:
         from pathlib import Path
 
-        click.echo(f"  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
+        documents = [file for file in report.files if ".evidence.json" in file]
+        click.echo(f"  {len(report.files) - len(documents)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
+        for file in documents:
+            click.echo(f"  evidence: firable verify {file}")
 
 
 def _show_assumptions(report: Report) -> None:

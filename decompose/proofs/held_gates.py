@@ -22,13 +22,15 @@ is needed from the moment its own part is firable, and the others may take long.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from firable.analysis.loop.families import ENDED, Family, answers, never
+from firable.analysis.goal import Limits
+from firable.analysis.loop.families import ENDED, Family, all_of, answers, any_of, never
+from firable.analysis.report import CheckReport
 from firable.analysis.spaces.reachability import Budget
 from firable.decompose.proofs.assumptions import Assumption, assumptions
 from firable.nets.decomposition import Coordinated, Decomposition
-from firable.nets.formula import And, Firable, Formula, Holds, Not, Or
+from firable.nets.formula import And, Firable, Formula, Holds, Not
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Sending
 from firable.nets.machines.plant_file import PlantModel
@@ -38,6 +40,7 @@ from firable.semantics.player import Player
 
 COMPLETIONS = "o4.completions"
 COMMANDS = "o4.commands"
+EVIDENCE = "o4.evidence.json"
 _HINT = "put the interlock into the machine's own controller, or make the signal one that a command clears"
 
 
@@ -51,7 +54,23 @@ def distributed_loop(net: Net, model: PlantModel) -> ClosedLoop:
     return close(net, model, sending=Sending.LATE)
 
 
-def persistence(decomposition: Decomposition, loop: ClosedLoop, budget: Budget | None = None) -> tuple[Verdict, ...]:
+@dataclass(frozen=True)
+class HeldGates:
+    """The verdicts on the gates, and what was found of the loop with the same questions as its properties."""
+
+    verdicts: tuple[Verdict, ...]
+    asked: CheckReport
+
+    def evidence(self, limits: Limits | None = None) -> dict[str, bytes]:
+        """The document of evidence on the questions, for `firable verify`, by the name of its file."""
+        from firable.analysis.evidence.producing.producer import evidence_of_report
+
+        questions = tuple(verdict for verdict in self.asked.verdicts if verdict.name.startswith("property."))
+        data = evidence_of_report(replace(self.asked, verdicts=questions), (), limits).to_bytes()
+        return {EVIDENCE if data.startswith(b"{") else f"{EVIDENCE}.gz": data}
+
+
+def held_gates(decomposition: Decomposition, loop: ClosedLoop, budget: Budget | None = None) -> HeldGates:
     """The verdict on each assumption O4 in a loop of the net, on the gates of completions, and on late commands.
 
     Runs are those of the loop; `distributed_loop` makes the one that is meant.
@@ -88,9 +107,10 @@ def persistence(decomposition: Decomposition, loop: ClosedLoop, budget: Budget |
             hint="let a completion of the one machine gate the command to the other",
         )
     )
-    verdicts = answers(loop, families, budget)[0]
+    verdicts, report = answers(loop, families, budget)
     every = [(one,) for one in assumptions(decomposition)] + [tuple(completions), ()]
-    return tuple(_shown(loop, decomposition, verdict, ones) for verdict, ones in zip(verdicts, every, strict=True))
+    shown = (_shown(loop, decomposition, verdict, ones) for verdict, ones in zip(verdicts, every, strict=True))
+    return HeldGates(tuple(shown), report)
 
 
 def _part(decomposition: Decomposition, row: Coordinated, controller: str | None) -> Transition:
@@ -106,7 +126,7 @@ def _vote(loop: ClosedLoop, part: Transition, one: Assumption) -> Formula:
     open_ = Holds(place) if means == one.wanted else Not(Holds(place))
     read = (*part.inputs, *part.permissive)
     bare = (*part.outputs, *part.inhibitive, *(loop.unsent[name] for name in read if name in loop.unsent))
-    return And((*map(Holds, read), *(Not(Holds(name)) for name in bare), open_, Not(ENDED)))
+    return all_of((*map(Holds, read), *(Not(Holds(name)) for name in bare), open_, Not(ENDED)))
 
 
 def _closing(loop: ClosedLoop, part: Transition, one: Assumption) -> Iterator[str]:
@@ -128,7 +148,7 @@ def _closing(loop: ClosedLoop, part: Transition, one: Assumption) -> Iterator[st
 
 def _closed_after_vote(loop: ClosedLoop, decomposition: Decomposition, row: Coordinated, one: Assumption) -> Formula:
     part = _part(decomposition, row, decomposition.net.signal(one.signal).owner)
-    return And((_vote(loop, part, one), Or(tuple(map(Firable, _closing(loop, part, one))))))
+    return And((_vote(loop, part, one), any_of(map(Firable, _closing(loop, part, one)))))
 
 
 def _shown(loop: ClosedLoop, decomposition: Decomposition, verdict: Verdict, ones: tuple[Assumption, ...]) -> Verdict:

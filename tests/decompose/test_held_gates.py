@@ -5,9 +5,11 @@ from __future__ import annotations
 import pytest
 from support.bench_cell import bench
 
+from firable.analysis.evidence.checking.checker import check_document
+from firable.analysis.evidence.document import document_from_text
 from firable.analysis.loop.verdicts import check_loop
 from firable.decompose.proofs.assumptions import assumptions
-from firable.decompose.proofs.persisting import COMMANDS, COMPLETIONS, distributed_loop, name_of, persistence
+from firable.decompose.proofs.held_gates import COMMANDS, COMPLETIONS, distributed_loop, held_gates, name_of
 from firable.decompose.splitting.cut import split
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.machines.plant_file import PlantModel, parse_plant
@@ -28,7 +30,7 @@ def plant_with(old: str, new: str) -> PlantModel:
 @pytest.mark.parametrize("cell", CELLS)
 def test_the_machines_of_the_catalogue_keep_every_assumption(cell: str) -> None:
     decomposition = split(catalogue_net(cell))
-    verdicts = persistence(decomposition, distributed_loop(decomposition.net, catalogue_plant(cell)))
+    verdicts = held_gates(decomposition, distributed_loop(decomposition.net, catalogue_plant(cell))).verdicts
     assert [verdict.name for verdict in verdicts] == [*map(name_of, assumptions(decomposition)), COMPLETIONS, COMMANDS]
     assert all(verdict.holds for verdict in verdicts)
 
@@ -45,7 +47,7 @@ def test_a_sensor_that_is_not_exact_breaks_its_assumption(
 ) -> None:
     plant = plant_with(old, new)
     net = catalogue_net("one_robot")
-    verdicts = {verdict.name: verdict for verdict in persistence(split(net), distributed_loop(net, plant))}
+    verdicts = {verdict.name: verdict for verdict in held_gates(split(net), distributed_loop(net, plant)).verdicts}
     broken = verdicts.pop(name)
     assert broken.status is Status.VIOLATED
     assert "interlock" in broken.hint
@@ -77,7 +79,7 @@ def test_a_gate_that_another_machine_closes_is_found() -> None:
         "robot.touch:            {holding: R}", "robot.touch: {holding: R}\n  mc.entry_taken: {occupied: cv1_entry}"
     )
     net = parse_net(wrong)
-    verdicts = {verdict.name: verdict for verdict in persistence(split(net), distributed_loop(net, plant))}
+    verdicts = {verdict.name: verdict for verdict in held_gates(split(net), distributed_loop(net, plant)).verdicts}
     taken = verdicts["o4.G6.mc.entry_taken"]
     assert taken.status is Status.VIOLATED
     assert taken.witness is not None
@@ -110,9 +112,21 @@ transitions:
 def test_a_command_that_overtakes_that_of_another_controller_is_found_though_at_one_instant_all_is_well() -> None:
     net = parse_net(TWO_COMMAND_ONE_BELT)
     assert check_loop(net, bench()).verdict("loop.busy-machines").holds
-    late = {verdict.name: verdict for verdict in persistence(split(net), distributed_loop(net, bench()))}[COMMANDS]
+    late = {verdict.name: verdict for verdict in held_gates(split(net), distributed_loop(net, bench())).verdicts}[
+        COMMANDS
+    ]
     assert late.status is Status.VIOLATED
     assert late.witness is not None
     assert late.witness.note == "B is given WAIT while it is at another command"
     assert ("hand_over",) in late.witness.firings
     assert ("sent/c.stops/stops-c.runs",) not in late.witness.firings
+
+
+def test_the_verdicts_leave_evidence_that_the_checker_confirms() -> None:
+    net = catalogue_net("one_robot")
+    held = held_gates(split(net), distributed_loop(net, catalogue_plant("one_robot")))
+    (text,) = held.evidence().values()
+    checked = list(check_document(document_from_text(text.decode())))
+    asked = ["o4.G1.conveyor.part_at_entry", "o4.G4.mc.part_present", "o4.completion.0"]
+    assert [one.record.name for one in checked][:3] == [f"property.{name}" for name in asked]
+    assert all(one.shown and one.record.proved and not one.only_claimed for one in checked)
