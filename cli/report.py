@@ -109,6 +109,7 @@ def _row_to_json(row: Coordinated) -> dict[str, Any]:
         "name": row.name,
         "parts": [{"controller": part.controller, "name": part.name} for part in row.parts],
         "description": row.description,
+        **({} if row.at is None else {"at": row.at}),
     }
 
 

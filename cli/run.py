@@ -14,6 +14,8 @@ from firable.cli.report import Report
 if TYPE_CHECKING:
     from firable.executor import RunReport
     from firable.nets.bundle import Bundle
+    from firable.nets.diagnostics import Diagnostic
+    from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
 _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
@@ -81,10 +83,30 @@ def run(
             loaded.net,
             _verdicts(report, workpieces, seed),
             files=(trace,) if trace else (),
+            notes=_notes(loaded.net),
             run={**report.to_json(), "workpieces": workpieces, "seed": seed},
         )
 
     return answer("run", format_, make, _show)
+
+
+def _notes(net: Net) -> tuple[Diagnostic, ...]:
+    """What a person should know of how the net is run: by one coordinator, whatever its layers.
+
+    That is right: with one decider for each conflict, and the votes of all parts, it decides what the layers would.
+    """
+    from firable.nets.diagnostics import Diagnostic, Severity
+    from firable.nets.layers import Layers
+
+    layers = Layers(net)
+    if not layers.several:
+        return ()
+    below = [name for name in layers.coordinators() if name != layers.root]
+    message = (
+        f"nothing is decided by {', '.join(below)} in this run: one coordinator, {layers.root}, decides everything"
+    )
+    hint = "what is decided is the same (O8); that a cell goes on alone while the line is down is not to be seen here"
+    return (Diagnostic("F5006", message, hint, severity=Severity.WARNING),)
 
 
 def _plant_file(bundle: Bundle, argument: str | None) -> Path:
@@ -147,6 +169,8 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
 
 
 def _show(report: Report) -> None:
+    for note in report.notes:
+        text.show_diagnostic(note)
     text.heading(report.net, report.input)
     done = report.run
     click.echo(

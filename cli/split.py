@@ -177,7 +177,7 @@ def _show(report: Report) -> None:
         click.echo("  no transition has more than one participant")
     for title, lines in (
         ("proposed owners", _proposed(report.split.get("suggestion"))),
-        ("coordinated because of a gate or a conflict", _because(report.split["coordinated"])),
+        ("coordinated, or decided higher up, because of a gate or a conflict", _because(report.split["coordinated"])),
         ("arbitration", _groups(report)),
         ("votes", _votes(report)),
         ("controllers", _controllers(report)),
@@ -221,6 +221,9 @@ def _because(reasons: Sequence[dict[str, Any]]) -> Iterator[str]:
             yield f"{reason['transition']}: would be local but for {_listed(reason['gates'])}"
         elif reason["because"] == "conflict":
             yield f"{reason['transition']}: local, in conflict with {reason['rival']} at {reason['place']}"
+        if lower := reason["lifted_from"]:
+            rival = f"in conflict with {reason['rival']} at {reason['place']}"
+            yield f"{reason['transition']}: would be decided by {lower}, but stands {rival}, which is not"
 
 
 def _groups(report: Report) -> Iterator[str]:
@@ -228,13 +231,14 @@ def _groups(report: Report) -> Iterator[str]:
         members = list(dict.fromkeys((*group["sequence"], *group["rest"])))
         by = {"priority": "by priority", "order": "in a given order", "rotation": "in rotation"}[group["by"]]
         rule = by if group["sequence"] else "by the order of the file"
-        yield f"{group['name']}: {_listed(members)}; decided by {group['controller'] or _top(report)} {rule}"
+        decider = group["controller"] or group["at"] or _top(report)
+        yield f"{group['name']}: {_listed(members)}; decided by {decider} {rule}"
 
 
 def _top(report: Report) -> str:
-    from firable.nets.knowledge import COORDINATOR
+    from firable.nets.layers import Layers
 
-    return report.net.coordinator.name if report.net.coordinator else COORDINATOR
+    return Layers(report.net).root
 
 
 def _votes(report: Report) -> Iterator[str]:
@@ -267,6 +271,8 @@ def _controllers(report: Report) -> Iterator[str]:
             ("decides", one["decides"]),
             ("votes on", [f"{name} ({part})" if name != part else name for name, part in one["votes"]]),
             ("must promise", one["promises"]),
+            ("coordinates", one["coordinates"]),
+            ("relays", one["relays"]),
             ("locks for others", [f"{place} ({name})" for place, name in one["locks"]]),
             ("answers for", list(dict.fromkeys(signal for signal, _ in one["answers"]))),
             ("talks to", one["talks_to"]),

@@ -43,6 +43,7 @@ class _CoordinatedRecord(_Record):
     number: int | None
     parts: tuple[tuple[str, str], ...]
     description: str
+    at: str | None
 
 
 class _GroupRecord(_Record):
@@ -51,6 +52,7 @@ class _GroupRecord(_Record):
     rest: tuple[str, ...]
     by: ArbitrationRule
     controller: str | None
+    at: str | None
 
 
 class TableRecord(_Record):
@@ -62,14 +64,14 @@ class TableRecord(_Record):
     def rows(self) -> tuple[Coordinated, ...]:
         """The transitions that the coordinator decides."""
         return tuple(
-            Coordinated(row.name, row.number, tuple(Part(*part) for part in row.parts), row.description)
+            Coordinated(row.name, row.number, tuple(Part(*part) for part in row.parts), row.description, row.at)
             for row in self.coordinated
         )
 
     def arbitration_groups(self) -> tuple[ArbitrationGroup, ...]:
         """The groups by which conflicts are decided."""
         return tuple(
-            ArbitrationGroup(group.name, group.sequence, group.rest, group.by, group.controller)
+            ArbitrationGroup(group.name, group.sequence, group.rest, group.by, group.controller, group.at)
             for group in self.groups
         )
 
@@ -83,6 +85,7 @@ def table_to_json(decomposition: Decomposition) -> dict[str, Any]:
                 "number": row.number,
                 "parts": [[part.controller, part.name] for part in row.parts],
                 "description": row.description,
+                "at": row.at,
             }
             for row in decomposition.coordinated
         ],
@@ -93,6 +96,7 @@ def table_to_json(decomposition: Decomposition) -> dict[str, Any]:
                 "rest": list(group.rest),
                 "by": group.by.value,
                 "controller": group.controller,
+                "at": group.at,
             }
             for group in decomposition.groups
         ],

@@ -29,13 +29,15 @@ class Coordinated:
     """A transition that the coordinator decides: its name in the central net and its parts, by controller number.
 
     With more than one part it is global, a row of the coordinator table. With one part it is a local transition in the
-    conflict component of a global one (O2).
+    conflict component of a global one (O2). `at` is the coordinator below the highest that decides it; None is the
+    highest.
     """
 
     name: str
     number: int | None
     parts: tuple[Part, ...]
     description: str = ""
+    at: str | None = None
 
     @property
     def is_global(self) -> bool:
@@ -48,7 +50,8 @@ class ArbitrationGroup:
     """A conflict component in the order of its arbiter, decided as one group.
 
     `controller` is the local controller that decides a component that no global transition belongs to; None is the
-    coordinator. The order is that of `firable.semantics.arbitration.Group`: `sequence`, then `rest`.
+    coordinator, of the layer that `at` names as in `Coordinated`. The order is that of
+    `firable.semantics.arbitration.Group`: `sequence`, then `rest`.
     """
 
     name: str
@@ -56,6 +59,7 @@ class ArbitrationGroup:
     rest: tuple[str, ...]
     by: ArbitrationRule
     controller: str | None = None
+    at: str | None = None
 
 
 @dataclass(frozen=True)

@@ -73,6 +73,7 @@ CODES: Final[dict[str, str]] = {
     "F2024": "a place that stands for two things",
     "F2025": "unknown step, sensor or role of a task",
     "F2026": "a template that cannot be filled",
+    "F2027": "controllers that are no tree",
     # F3: analysis
     "F3001": "a machine is started that no command ever stops",
     "F3002": "an output signal on a place marked in M0",
@@ -97,6 +98,7 @@ CODES: Final[dict[str, str]] = {
     "F5003": "the plant file does not fit the bundle",
     "F5004": "the trace is not a trace of the net",
     "F5005": "the trace file is malformed",
+    "F5006": "layers that are executed as one",
     # F6: evidence
     "F6001": "the evidence is damaged or malformed",
     "F6002": "the evidence does not show what it claims",

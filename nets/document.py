@@ -102,6 +102,7 @@ class ControllerDocument(StrictDocument):
     """A controller: what is nested in it is owned by it."""
 
     coordinator: bool = Field(default=False, description="Whether it coordinates the others.")
+    under: Name | None = Field(default=None, description="The coordinator above it, if not that of the whole net.")
     description: Text = ""
     start: Names = Field(default=[], description="The places that hold a token at first.")
     inputs: Names = Field(default=[], description="The sensors, signals that no command clears.")

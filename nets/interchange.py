@@ -39,7 +39,7 @@ from firable.nets.net import (
 )
 from firable.nets.temporal import Logic, format_temporal, logics, parse_temporal
 
-FORMAT: Final = "firable-net/1"
+FORMAT: Final = "firable-net/2"
 
 
 def net_to_json(net: Net) -> dict[str, Any]:
@@ -53,7 +53,8 @@ def net_to_json(net: Net) -> dict[str, Any]:
         "name": net.name,
         "description": net.description,
         "controllers": [
-            {"name": c.name, "coordinator": c.coordinator, "description": c.description} for c in net.controllers
+            {"name": c.name, "coordinator": c.coordinator, "description": c.description, "under": c.under}
+            for c in net.controllers
         ],
         "places": [
             {
@@ -163,7 +164,7 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
             for t in record.transitions
         ),
         tuple(Signal(s.name, s.owner, SignalKind(s.kind)) for s in record.signals),
-        tuple(Controller(c.name, c.coordinator, c.description) for c in record.controllers),
+        tuple(Controller(c.name, c.coordinator, c.description, c.under) for c in record.controllers),
         tuple(Arbiter(a.name, tuple(a.among), ArbitrationRule(a.by)) for a in record.arbiters),
         tuple(_property(p) for p in record.properties),
         record.description,
@@ -246,6 +247,7 @@ class _ControllerRecord(_Record):
     name: str
     coordinator: bool
     description: str
+    under: str | None
 
 
 _Pairs = list[Annotated[tuple[str, str], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v)]]
@@ -317,7 +319,7 @@ class _PropertyRecord(_Record):
 
 
 class _NetRecord(_Record):
-    format: Literal["firable-net/1"]
+    format: Literal["firable-net/2"]
     name: str
     description: str
     controllers: list[_ControllerRecord]

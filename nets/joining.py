@@ -2,8 +2,8 @@
 
 The parts of a coordinated transition fire as one, so the transition they make has all their inputs, outputs and gates
 (Eq. 6). What the joined net *is* comes from the subnets and the table alone; only the order of things, and what the
-split leaves with the central net (its name, arbiters and properties), is taken from there. So `join(split(net))` is
-`net`, and a subnet that was edited joins into another net.
+split leaves with the central net (its name, layers, arbiters and properties), is taken from there. So
+`join(split(net))` is `net`, and a subnet that was edited joins into another net.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ def join(decomposition: Decomposition) -> Net:
     """
     net = decomposition.net
     rows = {(part.controller, part.name): row for row in decomposition.coordinated for part in row.parts}
+    above = {controller.name: controller.under for controller in net.controllers}
     joined: dict[str, Transition] = {}
     for row in decomposition.coordinated:
         parts = [decomposition.subnet(part.controller).transition(part.name) for part in row.parts]
@@ -39,7 +40,11 @@ def join(decomposition: Decomposition) -> Net:
         _in_order(net.place_index, ((p.name, p) for subnet in decomposition.subnets for p in subnet.places)),
         _in_order(net.transition_index, joined.items()),
         _in_order(net.signal_index, ((s.name, s) for subnet in decomposition.subnets for s in subnet.signals)),
-        tuple(controller for subnet in decomposition.subnets for controller in subnet.controllers),
+        tuple(
+            replace(controller, under=above.get(controller.name))
+            for subnet in decomposition.subnets
+            for controller in subnet.controllers
+        ),
         net.arbiters,
         net.properties,
         net.description,

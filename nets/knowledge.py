@@ -16,12 +16,13 @@ Cost: linear in the arcs and gates of the net.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
 from firable.nets.decomposition import Decomposition
+from firable.nets.layers import Layers
 from firable.nets.net import Net, Transition
 
 
@@ -41,7 +42,8 @@ class Reason:
     """Why the coordinator decides `transition`.
 
     `gates` are the places and signals of other controllers that its gates read, where nothing else makes it global.
-    `rival` is what it conflicts with at `place`, and by which it is joined to a global one.
+    `rival` is what it conflicts with at `place`: by which a local transition is joined to a global one, or one whose
+    participants all stand under the coordinator `lifted_from` is decided by another one above that.
     """
 
     transition: str
@@ -49,6 +51,7 @@ class Reason:
     gates: tuple[str, ...] = ()
     rival: str = ""
     place: str = ""
+    lifted_from: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +62,9 @@ class Knowledge:
     with the transition. `locks` are its places that a gate of a global transition reads, each with the transition:
     while it has promised, they stay as they are. `answers` are its signals in the same way, which it cannot lock (O4).
     `undisturbing` are the parts that by the arcs take no other yes back and whose gates nothing here closes: one that
-    is persistent needs no promise (`firable.decompose.splitting.persistence`). It `talks_to` these and nobody else.
+    is persistent needs no promise (`firable.decompose.splitting.persistence`). It `coordinates` these transitions for
+    those under it, and `relays` those that are decided above it and in which one under it takes part: it asks them,
+    votes for them, and passes the order on. It `talks_to` the one above it and those under it, as far as it must.
     """
 
     controller: str
@@ -71,17 +76,15 @@ class Knowledge:
     locks: tuple[tuple[str, str], ...]
     answers: tuple[tuple[str, str], ...]
     undisturbing: tuple[str, ...]
+    coordinates: tuple[str, ...]
+    relays: tuple[str, ...]
     talks_to: tuple[str, ...]
-
-
-COORDINATOR = "the coordinator"
-"""The name of the coordinator where none of the controllers is marked as it."""
 
 
 def reasons(decomposition: Decomposition) -> tuple[Reason, ...]:
     """Why the coordinator decides each transition that it decides, in the order of the net."""
     net = decomposition.net
-    joined = _joined(decomposition)
+    joined, layers = _joined(decomposition), Layers(net)
     found = []
     for row in decomposition.coordinated:
         if row.name not in net.transition_index:
@@ -92,23 +95,29 @@ def reasons(decomposition: Decomposition) -> tuple[Reason, ...]:
             continue
         transition = net.transition(row.name)
         movers = {net.place(name).owner for name in (*transition.inputs, *transition.outputs)}
+        rival, place = "", ""
+        if (lower := layers.common(part.controller for part in row.parts)) == (row.at or layers.root):
+            lower = ""
+        else:
+            rival, place = _rival(net, transition)
         if len(movers) > 1:
-            found.append(Reason(row.name, Because.ARCS))
+            found.append(Reason(row.name, Because.ARCS, (), rival, place, lower))
             continue
         read = [*transition.permissive, *transition.inhibitive]
         gates = [name for name in read if net.place(name).owner not in movers]
         gates += [gate.signal for gate in transition.external if net.signal(gate.signal).owner not in movers]
-        found.append(Reason(row.name, Because.GATE, tuple(dict.fromkeys(gates))))
+        found.append(Reason(row.name, Because.GATE, tuple(dict.fromkeys(gates)), rival, place, lower))
     return tuple(found)
 
 
 def knowledge(decomposition: Decomposition) -> tuple[Knowledge, ...]:
     """What each controller must know, in the order of the subnets."""
-    coordinator = decomposition.net.coordinator
-    top = coordinator.name if coordinator else COORDINATOR
+    layers = Layers(decomposition.net)
+    relays, talks = _passed_on(decomposition, layers)
     whole = {(part.controller, part.name): row for row in decomposition.coordinated for part in row.parts}
-    taking_part = {part.controller for row in decomposition.coordinated for part in row.parts}
-    everyone = tuple(subnet.name for subnet in decomposition.subnets if subnet.name in taking_part - {top})
+    coordinated: dict[str, list[str]] = {}
+    for row in decomposition.coordinated:
+        coordinated.setdefault(row.at or layers.root, []).append(row.name)
     groups: dict[str | None, list[str]] = {}
     for group in decomposition.groups:
         groups.setdefault(group.controller, []).append(group.name)
@@ -117,7 +126,6 @@ def knowledge(decomposition: Decomposition) -> tuple[Knowledge, ...]:
         rows = [(whole.get((subnet.name, t.name)), t) for t in subnet.transitions]
         votes = [(row, part) for row, part in rows if row is not None]
         keeps = _keeping(subnet)
-        others = everyone if subnet.name == top else (top,) if subnet.name in taking_part else ()
         found.append(
             Knowledge(
                 subnet.name,
@@ -129,7 +137,9 @@ def knowledge(decomposition: Decomposition) -> tuple[Knowledge, ...]:
                 tuple(_read(votes, lambda t: (*t.permissive, *t.inhibitive))),
                 tuple(_read(votes, lambda t: tuple(gate.signal for gate in t.external))),
                 tuple(part.name for _, part in votes if keeps(part)),
-                others,
+                tuple(coordinated.get(subnet.name, ())),
+                tuple(relays.get(subnet.name, ())),
+                tuple(talks.get(subnet.name, ())),
             )
         )
     return tuple(found)
@@ -145,6 +155,29 @@ def split_to_json(decomposition: Decomposition) -> dict[str, Any]:
     return {
         "coordinated": [asdict(reason) for reason in reasons(decomposition)],
         "controllers": [asdict(one) for one in knowledge(decomposition)],
+    }
+
+
+def _passed_on(
+    decomposition: Decomposition, layers: Layers
+) -> tuple[Mapping[str, Iterable[str]], Mapping[str, Iterable[str]]]:
+    """For each controller what it passes on between the layers, and with whom it exchanges messages."""
+    relays: dict[str, dict[str, None]] = {}
+    talks: dict[str, dict[str, None]] = {}
+    for row in decomposition.coordinated:
+        at = row.at or layers.root
+        for part in row.parts:
+            now = part.controller
+            while now != at and (above := layers.parent.get(now)) is not None:
+                talks.setdefault(above, {})[now] = None
+                talks.setdefault(now, {})[above] = None
+                if above != at:
+                    relays.setdefault(above, {})[row.name] = None
+                now = above
+    order = {name: i for i, name in enumerate((layers.root, *(c.name for c in decomposition.net.controllers)))}
+    return relays, {
+        name: sorted(others, key=lambda other: (other != layers.parent.get(name), order.get(other, 0)))  # upwards first
+        for name, others in talks.items()
     }
 
 
@@ -178,6 +211,16 @@ def _joined(decomposition: Decomposition) -> Mapping[str, tuple[str, str]]:
                     joined[rival] = (name, place)
                     seen.append(rival)
     return joined
+
+
+def _rival(net: Net, transition: Transition) -> tuple[str, str]:
+    """One that it conflicts with, and the place; empty where there is none."""
+    for places, table in ((transition.inputs, net.consumers), (transition.outputs, net.producers)):
+        for place in places:
+            for other in table[net.place_index[place]]:
+                if net.transitions[other] is not transition:
+                    return net.transitions[other].name, place
+    return "", ""
 
 
 def _keeping(subnet: Net) -> Callable[[Transition], bool]:

@@ -34,11 +34,15 @@ _PROBLEMS_MAX: Final = 100  # enough to read; a file of noise has millions
 
 @dataclass(frozen=True, slots=True)
 class Controller:
-    """An owner of places and signals: what the split gives one subnet to."""
+    """An owner of places and signals: what the split gives one subnet to.
+
+    It stands under the coordinator that `under` names, or else under that of the whole net (`firable.nets.layers`).
+    """
 
     name: str
     coordinator: bool = False
     description: str = ""
+    under: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

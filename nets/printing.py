@@ -139,6 +139,8 @@ def _lines(net: Net) -> Iterator[str]:
         yield f"  {_text(name)}:"
         if controller.coordinator:
             yield "    coordinator: true"
+        if controller.under is not None:
+            yield f"    under: {_text(controller.under)}"
         if controller.description:
             yield f"    description: {_text(controller.description)}"
         yield from _scope(places.get(name, []), inputs.get(name, []), f"{name}.", "    ")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.joining import join
+from firable.nets.layers import Layers
 from firable.nets.net import Net, Transition
 from firable.nets.verdict import Verdict, Weight
 
@@ -37,7 +38,7 @@ def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
 
     Of the net what `CHECKED` names and every property of the file; of the decomposition Eq. (7), (8) and O3 for every
     transition, Eq. (9)-(10) for every place, O2 for every global transition and wherever transitions compete,
-    ownership, M0, commands, and arbitration.
+    O8 where there are layers, ownership, M0, commands, and arbitration.
     """
     net = decomposition.net
     yield from _required_of_the_net(net)
@@ -49,6 +50,9 @@ def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
         for p, place in enumerate(net.places)
         if len(net.consumers[p]) > 1 or len(net.producers[p]) > 1
     )
+    if Layers(net).several:
+        yield "o8"
+        yield from (f"o8.{t.name}" for t in net.transitions if len(_owners(net, t)) > 1)
     yield from ("ownership", "initial-marking", "commands", "arbitration")
     yield from (f"arbitration.{group.name}" for group in decomposition.groups)
 

@@ -140,7 +140,7 @@ class _Reading:
         transitions = tuple(self.transitions(places, signals))
         properties = tuple(self.properties())
         controllers = tuple(
-            Controller(name, body.coordinator, body.description) if body else Controller(name)
+            Controller(name, body.coordinator, body.description, body.under) if body else Controller(name)
             for name, body in (document.controllers or {}).items()
         )
         arbiters = tuple(

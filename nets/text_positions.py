@@ -97,6 +97,8 @@ class Positions:
     def _walk(self) -> Iterator[tuple[Subject, _Found]]:
         for name, key, controller in _entries(self.tree, "controllers"):
             yield ("controllers", name), key
+            if (under := _value(controller, "under")) is not None:
+                yield ("controllers", name, "under"), under
             yield from self._scope(controller, ("controllers", name), f"{name}.")
         yield from self._scope(self.tree, (), "")
         for name, key, transition in _entries(self.tree, "transitions"):

@@ -7,7 +7,7 @@ express, such as a completion signal that gates nothing, is a `ValueError`: the 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -42,6 +42,7 @@ def problems(net: Net) -> Iterator[Diagnostic]:
             "leave `coordinator: true` at one of them",
             ("controllers", coordinators[1]),
         )
+    yield from _layers(net, controllers)
     yield from _completions(net)
     yield from _meanings(net)
     known = _Known(
@@ -120,6 +121,45 @@ def _ownership(net: Net, controllers: set[str]) -> Iterator[Diagnostic]:
                     f"name it '{item.owner}.{item.name}'",
                     subject,
                 )
+
+
+def _layers(net: Net, controllers: set[str]) -> Iterator[Diagnostic]:
+    above = {controller.name: controller.under for controller in net.controllers}
+    for controller in net.controllers:
+        subject: Subject = ("controllers", controller.name, "under")
+        if controller.under is None:
+            continue
+        if controller.under not in controllers:
+            yield Diagnostic(
+                "F2005",
+                f"'{controller.name}' is under '{controller.under}', which is no controller",
+                did_you_mean(controller.under, sorted(controllers)) + "declare it under `controllers`",
+                subject,
+            )
+        elif controller.coordinator:
+            yield Diagnostic(
+                "F2027",
+                f"'{controller.name}' coordinates the whole net, and is under '{controller.under}'",
+                "the others are under it: leave `under` out here",
+                subject,
+            )
+        elif _is_cyclic(controller.name, above):
+            yield Diagnostic(
+                "F2027",
+                f"'{controller.name}' is under itself, by way of '{controller.under}'",
+                "controllers are a tree: leave `under` out at the highest of these",
+                subject,
+            )
+
+
+def _is_cyclic(name: str, above: Mapping[str, str | None]) -> bool:
+    """Whether the way up from a controller comes back to it."""
+    seen = {name}
+    now = above[name]
+    while now is not None and now not in seen:
+        seen.add(now)
+        now = above.get(now)
+    return now == name
 
 
 def _completions(net: Net) -> Iterator[Diagnostic]:

@@ -36,7 +36,7 @@ OTHERWISE: Final = {
     "O5": ("assumed", "of the protocol"),
     "O6": ("assumed", "of the hosts and their storage"),
     "O7": ("assumed", "of the protocol"),
-    "O8": ("nothing to show", "the coordinator has no other one above it"),
+    "O8": ("nothing to show", "there is one layer: no coordinator is under another one"),
     "O9": ("not claimed", "what is proved is the equivalence of interleaving"),
 }
 """The status of an obligation that no family proves, and of whom it is assumed."""
@@ -72,6 +72,8 @@ def standing(decomposition: Decomposition, verdicts: Iterable[Verdict]) -> Itera
         found = overall(verdict for family in families for verdict in proved_of(family, given))
         kinds = list(dict.fromkeys(family.kind.value for family in families))
         by = ", ".join(family.title for family in families)
+        if name == "O8":  # what is proved is the table
+            by += "; a run is in one layer, so that no coordinator keeps locks for others"
         yield Standing(name, says, " and ".join(kinds) if found is Status.PROVED else found.value, by)
 
 

@@ -10,16 +10,20 @@ The paper's alternative, parts listed by hand in the coordinator's table, has to
 table is derived, and for the paper's own cell the derived table is the published one.
 
 Decided by the coordinator are the global transitions and every local one in the conflict component of a global one
-(O2): two deciders of one conflict would each choose a winner.
+(O2): two deciders of one conflict would each choose a winner. Where controllers stand in layers, it is the lowest
+coordinator above all participants of the component that decides (`firable.nets.layers`). The subnets are flat: which
+layer a controller stands in stays with the central net, since it changes nothing that the controller itself does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import count
 
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
 from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.layers import Layers
 from firable.nets.net import Net, Place, Signal, Transition
 from firable.semantics.arbitration import Arbitration
 
@@ -90,14 +94,15 @@ def split(net: Net) -> Decomposition:
     if clashes := list(_clashes(parts)):
         raise InputError(clashes)
 
-    arbitration = Arbitration.of(net)
-    decided = {name for name, its in parts.items() if len(its) > 1}
+    arbitration, layers = Arbitration.of(net), Layers(net)
+    decided = {name: layers.common(taking_part[name]) for name, its in parts.items() if len(its) > 1}
     groups = []
     for group, members in zip(arbitration.groups, arbitration.conflicts.components, strict=True):
         names = [net.transitions[t].name for t in members]
         is_coordinated = any(len(parts[name]) > 1 for name in names)
+        at = layers.common(dict.fromkeys(owner for name in names for owner in taking_part[name]))
         if is_coordinated:
-            decided.update(names)
+            decided.update(dict.fromkeys(names, at))
         groups.append(
             ArbitrationGroup(
                 group.name,
@@ -106,10 +111,17 @@ def split(net: Net) -> Decomposition:
                 group.by,
                 # Local transitions in conflict share a place, so they are all of its owner.
                 None if is_coordinated else parts[names[0]][0].controller,
+                at if is_coordinated and at != layers.root else None,
             )
         )
     coordinated = tuple(
-        Coordinated(t.name, numbers.get(t.name, t.number), parts[t.name], t.description)
+        Coordinated(
+            t.name,
+            numbers.get(t.name, t.number),
+            parts[t.name],
+            t.description,
+            decided[t.name] if decided[t.name] != layers.root else None,
+        )
         for t in net.transitions
         if t.name in decided
     )
@@ -211,7 +223,7 @@ def _subnets(net: Net, parts: Mapping[str, tuple[Part, ...]]) -> tuple[Net, ...]
             tuple(places.get(controller.name, ())),
             tuple(transitions.get(controller.name, ())),
             tuple(signals.get(controller.name, ())),
-            (controller,),
+            (replace(controller, under=None),),
             description=controller.description,
         )
         for controller in net.controllers

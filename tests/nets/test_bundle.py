@@ -171,7 +171,7 @@ def test_other_spelling_of_the_same_content_is_refused() -> None:
         ("table.json", b'["b","t1-11"]', b'["b"]'),
         ("net.json", b'"marked":true', b'"marked":1'),
         ("net.json", b'"inputs":["a.p"]', b'"inputs":["a.z"]'),
-        ("subnets/a.json", b'"name":"a"}', b'"name":"c"}'),
+        ("subnets/a.json", b'"name":"a","under"', b'"name":"c","under"'),
         ("verdicts.json", b'"evidence":["eq7-G.smt2"]', b'"evidence":"eq7-G.smt2"'),
         ("verdicts.json", b'"name":"ownership"', b'"markings":true,"name":"ownership"'),
         ("verdicts.json", b'"name":"ownership"', b'"name":"ownership","seconds":1'),

@@ -117,6 +117,9 @@ TWINS = (
 )
 
 
+WITHOUT_REFERENCE = {"two_cells"}  # their figures stand in the tests of what they are there to show
+
+
 def parts(net: Net, names: Mapping[str, str], owners: Mapping[str, str]) -> dict[str, object]:
     """All of a net that the reference speaks of, renamed, as sets."""
 
@@ -162,7 +165,7 @@ def test_a_cell_of_the_catalogue_equals_its_reference(twin: Twin) -> None:
 
 
 def test_every_net_of_the_catalogue_has_a_reference() -> None:
-    assert set(catalogue_names()) == {twin.ours for twin in TWINS}
+    assert set(catalogue_names()) == {twin.ours for twin in TWINS} | WITHOUT_REFERENCE
 
 
 @pytest.mark.parametrize("name", catalogue_names())

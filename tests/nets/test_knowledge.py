@@ -9,7 +9,8 @@ from support.reference import load_net
 from firable.decompose.splitting.cut import split
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Coordinated, Decomposition, Part
-from firable.nets.knowledge import COORDINATOR, Because, Knowledge, Reason, knowledge, reasons, split_to_json
+from firable.nets.knowledge import Because, Knowledge, Reason, knowledge, reasons, split_to_json
+from firable.nets.layers import COORDINATOR
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 
 A, B = Controller("a"), Controller("b")
