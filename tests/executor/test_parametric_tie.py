@@ -27,16 +27,16 @@ from firable.executor.messages import (
     Effect,
     Firing,
     ProtocolError,
+    Sending,
     ToCoordinator,
     Vote,
     VoteRequest,
 )
 from firable.executor.simulation import Network, Simulation
-from firable.executor.token_player import Compiled
+from firable.executor.token_player import Compiled, TokenPlayer
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
-from firable.nets.net import Controller, Net, Place, Transition
-from firable.semantics.player import Player
+from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 
 Key = tuple[Thing, ...]
 
@@ -46,10 +46,12 @@ class Watched(Simulation):
 
     def __init__(self, decomposition: Decomposition, seed: int, network: Network, **machines: Any) -> None:
         super().__init__(decomposition, seed, network, **machines)
-        self.structure = net_structure(decomposition, ())
+        self.structure = net_structure(decomposition, (), signals=True)
         self.takes_part = self.structure.relations["takes-part"]
-        self.central = Player(self.net)
+        self.central = TokenPlayer.of(self.net)
         self.shadow = self.net.initial_marking
+        self.image: frozenset[str] = frozenset()
+        """The signals that are 1 in the process images."""
         self.rounds: dict[int, tuple[tuple[str, ...], dict[str, frozenset[str]], str | None, set[str]]] = {}
         """Of each round that was ever opened: what it asks for, the votes, the commit, who has obeyed."""
         self.sent: dict[str, set[Key]] = {
@@ -62,6 +64,7 @@ class Watched(Simulation):
     def _perform(self, effects: list[Effect]) -> None:
         super()._perform(effects)
         fired = []
+        cleared = set()
         for effect in effects:
             match effect:
                 case VoteRequest():
@@ -69,10 +72,17 @@ class Watched(Simulation):
                 case Vote():
                     self.sent["vote"] |= {(effect.round, t, effect.controller) for t in effect.promised}
                 case Firing(transition):
-                    t = self.net.transition_index[transition]
-                    assert t in self.central.may_fire(self.shadow), f"the central net cannot fire '{transition}'"
-                    self.shadow = self.central.fire(self.shadow, [t])
+                    compiled = self.central.transitions[transition]
+                    assert compiled.enabled(self.shadow), f"'{transition}' is not enabled in the central net"
+                    self.shadow = compiled.fire(self.shadow)
                     fired.append(transition)
+                case Sending(place):
+                    cleared.add(self.net.place(place).completion)
+        before_image, self.image = self.image, self._image()
+        changed = before_image ^ self.image
+        sensed = sorted(name for name in changed if name not in cleared or name in self.image)
+        for name in sensed:
+            self.shadow ^= self.central.signal_bit(name)
         self._remember()
         for effect in effects:
             match effect:
@@ -83,10 +93,14 @@ class Watched(Simulation):
                     self.sent["acknowledgement"] |= set(self._asked_of(effect.round, effect.controller))
         before, self.now = self.now, self.told()
         local = [name for name in fired if (name,) not in self.structure.relations["coordinated"]]
-        steps: list[Instance] = explain(with_things(before, self.now), self.now, local)
+        steps: list[Instance] = explain(with_things(before, self.now), self.now, local, sensed)
         self.actions.update(name for name, _ in steps)
         if steps:
             assert broken(self.now) == [], steps
+
+    def _image(self) -> frozenset[str]:
+        every = self.controllers.values()
+        return frozenset(s.name for c in every for s in c.subnet.signals if c.word & c.player.signal_bit(s.name))
 
     def _asked_of(self, number: int, controller: str) -> Iterator[Key]:
         for t in self.rounds[number][0]:
@@ -112,8 +126,9 @@ class Watched(Simulation):
             obeyed |= {(r, t.name, name) for r in range(controller.closed_below) for t in self.net.transitions}
         return with_relations(
             with_things(self.structure, rounds=tuple(self.rounds)),
-            marked=[(place,) for place in self.net.names(self.marking)],
-            shadow=[(place,) for place in self.net.names(self.shadow)],
+            marked=[(name,) for name in (*self.net.names(self.marking), *self.image)],
+            shadow=[(place,) for place in self.net.names(self.central.marking(self.shadow))]
+            + [(s.name,) for s in self.net.signals if self.shadow & self.central.signal_bit(s.name)],
             begun=[(r,) for r in self.rounds],
             asked=[(r, t) for r, (names, *_) in self.rounds.items() for t in names],
             heard=[(r, t, c) for r, (_, votes, *_) in self.rounds.items() for c, yes in votes.items() for t in yes],
@@ -234,6 +249,13 @@ class VotesAgain(LocalController):
         yield from super()._vote(request)
 
 
+class SignalsUnlocked(LocalController):
+    """A signal may change between the vote and the commit."""
+
+    def _locked_reads(self) -> int:
+        return 0
+
+
 class StaleVotes(Coordinator):
     """A vote of an earlier round counts for the present one."""
 
@@ -263,10 +285,22 @@ class ClosesEarly(Coordinator):
         yield from super()._acknowledged(message)
 
 
+SENSOR = Net(
+    "sensor",
+    (Place("a.p", "a", marked=True), Place("a.x", "a"), Place("b.q", "b", marked=True), Place("b.y", "b")),
+    (
+        Transition("G", ("a.p", "b.q"), ("a.x", "b.y"), external=(ExternalGate("a.s"),)),
+        Transition("G-back", ("a.x", "b.y"), ("a.p", "b.q"), external=(ExternalGate("b.s", wanted=False),)),
+    ),
+    (Signal("a.s", "a"), Signal("b.s", "b")),
+    (Controller("a"), Controller("b")),
+)
+
 FAULTS: list[tuple[str, type, str]] = [
     ("controller", NoLock, "O1"),
     ("controller", AppliesTwice, "leads elsewhere"),
     ("controller", VotesAgain, "obeyed"),
+    ("controller", SignalsUnlocked, "no promise reads it"),
     ("coordinator", StaleVotes, "a vote of the round has arrived"),
     ("coordinator", DecidesEarly, "all who take part have voted yes"),
     ("coordinator", ClosesEarly, "an acknowledgement of the round has arrived"),
@@ -277,9 +311,9 @@ FAULTS: list[tuple[str, type, str]] = [
 def test_planted_fault_is_no_action_of_the_proof(machine: str, fault: type, says: str) -> None:
     said = []
     for seed in range(30):
-        for name in ("local_gate", "ring", "read_before_order"):
+        for net in (load_net("local_gate"), load_net("ring"), load_net("read_before_order"), SENSOR):
             try:
-                Watched(split(load_net(name)), seed, NETWORKS[1], **{machine: fault}).run(120)
+                Watched(split(net), seed, NETWORKS[1], **{machine: fault}).run(120)
             except AssertionError as failed:
                 said.append(str(failed))
             except ProtocolError:

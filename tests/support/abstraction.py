@@ -20,44 +20,43 @@ Instance = tuple[str, tuple[Thing, ...]]
 """An action with the values of its parameters."""
 
 
-def net_structure(decomposition: Decomposition, rounds: Sequence[Thing]) -> Structure:
-    """The things and the fixed relations of a decomposition; nothing moves yet."""
+def net_structure(decomposition: Decomposition, rounds: Sequence[Thing], *, signals: bool) -> Structure:
+    """The things and the fixed relations of a decomposition; nothing moves yet. Without signals, gates are free."""
     net = decomposition.net
     rows = {row.name: row for row in decomposition.coordinated}
     homes = {t.name: s.name for s in decomposition.subnets for t in s.transitions if t.name in net.transition_index}
     part = [(row.name, its.controller) for row in rows.values() for its in row.parts]
     part += [(name, home) for name, home in homes.items() if name not in rows]
-    openable_at = [
-        (row.name, its.controller)
-        for row in rows.values()
-        for its in row.parts
-        if decomposition.subnet(its.controller).transition(its.name).openable
-    ]
-    openable_at += [(n, home) for n, home in homes.items() if n not in rows and net.transition(n).openable]
+    sensed = tuple(signal.name for signal in net.signals) if signals else ()
 
-    def arcs(kind: str) -> Tuples:
-        return frozenset((t.name, place) for t in net.transitions for place in getattr(t, kind))
+    def arcs(kind: str, wanted: bool | None = None) -> Tuples:
+        found = {(t.name, place) for t in net.transitions for place in getattr(t, kind)}
+        gates = {(t.name, gate.signal) for t in net.transitions for gate in t.external if gate.wanted is wanted}
+        return frozenset(found | gates if signals else found)
 
+    completions = {(t.name, net.place(place).completion or "") for t in net.transitions for place in t.outputs}
     fixed: dict[str, Tuples] = {
         "coordinated": frozenset((name,) for name in rows),
         "takes-part": frozenset(part),
-        "openable": frozenset((t.name,) for t in net.transitions if t.openable),
-        "openable-at": frozenset(openable_at),
         "input": arcs("inputs"),
         "output": arcs("outputs"),
-        "permissive": arcs("permissive"),
-        "inhibitive": arcs("inhibitive"),
+        "permissive": arcs("permissive", wanted=True),
+        "inhibitive": arcs("inhibitive", wanted=False),
+        "signal": frozenset((name,) for name in sensed),
+        "clears": frozenset(key for key in completions if key[1] in sensed),
     }
     some_home = decomposition.subnets[0].name
     return Structure(
         {
-            "Place": tuple(place.name for place in net.places),
+            "Place": (*(place.name for place in net.places), *sensed),
             "Transition": tuple(t.name for t in net.transitions),
             "Controller": tuple(subnet.name for subnet in decomposition.subnets),
             "Round": tuple(rounds),
         },
         {
-            "owner": {place.name: place.owner or "" for place in net.places},
+            "owner": dict(
+                [(p.name, p.owner or "") for p in net.places] + [(s.name, s.owner or "") for s in net.signals]
+            ),
             "home": {t.name: homes.get(t.name, some_home) for t in net.transitions},
         },
         {**fixed, **{relation.name: frozenset() for relation in MOVING}},
@@ -99,20 +98,22 @@ def explain(
     before: Structure,
     after: Structure,
     fired: Sequence[str] = (),
+    sensed: Sequence[str] = (),
     compared: Callable[[Structure], Structure] = lambda structure: structure,
 ) -> list[Instance]:
-    """The actions by which one configuration becomes the other; `fired` are the local transitions that fired.
+    """The actions by which one configuration becomes the other.
 
-    `compared` leaves out what is not to be compared. Raises `AssertionError` where there are no such actions: then
-    something has happened that the proof knows nothing of.
+    `fired` are the local transitions that fired, `sensed` the signals that changed by themselves; `compared` leaves out
+    what is not to be compared. Raises `AssertionError` where there are no such actions: then something has happened
+    that the proof knows nothing of.
     """
-    steps = list(_steps(before, after, fired))
+    steps = list(_steps(before, after, fired, sensed))
     reached = compared(play(before, steps))
     assert not differences(reached, after), f"{steps} leads elsewhere: {differences(reached, after)}"
     return steps
 
 
-def _steps(before: Structure, after: Structure, fired: Sequence[str]) -> Iterator[Instance]:
+def _steps(before: Structure, after: Structure, fired: Sequence[str], sensed: Sequence[str]) -> Iterator[Instance]:
     def new(name: str) -> list[tuple[Thing, ...]]:
         return sorted(after.relations[name] - before.relations[name], key=str)
 
@@ -123,6 +124,7 @@ def _steps(before: Structure, after: Structure, fired: Sequence[str]) -> Iterato
         if key in _forgotten(before, after):
             continue
         yield ("apply" if key[:2] in before.relations["committed"] else "release"), key
+    yield from (("sense", (name,)) for name in sensed)
     yield from (("hear", key) for key in new("heard"))
     for (r,) in new("decided"):
         commits = [key for key in new("committed") if key[0] == r]

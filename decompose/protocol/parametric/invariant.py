@@ -1,14 +1,14 @@
 """What holds in every configuration that the protocol reaches, in any net: the inductive invariant.
 
-Each conjunct is one sentence, for all values of its variables. Together they hold at the start and each action
-keeps them (`theorem`), so they hold for ever. The names V1 to V5 and S are the ones by which the safety argument goes:
+Each conjunct is one sentence, for all values of its variables. Together they hold at the start and each action keeps
+them (`theorem`), so they hold for ever. V1 to V5, S1 and S2 are the ones by which the safety argument goes:
 
-- a vote that may still count rests on a promise (V1), and a promise keeps its part firable in the subnet (V2), because
+- a vote that may still count rests on a promise (V1), and a promise keeps its part enabled in the subnet (V2), because
   whatever fires or is promised besides does not disturb it (V3);
-- so at a commit all parts are firable at once, though the votes were given at different instants; and what is
+- so at a commit all parts are enabled at once, though the votes were given at different instants; and what is
   committed stays promised until its order is obeyed (V4), once in each round (V5);
-- where a committed part is not yet applied, the subnet holds the token that the part will move, and the shadow has
-  moved it; everywhere else they hold the same (S).
+- where a committed part is not yet applied, the shadow has moved the token already, which the subnet still holds (V2);
+  everywhere else they hold the same (S1, S2).
 
 The rest says what messages say: that of what was sent the cause is true, and that what has to be sent was sent.
 """
@@ -33,15 +33,13 @@ from firable.decompose.protocol.parametric.system import (
     decided,
     disturb,
     heard,
-    input_of,
     marked,
     noted,
     obeyed,
-    openable_at,
     output_of,
     owner,
     p,
-    part_firable,
+    part_enabled,
     promised,
     r,
     request,
@@ -75,9 +73,8 @@ _underway = committed(r, t) & ~obeyed(r, t, owner(p)) & writes(t, p)
 INVARIANT: Final = (
     Conjunct("V1", "a part with a vote stays promised until its order is obeyed", (
         vote(r, t, c) & ~obeyed(r, t, c)).implies(promised(r, t, c))),
-    Conjunct("V2", "a promised part that may still be applied is firable in its subnet", (
-        promised(r, t, c) & (~decided(r) | committed(r, t))).implies(part_firable(t, c))),
-    Conjunct("gates", "the external gates of a promised part can open", promised(r, t, c).implies(openable_at(t, c))),
+    Conjunct("V2", "a promised part that may still be applied is enabled in its subnet", (
+        promised(r, t, c) & (~decided(r) | committed(r, t))).implies(part_enabled(t, c))),
     Conjunct("V3", "promises of different rounds at one controller do not disturb each other", (
         promised(r, t, c) & promised(s, u, c) & ~same(r, s) & same(owner(p), c)).implies(~disturb(t, u, p))),
     Conjunct("V4", "a committed part stays promised until it is applied", (
@@ -86,8 +83,7 @@ INVARIANT: Final = (
         committed(r, t) & committed(r, u)).implies(same(t, u))),
     Conjunct("S1", "where a committed part is not yet applied, the shadow has moved the token", (
         _underway).implies(shadow(p).iff(output_of(t, p)))),
-    Conjunct("S2", "and the subnet still holds it", (_underway).implies(marked(p).iff(input_of(t, p)))),
-    Conjunct("S3", "everywhere else the subnets hold what the shadow holds", (
+    Conjunct("S2", "everywhere else the subnets hold what the shadow holds", (
         ~exists(r, t)(_underway)).implies(marked(p).iff(shadow(p)))),
     Conjunct("asked", "what is asked for is coordinated, in a round that is begun", (
         asked(r, t)).implies(begun(r) & coordinated(t))),

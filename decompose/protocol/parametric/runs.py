@@ -9,8 +9,8 @@ happen, and that what is proved is not proved of nothing.
 
 A run stands as text, `promise r1 G a; fire l`: an action and the names for its parameters. Names of rounds are r1, r2;
 of coordinated transitions capital letters, of local ones small; of controllers a, b, c. There are no other things but
-places, which are p1, p2 and so on, as many as asked for. Rejected: a search for the actions, too; it takes minutes
-where this takes a tenth of a second, and the runs worth showing are known.
+places, which are p1, p2 and so on, as many as asked for; a place that a step names is a signal. Rejected: a search for
+the actions, too; it takes minutes where this takes a tenth of a second, and the runs worth showing are known.
 """
 
 from __future__ import annotations
@@ -42,18 +42,20 @@ from firable.decompose.protocol.parametric.system import (
     Protocol,
     Round,
     Transition,
-    central_firable,
+    central_enabled,
+    clears,
     coordinated,
     inhibitive_of,
     initially,
     input_of,
     marked,
-    openable_at,
     output_of,
     owner,
+    p,
     permissive_of,
     reads,
     shadow,
+    signal,
     t,
     takes_part,
 )
@@ -69,8 +71,10 @@ class Run:
 
     net: nets.Net
     events: tuple[str, ...]
-    fired: tuple[str, ...]
-    """What fired, in this order: local transitions when they fire, others when they are decided."""
+    signals: tuple[tuple[str, bool], ...]
+    """The value of each signal at the beginning."""
+    course: tuple[str, ...]
+    """What fired, local transitions when they fire, others when they are decided, and the signals that changed."""
     local: tuple[str, ...]
     """The places that the controllers have a token on at the end."""
     central: tuple[str, ...]
@@ -82,6 +86,7 @@ class _Stage:
     """The things of a run, by their names."""
 
     places: tuple[Variable, ...]
+    signals: tuple[Variable, ...]
     transitions: tuple[Variable, ...]
     controllers: tuple[Variable, ...]
     rounds: tuple[Variable, ...]
@@ -89,7 +94,7 @@ class _Stage:
     @property
     def sorts(self) -> tuple[tuple[Sort, tuple[Variable, ...]], ...]:
         return (
-            (Place, self.places),
+            (Place, (*self.places, *self.signals)),
             (Transition, self.transitions),
             (Controller, self.controllers),
             (Round, self.rounds),
@@ -129,32 +134,44 @@ def find_run(
     model = _smallest(script.text(), len(facts))
     if model is None:
         return None
-    names = {p: f"{_owner(model, stage, facts, p)}.{p.name}" for p in stage.places}
+    holding = [fact for n, fact in enumerate(facts) if f"fact-{n}" in model]
+    names = {
+        place: f"{next(c.name for c in stage.controllers if same(owner(place), c) in holding)}.{place.name}"
+        for place in (*stage.places, *stage.signals)
+    }
     return Run(
-        _net(stage, names, [fact for n, fact in enumerate(facts) if f"fact-{n}" in model]),
+        _net(stage, names, holding),
         tuple(_events(protocol, steps)),
-        tuple(dict(_named(protocol, step))[t].name for step in steps if protocol.action(step[0]).fires),
+        tuple((names[each], initially(each) in holding) for each in stage.signals),
+        tuple(_course(protocol, steps, names)),
         tuple(names[p] for p in stage.places if f"local-{p.name}" in model),
         tuple(names[p] for p in stage.places if f"central-{p.name}" in model),
     )
 
 
-def before_last(run: Run) -> tuple[str, ...] | None:
-    """The marking of the central net after all firings of a run but the last; None where it cannot fire them."""
-    player, marking = Player(run.net), run.net.initial_marking
-    for name in run.fired[:-1]:
-        if (fired := run.net.transition_index[name]) not in player.may_fire(marking):
+def before_last(run: Run) -> tuple[tuple[str, ...], dict[str, bool]] | None:
+    """The marking of the central net before the last firing of a run, and the signals; None where it comes to none."""
+    *before, _ = run.course
+    return _played(run, before)
+
+
+def central_marking(run: Run) -> tuple[str, ...] | None:
+    """The marking of the central net at the end of a run; None where it cannot fire what fired."""
+    played = _played(run, run.course)
+    return None if played is None else played[0]
+
+
+def _played(run: Run, course: Sequence[str]) -> tuple[tuple[str, ...], dict[str, bool]] | None:
+    """By the reference player: each firing where it is enabled."""
+    player, marking, signals = Player(run.net), run.net.initial_marking, dict(run.signals)
+    for name in course:
+        if name in signals:
+            signals[name] = not signals[name]
+        elif (fired := run.net.transition_index[name]) in player.enabled(marking, signals):
+            marking = player.fire(marking, [fired])
+        else:
             return None
-        marking = player.fire(marking, [fired])
-    return run.net.names(marking)
-
-
-def central_marking(run: Run) -> tuple[str, ...]:
-    """The marking of the central net after the firings of a run, by the reference player; the names of its places."""
-    player, marking = Player(run.net), run.net.initial_marking
-    for name in run.fired:
-        marking = player.fire(marking, [run.net.transition_index[name]])
-    return run.net.names(marking)
+    return run.net.names(marking), signals
 
 
 def _stage(protocol: Protocol, steps: Sequence[Step], places: int, given: Sequence[Formula]) -> _Stage:
@@ -164,7 +181,8 @@ def _stage(protocol: Protocol, steps: Sequence[Step], places: int, given: Sequen
     def of(sort: Sort) -> tuple[Variable, ...]:
         return tuple(sorted((v for v in found if v.sort == sort), key=lambda v: v.name))
 
-    return _Stage(tuple(Variable(f"p{i + 1}", Place) for i in range(places)), of(Transition), of(Controller), of(Round))
+    ordinary = tuple(Variable(f"p{i + 1}", Place) for i in range(places))
+    return _Stage(ordinary, of(Place), of(Transition), of(Controller), of(Round))
 
 
 def _named(protocol: Protocol, step: Step) -> Iterator[tuple[Variable, Variable]]:
@@ -181,6 +199,15 @@ def _events(protocol: Protocol, steps: Sequence[Step]) -> Iterator[str]:
             for parameter, value in _named(protocol, step)
         }
         yield protocol.action(step[0]).words.format(**spoken)
+
+
+def _course(protocol: Protocol, steps: Sequence[Step], names: dict[Variable, str]) -> Iterator[str]:
+    for step in steps:
+        action, values = protocol.action(step[0]), dict(_named(protocol, step))
+        if action.fires:
+            yield values[t].name
+        elif p in values:
+            yield names[values[p]]
 
 
 def _script(
@@ -206,42 +233,47 @@ def _script(
     for demand in protocol.action(last[0]).demands:
         script.add(demand.formula, demand.words, names)
     if goal is NOT_FOLLOWED:
-        script.add(~central_firable(t), "the central net cannot follow", names)
+        script.add(~central_enabled(t), "the central net cannot follow", names)
     script.change(protocol.action(last[0]), names)
     if goal is not NOT_FOLLOWED:
         script.add(goal, "the end")
     return script
 
 
-NOT_FOLLOWED: Final = ~central_firable(t)
+NOT_FOLLOWED: Final = ~central_enabled(t)
 """As a goal: the last step fires what the central net cannot fire then."""
 
 
 def _tidy(stage: _Stage) -> Iterator[Formula]:
-    """Capital letters are coordinated; who takes part owns a place of it; all external gates can open.
+    """Capital letters are coordinated; who takes part owns something of it; signals are only read.
 
     A transition takes a token and puts one, and has one arc or gate to a place.
     """
+    both_kinds = (*stage.places, *stage.signals)
+    yield both([~signal(place) for place in stage.places])
+    yield both([signal(each) for each in stage.signals])
     for transition in stage.transitions:
         is_coordinated = coordinated(transition)
         yield is_coordinated if transition.name.isupper() else ~is_coordinated
+        yield both([~clears(transition, place) for place in both_kinds])
         for moves in (input_of, output_of):
             yield any_of([moves(transition, place) for place in stage.places])
+            yield both([~moves(transition, each) for each in stage.signals])
         for one, other in combinations(_ARCS, 2):
-            yield both([~(one(transition, place) & other(transition, place)) for place in stage.places])
+            yield both([~(one(transition, place) & other(transition, place)) for place in both_kinds])
         for controller in stage.controllers:
-            yield openable_at(transition, controller)
-            its = [reads(transition, place) & same(owner(place), controller) for place in stage.places]
+            its = [reads(transition, place) & same(owner(place), controller) for place in both_kinds]
             yield takes_part(transition, controller).implies(any_of(its))
 
 
 def _facts(stage: _Stage) -> Iterator[Formula]:
     """What there is to know of the net, in the order in which it is tried to do without."""
+    both_kinds = (*stage.places, *stage.signals)
     for relation in _ARCS:
         for transition in stage.transitions:
-            for place in stage.places:
+            for place in both_kinds:
                 yield relation(transition, place)
-    for place in stage.places:
+    for place in both_kinds:
         yield initially(place)
         for controller in stage.controllers:
             yield same(owner(place), controller)
@@ -276,13 +308,16 @@ def _holding(solver: z3.Solver) -> frozenset[str] | None:
     return frozenset(d.name() for d in model.decls() if d.arity() == 0 and z3.is_true(model[d]))
 
 
-def _owner(model: frozenset[str], stage: _Stage, facts: tuple[Formula, ...], place: Variable) -> str:
-    return next(c.name for c in stage.controllers if f"fact-{facts.index(same(owner(place), c))}" in model)
-
-
 def _net(stage: _Stage, names: dict[Variable, str], facts: Sequence[Formula]) -> nets.Net:
-    def arcs(relation: Relation, transition: Variable) -> tuple[str, ...]:
-        return tuple(names[place] for place in stage.places if relation(transition, place) in facts)
+    def arcs(relation: Relation, transition: Variable, of: tuple[Variable, ...]) -> tuple[str, ...]:
+        return tuple(names[place] for place in of if relation(transition, place) in facts)
+
+    def gates(transition: Variable) -> tuple[nets.ExternalGate, ...]:
+        return tuple(
+            nets.ExternalGate(name, wanted=wanted)
+            for relation, wanted in ((permissive_of, True), (inhibitive_of, False))
+            for name in arcs(relation, transition, stage.signals)
+        )
 
     return nets.Net(
         "found",
@@ -290,12 +325,14 @@ def _net(stage: _Stage, names: dict[Variable, str], facts: Sequence[Formula]) ->
         tuple(
             nets.Transition(
                 transition.name,
-                arcs(input_of, transition),
-                arcs(output_of, transition),
-                arcs(permissive_of, transition),
-                arcs(inhibitive_of, transition),
+                arcs(input_of, transition, stage.places),
+                arcs(output_of, transition, stage.places),
+                arcs(permissive_of, transition, stage.places),
+                arcs(inhibitive_of, transition, stage.places),
+                gates(transition),
             )
             for transition in stage.transitions
         ),
-        controllers=tuple(nets.Controller(controller.name) for controller in stage.controllers),
+        tuple(nets.Signal(names[each], names[each].partition(".")[0]) for each in stage.signals),
+        tuple(nets.Controller(controller.name) for controller in stage.controllers),
     )

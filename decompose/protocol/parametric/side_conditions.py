@@ -9,7 +9,8 @@ central net, in time linear in arcs and gates:
   gates there (so that who owns a gate takes part, O3), and whatever else takes part moves and reads nothing;
 - *locals*: every other transition stands in one subnet, whole (the function `home`);
 - *strangers*: the subnets have no transition that is neither, and none stands for two;
-- *gates*: the external gates of the parts are those of the transition, each at the owner of its signal (`openable`);
+- *gates*: the external gates of the parts are those of the transition, each at the owner of its signal, and commands
+  are completed by the same signals (`signal`, `clears`);
 - *start*: a place is marked in its subnet as in the central net.
 
 Nothing is asked of arbitration groups. Promises alone keep conflicting transitions apart, whichever rounds ask for
@@ -48,6 +49,7 @@ class _Split:
     net: Net
     subnets: dict[str, Net]
     owner_of: dict[str, str | None]
+    completion_of: dict[str, str | None]
     part_of: dict[tuple[str, str], list[str]]
     """By controller and name of a part: the coordinated transitions that list it."""
     coordinated: frozenset[str]
@@ -63,6 +65,7 @@ class _Split:
             decomposition.net,
             {subnet.name: subnet for subnet in decomposition.subnets},
             {place.name: place.owner for place in decomposition.net.places},
+            {place.name: place.completion for place in decomposition.net.places},
             part_of,
             frozenset(row.name for row in decomposition.coordinated),
         )
@@ -187,6 +190,10 @@ def _gates(split: _Split) -> Iterator[_Problem]:
         for signal in subnet.signals:
             if owner_of.get(signal.name) != subnet.name:
                 yield _Problem(signal.name, f"'{signal.name}' is read by '{subnet.name}', which does not own it")
+        for place in subnet.places:
+            if place.completion != split.completion_of.get(place.name):
+                words = f"the command of '{place.name}' is completed by another signal at '{subnet.name}'"
+                yield _Problem(place.name, words)
     for row in split.decomposition.coordinated:
         if row.name not in split.net.transition_index:
             continue  # which `parts` says
@@ -220,7 +227,7 @@ CONDITIONS: Final[tuple[tuple[str, str, Callable[[_Split], Iterator[_Problem]]],
     ("parts", "each part has the arcs and gates of its transition at its controller, and no owner is left out", _parts),
     ("locals", "each transition that is not coordinated stands whole in one subnet", _locals),
     ("strangers", "the subnets have no other transitions", _strangers),
-    ("gates", "the external gates of the parts are those of the transition, at the owners of the signals", _gates),
+    ("gates", "the parts have the external gates of the transition, each at the owner of its signal", _gates),
     ("start", "the subnets are marked as the central net", _start),
 )
 """What the theorem assumes of a decomposition. To add one: its function, and a row."""

@@ -6,7 +6,13 @@ are about these lines, and the tests hold them to the machines that run the cell
 **What there is.** Places, transitions, controllers and rounds. Each place has an owner. A transition is *coordinated*,
 or a local one of the controller that is its home. The part of a transition at a controller is what it has of places
 there; so the arcs and gates are those of the central net, and that the subnets hold just these is a condition on
-each decomposition (`side_conditions`). External gates are free: `openable` says that some valuation opens them.
+each decomposition (`side_conditions`).
+
+**Signals.** To the protocol a signal, as the process image of its owner has it, is a place that the cell fills and
+empties (`sense`): an external gate reads it as an internal one reads a place, and a command that it completes clears
+it. A change of a signal that a promise reads is kept out of the image until the promise ends, so here it happens later.
+What is proved is thus Eq. (1) *and* (2), of the images that the controllers have at one instant. That an image tells
+the truth about the cell is assumed (O4).
 
 **Rounds.** The coordinator asks for transitions in rounds, each decided once: with one transition committed, or with
 none. Any number of rounds may be open at once, of one arbitration group or of several, and a round may ask for any
@@ -22,8 +28,8 @@ that is bad in every way (Lamport, Specifying Systems; Padon et al., Ivy, PLDI 2
 changes nothing here, and whatever it might do stays possible after its restart. A coordinator that crashes keeps what
 it has decided and gives up the rest (`restart`).
 
-**What fires when.** `shadow` is the marking of the central net: it fires at a commit and at each local firing. All that
-is proved compares it with `marked`, what the controllers hold.
+**What fires when.** `shadow` is the marking of the central net: it fires at a commit and at each local firing, and has
+the signals of the images. All that is proved compares it with `marked`, what the controllers hold.
 
 Rejected: channels as bags with actions that lose and double; they need counting, of which first-order logic is not
 capable, and show nothing more. Rounds as numbers: nothing is ever asked of them but whether they are the same.
@@ -65,11 +71,11 @@ output_of = Relation("output", (Transition, Place))
 permissive_of = Relation("permissive", (Transition, Place))
 inhibitive_of = Relation("inhibitive", (Transition, Place))
 takes_part = Relation("takes-part", (Transition, Controller))
-openable = Relation("openable", (Transition,))
-openable_at = Relation("openable-at", (Transition, Controller))
+clears = Relation("clears", (Transition, Place))  # a signal, because it completes a command that is sent then
+signal = Relation("signal", (Place,))
 initially = Relation("initially", (Place,))
 
-writes = Definition("writes", (t, p), input_of(t, p) | output_of(t, p))
+writes = Definition("writes", (t, p), input_of(t, p) | output_of(t, p) | clears(t, p))
 reads = Definition("reads", (t, p), writes(t, p) | permissive_of(t, p) | inhibitive_of(t, p))
 disturb = Definition(  # firing one could change what the other reads
     "disturb-at", (t, u, p), (writes(t, p) & reads(u, p)) | (reads(t, p) & writes(u, p))
@@ -82,18 +88,6 @@ STATIC: Final[tuple[tuple[str, Formula], ...]] = (
     (
         "a local transition moves and reads places of its home alone",
         forall(u, q)((~coordinated(u) & reads(u, q)).implies(same(owner(q), home(u)))),
-    ),
-    (
-        "in a local transition its home takes part alone",
-        forall(u, d)((~coordinated(u)).implies(takes_part(u, d).iff(same(d, home(u))))),
-    ),
-    (
-        "what opens the external gates of a transition opens those of its parts",
-        forall(u, d)((openable(u) & takes_part(u, d)).implies(openable_at(u, d))),
-    ),
-    (
-        "and the other way round: external gates have one owner each",
-        forall(u)(forall(d)(takes_part(u, d).implies(openable_at(u, d))).implies(openable(u))),
     ),
 )
 """What is assumed of every net and its split, and checked of each."""
@@ -127,22 +121,22 @@ MOVING: Final = (
 """All that steps change: a configuration is what these hold of."""
 
 
-def _firable(tokens: Relation, of: Variable, at: Variable) -> Formula:
-    """Eq. (1) at one place: an input or permissive gate needs a token, an output or inhibitive gate none."""
+def _enabled(tokens: Relation, of: Variable, at: Variable) -> Formula:
+    """Eq. (1)-(2) at one place: an input or permissive gate needs a token, an output or inhibitive gate none."""
     full = (input_of(of, at) | permissive_of(of, at)).implies(tokens(at))
     empty = (output_of(of, at) | inhibitive_of(of, at)).implies(~tokens(at))
     return full & empty
 
 
-part_firable = Definition(  # Eq. (1) of a part, in the subnet of its controller
-    "part-firable", (t, c), forall(q)(same(owner(q), c).implies(_firable(marked, t, q)))
+part_enabled = Definition(  # Eq. (1)-(2) of a part, in the subnet of its controller
+    "part-enabled", (t, c), forall(q)(same(owner(q), c).implies(_enabled(marked, t, q)))
 )
-central_firable = Definition("central-firable", (t,), openable(t) & forall(q)(_firable(shadow, t, q)))
+central_enabled = Definition("central-enabled", (t,), forall(q)(_enabled(shadow, t, q)))
 
 
 def _fired(tokens: Relation, of: Variable, at: Variable) -> Formula:
-    """Eq. (3)-(4): the token of a place after a firing."""
-    return output_of(of, at) | (tokens(at) & ~input_of(of, at))
+    """Eq. (3)-(4): the token of a place after a firing; a signal of a command is cleared."""
+    return output_of(of, at) | (tokens(at) & ~input_of(of, at) & ~clears(of, at))
 
 
 undisturbed = Definition(  # O1, of a part of round r and the promises given in other rounds
@@ -158,8 +152,9 @@ undisturbed_locally = Definition(  # O1, of a local transition and all promises
 
 # --- What may happen
 #
-# Every demand is needed: without any one of them the proof fails (tests/decompose/test_wrong_protocols.py). So the
-# executor demands more here and there, as that a vote counts only before the decision, which changes nothing.
+# Every demand is needed: without any one of them the proof fails (tests/decompose/test_parametric_wrong.py). Only that
+# it is signals which the cell changes by itself is no demand of the proof. The executor demands more here and there, as
+# that a vote counts only before the decision, which changes nothing.
 
 
 def _is(formals: tuple[Variable, ...], terms: tuple[Term, ...]) -> Formula:
@@ -223,8 +218,7 @@ PROMISE: Final = Action(
     (
         Demand("a request of the round has arrived", request(r, t, c)),
         Demand("no order of the round has been obeyed", ~obeyed(r, t, c)),
-        Demand("the part is firable in the subnet", part_firable(t, c)),
-        Demand("its external gates can open", openable_at(t, c)),
+        Demand("the part is enabled in the subnet", part_enabled(t, c)),
         Demand("no promise of another round is disturbed (O1)", undisturbed(r, t, c)),
     ),
     (adds(promised, r, t, c), adds(vote, r, t, c)),
@@ -331,13 +325,23 @@ FIRE: Final = Action(
     (t,),
     (
         Demand("it is local", ~coordinated(t)),
-        Demand("it is firable in the subnet of its home", part_firable(t, home(t))),
-        Demand("its external gates can open", openable_at(t, home(t))),
+        Demand("it is enabled in the subnet of its home", part_enabled(t, home(t))),
         Demand("no promise is disturbed (O1)", undisturbed_locally(t, home(t))),
     ),
     (part_applied(t, home(t)), shadow_fires(t)),
     "the local transition {t} fires",
     fires=True,
+)
+
+SENSE: Final = Action(
+    "sense",
+    (p,),
+    (
+        Demand("it is a signal", signal(p)),
+        Demand("no promise reads it", forall(s, u)(promised(s, u, owner(p)).implies(~reads(u, p)))),
+    ),
+    tuple(Update(tokens, (q,), (same(q, p) & ~tokens(q)) | (~same(q, p) & tokens(q))) for tokens in (marked, shadow)),
+    "the signal {p} changes",
 )
 
 
@@ -354,7 +358,7 @@ class Protocol:
 
 
 PROTOCOL: Final = Protocol(
-    STATIC, (ASK, PROMISE, HEAR, DECIDE, GIVE_UP, RESTART, APPLY, RELEASE, NOTE, CLOSE, FORGET, FIRE)
+    STATIC, (ASK, PROMISE, HEAR, DECIDE, GIVE_UP, RESTART, APPLY, RELEASE, NOTE, CLOSE, FORGET, FIRE, SENSE)
 )
 """The protocol of the executor."""
 

@@ -1,15 +1,15 @@
 """What is proved of the protocol, once for every net: each obligation a file that must have no model.
 
 - *starts*, *keeps*: the invariant holds at the start, and each action keeps it; so it holds for ever.
-- *follows*, *rest*, *once*, *expected*: what the invariant is for. Whatever fires, at a commit or locally, the central
-  net can fire then, and the shadow does so by definition; all other actions leave the shadow alone. When every decided
-  round is closed, the controllers hold the central marking. An order finds its part promised and firable, so that it
-  takes tokens that are there and puts them on empty places.
+- *follows*, *rest*, *once*, *expected*: what the invariant is for. Whatever fires, at a commit or locally, is enabled
+  in the central net then, which fires it by definition; all other actions leave it alone, but for signals that change.
+  When every decided round is closed, the controllers hold the central marking. An order finds its part promised and
+  enabled, so that it takes tokens that are there and puts them on empty places.
 - *home*: as long as a round is open, one of five steps can be taken that leaves the shadow alone (give up, apply,
   release, note, close), and each of them makes what is still to be done strictly less.
-- *complete*: when no round is open, whatever the central net may fire can fire: a local transition at once, a
-  coordinated one asked for in a new round, promised and heard of each who takes part, and decided. On the way the
-  shadow stays.
+- *complete*: when no round is open, whatever is enabled in the central net can fire: a local transition at once, a
+  coordinated one asked for in a new round, promised and heard of each who takes part, and decided; and every signal
+  can change. On the way the shadow stays.
 - *advances*: every step that is hidden, but for asking, leaves everything as it is or makes something known for good
   that was not: so a run without end that fires nothing asks again and again, or repeats.
 
@@ -51,7 +51,7 @@ from firable.decompose.protocol.parametric.system import (
     asked,
     begun,
     c,
-    central_firable,
+    central_enabled,
     closed_round,
     commit_order,
     coordinated,
@@ -65,12 +65,14 @@ from firable.decompose.protocol.parametric.system import (
     obeyed,
     output_of,
     owner,
-    part_firable,
+    p,
+    part_enabled,
     promised,
     q,
     r,
     s,
     shadow,
+    signal,
     t,
     takes_part,
     u,
@@ -136,7 +138,7 @@ def parametric_obligations(protocol: Protocol = PROTOCOL) -> Iterator[Parametric
     yield from prover.homeward()
     yield from prover.complete()
     for action in protocol.actions:
-        if action.name != "ask" and not action.fires:
+        if action.name not in {"ask", "sense"} and not action.fires:
             yield prover.advances(action)
 
 
@@ -163,9 +165,9 @@ _less: Final = both([closed(item.implies(earlier(item))) for item in _to_do]) & 
 )
 
 _opening: Final = (
-    asked(r, t) & ~decided(r) & central_firable(t) & forall(s, u, d)(promised(s, u, d).implies(same(s, r))) & agree
+    asked(r, t) & ~decided(r) & central_enabled(t) & forall(s, u, d)(promised(s, u, d).implies(same(s, r))) & agree
 )
-"""Round r asks for t, which the central net may fire, and no promise of another round stands."""
+"""Round r asks for t, which is enabled in the central net, and no promise of another round stands."""
 
 
 def _may(action: Action) -> Formula:
@@ -208,9 +210,9 @@ class _Prover:
             if action.fires:
                 yield self.implied(
                     f"follows.{action.name}",
-                    f"what fires at '{action.name}', the central net may fire then",
+                    f"what fires at '{action.name}' is enabled in the central net then",
                     both(list(action.guard)),
-                    central_firable(t),
+                    central_enabled(t),
                 )
         yield self.implied(
             "rest",
@@ -226,9 +228,9 @@ class _Prover:
         )
         yield self.implied(
             "expected",
-            "an order that was not obeyed finds its part promised and firable",
+            "an order that was not obeyed finds its part promised and enabled",
             commit_order(r, t, c) & ~obeyed(r, t, c),
-            promised(r, t, c) & part_firable(t, c),
+            promised(r, t, c) & part_enabled(t, c),
         )
 
     # --- Completeness
@@ -261,9 +263,9 @@ class _Prover:
         steps: tuple[tuple[str, Formula, Formula, str], ...] = (
             (
                 "ask",
-                none_open & coordinated(t) & central_firable(t) & ~begun(r),
+                none_open & coordinated(t) & central_enabled(t) & ~begun(r),
                 _opening,
-                "with no round open, a new one can ask for what the central net may fire",
+                "with no round open, a new one can ask for whatever is enabled in the central net",
             ),
             (
                 "promise",
@@ -280,10 +282,11 @@ class _Prover:
             ),
             (
                 "fire",
-                none_open & ~coordinated(t) & central_firable(t),
+                none_open & ~coordinated(t) & central_enabled(t),
                 both([]),
-                "with no round open, a local transition that the central net may fire can fire",
+                "with no round open, a local transition that is enabled in the central net can fire",
             ),
+            ("sense", none_open & signal(p), both([]), "with no round open, every signal can change"),
         )
         for step, given, after, words in steps:
             action = self.protocol.action(step)

@@ -40,7 +40,7 @@ from firable.decompose.protocol.parametric.system import (
     adds_where,
     asked,
     c,
-    central_firable,
+    central_enabled,
     commit_order,
     coordinated,
     d,
@@ -115,16 +115,18 @@ def refute(wrong: Wrong) -> Refutation | None:
 def _end(goal: Formula, run: Run) -> Iterator[str]:
     """What the reference player says is wrong at the end."""
     if goal is NOT_FOLLOWED:
-        if (marking := before_last(run)) is None:
+        if (played := before_last(run)) is None:
             return
-        last = run.net.transition(run.fired[-1])
+        marking, signals = played
+        last = run.net.transition(run.course[-1])
         wrong = [f"'{p}' is empty" for p in (*last.inputs, *last.permissive) if p not in marking]
         wrong += [f"'{p}' is full" for p in (*last.outputs, *last.inhibitive) if p in marking]
+        wrong += [f"'{g.signal}' is {int(not g.wanted)}" for g in last.external if signals[g.signal] != g.wanted]
         if wrong:
             yield f"the central net cannot fire '{last.name}' then: {' and '.join(wrong)}"
         return
     central = central_marking(run)
-    if set(central) != set(run.central):
+    if central is None or set(central) != set(run.central):
         return
     if goal is STUCK:
         yield "every round is closed, and a promise still stands, which nobody will release"
@@ -298,7 +300,16 @@ WRONG: Final = (
         ("follows.decide",),
         "ask r1 G; promise r1 G a; promise r1 G b; fire l; hear r1 G a; hear r1 G b; decide r1 G",
         4,
-        given=(central_firable(_G), takes_part(Variable("l", Transition), Variable("c", Controller))),
+        given=(central_enabled(_G), takes_part(Variable("l", Transition), Variable("c", Controller))),
+    ),
+    Wrong(
+        "signals-change-under-promises",
+        "O4",
+        "a signal that a promise reads is taken into the process image at once",
+        without("sense", "no promise"),
+        ("keeps.sense",),
+        "ask r1 G; promise r1 G a; sense s1; promise r1 G b; hear r1 G a; hear r1 G b; decide r1 G",
+        2,
     ),
     Wrong(
         "votes-from-before-the-decision",
@@ -401,7 +412,7 @@ WRONG: Final = (
         "filled-outputs-not-looked-at",
         "Eq. (5)",
         "a part is promised though its output place is full, as Eq. (5) reads without its bars",
-        _instead("promise", "firable", _inputs_only(t, c)),
+        _instead("promise", "enabled", _inputs_only(t, c)),
         ("keeps.promise",),
         f"{_VOTES}; decide r1 G",
         2,
