@@ -59,8 +59,8 @@ def refine(
     """Open every place of NET that names a registered task to the steps of that task.
 
     Each task is checked alone, with nothing around it: that it always can end, leaves nothing behind and has no
-    contact. What is proved of NET then holds of the detailed net too, which is not explored for it. A task that violates
-    a condition is refused, with a firing sequence in its own names.
+    contact. What is proved of NET then holds of the detailed net too, which is not explored for it. A task that
+    violates a condition is refused, with a firing sequence in its own names.
     """
     if output == "-":
         raise click.UsageError("the net cannot go to standard output, where the report goes: name a file")
