@@ -100,10 +100,8 @@ class _Search:
     def __init__(self, net: Net, deadline: Deadline) -> None:
         self.net, self.deadline, self.of = net, deadline, ordinary(net)
         self.may_be_marked = markable(self.of)
-        self.changes = columns(net)
         # A unit is a draining set that fewer tries find, where there is one. Next time what was found goes first.
-        self.drain = UnitSearch(self.changes, self.of.n_places, self.of.marked, 1, draining=True)
-        self.searches = [UnitSearch(self.changes, self.of.n_places, self.of.marked, 1), self.drain]
+        self.draining_first = False
         self.drains: list[tuple[frozenset[int], int]] = []  # each with its tokens
         self.at: dict[int, list[int]] = {}
         self.used: dict[int, None] = {}
@@ -121,10 +119,13 @@ class _Search:
             return True
         if place not in self.tried and place not in self.at:
             self.tried.add(place)
-            first, second = self.searches
-            for search, tries in ((first, 20), (second, 200), (first, 500)):
+            first = self.draining_first
+            for draining, tries in ((first, 20), (not first, 200), (first, 500)):
+                if self.deadline.over:
+                    return False
+                search = self._drain if draining else self._unit
                 if drain := search.unit(place, tries, self.deadline):
-                    self.searches = [search, second if search is first else first]
+                    self.draining_first = draining
                     self._add(drain)
                     if self._by_drain(full, {place}):
                         return True
@@ -156,16 +157,29 @@ class _Search:
             self.at.setdefault(place, []).append(len(self.drains))
         self.drains.append((frozenset(drain), len(self.of.marked.intersection(drain))))
 
+    # What is as large as the net is made when it is first needed, so that the deadline is looked at between.
+    @cached_property
+    def _changes(self) -> list[dict[int, int]]:
+        return columns(self.net)
+
+    @cached_property
+    def _unit(self) -> UnitSearch:
+        return UnitSearch(self._changes, self.of.n_places, self.of.marked, 1)
+
+    @cached_property
+    def _drain(self) -> UnitSearch:
+        return UnitSearch(self._changes, self.of.n_places, self.of.marked, 1, draining=True)
+
     @cached_property
     def _refuter(self) -> Refuter:
         # Only the transitions that can fire: the certificate says which places they are that stay empty.
         fires = (t for k, t in enumerate(self.of.transitions) if self.may_be_marked.issuperset(self.of.inputs[k]))
-        return Refuter([self.changes[t] for t in fires], self.of.n_places, self.of.marked)
+        return Refuter([self._changes[t] for t in fires], self.of.n_places, self.of.marked)
 
     def proof(self, *, whole: bool, behaves: bool, undecided: str) -> ContactProof:
         """What was found, with the units that were needed."""
         used = [(tuple(sorted(self.drains[k][0])), self.drains[k][1]) for k in self.used]
-        lossless = self.drain.lossless([places for places, _ in used])
+        lossless = self._drain.lossless([places for places, _ in used]) if used else []
         units = tuple(places for (places, _), unit in zip(used, lossless, strict=True) if unit)
         sums = (never_more(*drain) for drain, unit in zip(used, lossless, strict=True) if not unit)
         told = "the time was over" if undecided and self.deadline.over else undecided

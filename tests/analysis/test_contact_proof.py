@@ -17,6 +17,7 @@ from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.goal import Limits
 from firable.analysis.structure.contact import contact_proof, decide_contact_by_invariants
 from firable.analysis.verdicts.goals import in_contact_formula
+from firable.nets.catalogue import catalogue_net
 from firable.nets.formula import Or
 from firable.nets.net import Net, Place, Transition
 from firable.semantics.player import Player
@@ -108,3 +109,12 @@ def test_thousands_of_places_are_a_matter_of_units_and_the_flag_ends_the_search(
     flag.set()
     found = decide_contact_by_invariants(net, Limits(Deadline(cancelled=flag)))
     assert (found.reachable, found.bound) == (None, "the time was over")
+
+
+def test_what_is_as_large_as_the_net_is_not_made_when_the_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    def too_late(net: Net) -> list[dict[int, int]]:
+        raise AssertionError(f"the matrix of {net.name} is made")
+
+    monkeypatch.setattr("firable.analysis.structure.contact.columns", too_late)
+    proof = contact_proof(catalogue_net("one_robot"), Deadline.after(0))
+    assert (proof.whole, proof.undecided) == (False, "the time was over")

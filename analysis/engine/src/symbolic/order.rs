@@ -21,6 +21,7 @@
 
 use std::collections::{BinaryHeap, VecDeque};
 
+use crate::budget::{Stop, Watch};
 use crate::net::Transition;
 
 const FORCE_ROUNDS: usize = 40;
@@ -30,6 +31,9 @@ const FORCE_WORK: usize = 40_000_000;
 /// How far a place may slide, and the arcs that all sliding may visit.
 const WINDOW: usize = 12;
 const SLIDING_WORK: usize = 10_000_000;
+
+/// The work between two looks at the clock, or more.
+const BETWEEN: usize = 1 << 16;
 
 /// An order: the places from the lowest level to the highest.
 pub type Order = Vec<u32>;
@@ -330,13 +334,24 @@ impl Graph {
 }
 
 /// Orders worth trying, those with the shorter arcs first, each followed by its reverse.
-pub fn candidates(places: usize, transitions: &[Transition]) -> Vec<Order> {
+///
+/// The watch is asked between two of them, each of which has work of its own that is bounded.
+pub fn candidates(places: usize, transitions: &[Transition], watch: &mut Watch<'_>) -> Result<Vec<Order>, Stop> {
     let graph = Graph::new(places, transitions);
     let as_given: Order = (0..places as u32).collect();
     let both = |order: Order| [order.clone(), order.into_iter().rev().collect::<Order>()];
     let span = |pair: &[Order; 2]| graph.span(&pair[0]);
     let given = [graph.slide(as_given.clone()), as_given].map(both);
-    let mut found = [graph.sloan(), graph.cuthill_mckee()].map(|order| both(graph.slide(graph.force(order)))).to_vec();
+    let mut found = Vec::new();
+    for numbered in [Graph::sloan, Graph::cuthill_mckee] {
+        let mut order = numbered(&graph);
+        for shortened in [Graph::force, Graph::slide] {
+            watch.tick(BETWEEN)?;
+            order = shortened(&graph, order);
+        }
+        found.push(both(order));
+    }
+    watch.tick(BETWEEN)?;
     if let Some(hubs) = graph.by_hub(transitions) {
         // Where the hubs give the shortest arcs, the others are as good as them but for disorder within the hubs.
         if found.iter().all(|pair| span(&hubs) < span(pair)) {
@@ -347,12 +362,30 @@ pub fn candidates(places: usize, transitions: &[Transition]) -> Vec<Order> {
     found.extend(given);
     found.sort_by_cached_key(span);
     found.dedup();
-    found.into_iter().flatten().collect()
+    Ok(found.into_iter().flatten().collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::unwatched;
+
+    fn made(places: usize, transitions: &[Transition]) -> Vec<Order> {
+        let mut poll = unwatched;
+        candidates(places, transitions, &mut Watch::new(None, &mut poll)).unwrap()
+    }
+
+    #[test]
+    fn the_making_of_orders_ends_in_time() {
+        let transitions = ring(1000);
+        let mut polls = 0;
+        let mut poll = |_| {
+            polls += 1;
+            Err(Stop::Cancelled)
+        };
+        let stopped = candidates(1000, &transitions, &mut Watch::new(None, &mut poll));
+        assert_eq!((stopped, polls), (Err(Stop::Cancelled), 1));
+    }
 
     fn ring(n: u32) -> Vec<Transition> {
         // Places far apart in number are neighbours in the ring.
@@ -364,12 +397,12 @@ mod tests {
     fn every_candidate_is_a_permutation() {
         let mut transitions = ring(20);
         transitions.push(Transition::default());
-        for order in candidates(25, &transitions) {
+        for order in made(25, &transitions) {
             let mut sorted = order.clone();
             sorted.sort_unstable();
             assert_eq!(sorted, (0..25).collect::<Vec<u32>>());
         }
-        assert_eq!(candidates(0, &[]), vec![Vec::<u32>::new(); 2]);
+        assert_eq!(made(0, &[]), vec![Vec::<u32>::new(); 2]);
     }
 
     #[test]
@@ -393,7 +426,7 @@ mod tests {
         let (n, transitions) = (1000, ring(1000));
         let graph = Graph::new(n, &transitions);
         let given: Order = (0..n as u32).collect();
-        assert!(graph.span(&candidates(n, &transitions)[0]) <= 2 * n as u64);
+        assert!(graph.span(&made(n, &transitions)[0]) <= 2 * n as u64);
         assert!(graph.span(&given) > 10 * n as u64);
     }
 }

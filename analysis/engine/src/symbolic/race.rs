@@ -136,7 +136,10 @@ impl Symbolic {
         orders: Option<Vec<Order>>,
         watch: &mut Watch<'_>,
     ) -> Result<Self, Stop> {
-        let orders = orders.unwrap_or_else(|| candidates(places, &transitions));
+        let orders = match orders {
+            Some(orders) => orders,
+            None => candidates(places, &transitions, watch)?,
+        };
         let racer = |order| Racer { order, begun: None, before: 0, alike: 0 };
         let mut field: Vec<Racer> = orders.into_iter().map(racer).collect();
         let first = FUEL + FUEL_PER_LEVEL * places as u64;
