@@ -53,7 +53,7 @@ def test_file_is_the_same_for_every_net_and_every_time() -> None:
 
 def test_what_is_left_out_of_a_block_is_missed() -> None:
     obligation = next(o for o in parametric_obligations() if o.name == "rest")
-    reader = Reader(10_000, start(PROTOCOL))
+    reader = Reader(10_000, start())
     assert reader.answer(obligation.block) is Answer.UNSAT
     without_invariant = obligation.block.replace("(assert invariant)\n", "")
     assert reader.answer(without_invariant) is Answer.SAT

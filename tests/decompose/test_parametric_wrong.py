@@ -1,6 +1,7 @@
 """The proof is about something: every action can happen, every demand is needed, every wrong protocol is refuted."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 
 from firable.analysis.induction.smt import Answer
 from firable.decompose.proofs.script import Reader
-from firable.decompose.protocol.parametric.invariant import INVARIANT
+from firable.decompose.protocol.parametric.invariant import INVARIANT, Conjunct
 from firable.decompose.protocol.parametric.logic import both
 from firable.decompose.protocol.parametric.proving import start
 from firable.decompose.protocol.parametric.runs import central_marking, find_run, steps_of
@@ -39,7 +40,7 @@ def test_what_an_obligation_is_given_is_possible(name: str) -> None:
     block = next(o.block for o in parametric_obligations() if o.name == name)
     given, denied, _ = block.partition("; and what is to be shown does not hold\n")
     assert denied
-    assert small(PROTOCOL).answer(given + "(check-sat)\n(pop 1)\n") is Answer.SAT
+    assert small().answer(given + "(check-sat)\n(pop 1)\n") is Answer.SAT
 
 
 # --- Every demand is needed
@@ -50,9 +51,9 @@ def without(action: Action, demand: Demand) -> Protocol:
     return replace(PROTOCOL, actions=tuple(changed if other is action else other for other in PROTOCOL.actions))
 
 
-def small(protocol: Protocol) -> Reader:
+def small(protocol: Protocol = PROTOCOL, conjuncts: Sequence[Conjunct] = INVARIANT) -> Reader:
     """z3, told of three places and two things of each other sort at most; what is possible there is possible."""
-    told = start(protocol)
+    told = start(protocol, conjuncts)
     for sort, n in (("Place", 3), ("Transition", 2), ("Controller", 2), ("Round", 2)):
         names = [f"some-{sort}-{i}" for i in range(n)]
         told += "".join(f"(declare-const {name} {sort})\n" for name in names)
@@ -84,6 +85,24 @@ def test_no_demand_can_be_left_out(action: Action, demand: Demand) -> None:
 def test_no_assumption_on_the_net_can_be_left_out(words: str) -> None:
     changed = replace(PROTOCOL, static=tuple(its for its in PROTOCOL.static if its[0] != words))
     assert fails(changed, ("follows.decide", "follows.fire", "complete.fire"))
+
+
+@pytest.mark.parametrize(
+    ("action", "changes"),
+    [(a.name, up.relation.name) for a in PROTOCOL.actions for up in a.updates if a.name != "forget"],
+)
+def test_no_change_can_be_left_out(action: str, changes: str) -> None:
+    its = PROTOCOL.action(action)
+    changed = replace(its, updates=tuple(up for up in its.updates if up.relation.name != changes))
+    protocol = replace(PROTOCOL, actions=tuple(changed if a is its else a for a in PROTOCOL.actions))
+    assert fails(protocol, (f"keeps.{action}", f"home.{action}", f"complete.{action}"))
+
+
+@pytest.mark.parametrize("conjunct", INVARIANT, ids=lambda conjunct: conjunct.name)
+def test_no_conjunct_can_be_left_out(conjunct: Conjunct) -> None:
+    kept = tuple(other for other in INVARIANT if other is not conjunct)
+    reader = small(PROTOCOL, kept)
+    assert any(reader.answer(o.block) is Answer.SAT for o in parametric_obligations(PROTOCOL, kept))
 
 
 # --- Wrong protocols

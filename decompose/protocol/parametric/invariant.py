@@ -15,6 +15,7 @@ The rest says what messages say: that of what was sent the cause is true, and th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -110,5 +111,7 @@ INVARIANT: Final = (
 )  # fmt: skip
 """The invariant; the order is the one of the documentation."""
 
-invariant: Final = Definition("invariant", (), both([conjunct.sentence() for conjunct in INVARIANT]))
-"""All conjuncts together."""
+
+def invariant_of(conjuncts: Sequence[Conjunct]) -> Definition:
+    """All of these together, under the name `invariant`."""
+    return Definition("invariant", (), both([conjunct.sentence() for conjunct in conjuncts]))

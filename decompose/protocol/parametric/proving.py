@@ -7,13 +7,14 @@ it is decided once in a process. z3 reads the very text.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Final
 
 from firable.analysis.induction.smt import Answer
 from firable.decompose.proofs.script import Reader
 from firable.decompose.protocol.parametric.fragment import dependencies, order
+from firable.decompose.protocol.parametric.invariant import INVARIANT, Conjunct
 from firable.decompose.protocol.parametric.side_conditions import side_conditions
 from firable.decompose.protocol.parametric.system import PROTOCOL, Protocol
 from firable.decompose.protocol.parametric.theorem import ParametricObligation, parametric_obligations, theory
@@ -46,15 +47,15 @@ def theorem(timeout_ms: int = TIMEOUT_MS) -> tuple[tuple[Verdict, ...], str]:
     sorts = order({edge for obligation in obligations for edge in dependencies(obligation.script.formulas)})
     assert sorts is not None, "the theorem is outside the decidable fragment"
     head = "".join(f"; {line}\n" for line in (*_HEAD, f"  {', '.join(sort.name for sort in sorts)}."))
-    beginning = head + start(PROTOCOL)
+    beginning = head + start()
     reader = Reader(timeout_ms, beginning)
     verdicts = tuple(_verdict(obligation, reader.answer(obligation.block)) for obligation in obligations)
     return verdicts, beginning + "".join(obligation.block for obligation in obligations)
 
 
-def start(protocol: Protocol) -> str:
+def start(protocol: Protocol = PROTOCOL, conjuncts: Sequence[Conjunct] = INVARIANT) -> str:
     """What stands in the file before the first obligation."""
-    return "\n".join(theory(protocol).lines()) + "\n"
+    return "\n".join(theory(protocol, conjuncts).lines()) + "\n"
 
 
 _HEAD: Final = (

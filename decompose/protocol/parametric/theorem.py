@@ -23,12 +23,12 @@ functions, go from places and transitions to controllers and rounds, and from no
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
-from firable.decompose.protocol.parametric.invariant import INVARIANT, invariant
+from firable.decompose.protocol.parametric.invariant import INVARIANT, Conjunct, invariant_of
 from firable.decompose.protocol.parametric.logic import (
     Formula,
     any_of,
@@ -115,22 +115,24 @@ class ParametricObligation:
         return "\n" + "\n".join([*lines, "(check-sat)", "(pop 1)"]) + "\n"
 
 
-def theory(protocol: Protocol = PROTOCOL) -> Script:
+def theory(protocol: Protocol = PROTOCOL, conjuncts: Sequence[Conjunct] = INVARIANT) -> Script:
     """What there is, what is assumed of every net, and what the invariant says."""
     script = Script()
     script.speak_of(*MOVING)
     for words, formula in protocol.static:
         script.add(formula, f"assumed of every net: {words}")
-    for conjunct in INVARIANT:
+    for conjunct in conjuncts:
         script.remark(f"invariant {conjunct.name}: {conjunct.words}")
         script.speak_of(conjunct.sentence)
-    script.speak_of(invariant)
+    script.speak_of(invariant_of(conjuncts))
     return script
 
 
-def parametric_obligations(protocol: Protocol = PROTOCOL) -> Iterator[ParametricObligation]:
-    """Every obligation of the theorem; they are the same for every net."""
-    prover = _Prover(protocol)
+def parametric_obligations(
+    protocol: Protocol = PROTOCOL, conjuncts: Sequence[Conjunct] = INVARIANT
+) -> Iterator[ParametricObligation]:
+    """Every obligation of the theorem, of this protocol and the invariant of these conjuncts, for every net."""
+    prover = _Prover(protocol, conjuncts)
     yield prover.starts()
     for action in protocol.actions:
         yield prover.keeps(action)
@@ -175,33 +177,32 @@ def _may(action: Action) -> Formula:
     return earlier(both(list(action.guard)))
 
 
-_INVARIANT: Final = ("the invariant", invariant())
-
-
 class _Prover:
     """The obligations of one protocol."""
 
-    def __init__(self, protocol: Protocol) -> None:
+    def __init__(self, protocol: Protocol, conjuncts: Sequence[Conjunct]) -> None:
         self.protocol = protocol
-        self.theory = theory(protocol)
+        self.theory = theory(protocol, conjuncts)
+        self.invariant = invariant_of(conjuncts)()
+        self.given = ("the invariant", self.invariant)
 
     def implied(
         self, name: str, statement: str, given: Formula, claim: Formula, by: Action | None = None
     ) -> ParametricObligation:
         """In each configuration of the invariant, `given` implies `claim`; or after the action `by`."""
-        return ParametricObligation(name, statement, self.theory, (_INVARIANT, ("besides", given)), claim, by)
+        return ParametricObligation(name, statement, self.theory, (self.given, ("besides", given)), claim, by)
 
     def kept(self, name: str, statement: str, claim: Formula, by: Action) -> ParametricObligation:
         """From each configuration of the invariant, an action leads to one of which the claim holds."""
-        return ParametricObligation(name, statement, self.theory, (_INVARIANT,), claim, by, happens=True)
+        return ParametricObligation(name, statement, self.theory, (self.given,), claim, by, happens=True)
 
     # --- The invariant
 
     def starts(self) -> ParametricObligation:
-        return ParametricObligation("starts", "the invariant holds at the start", self.theory, INITIAL, invariant())
+        return ParametricObligation("starts", "the invariant holds at the start", self.theory, INITIAL, self.invariant)
 
     def keeps(self, action: Action) -> ParametricObligation:
-        return self.kept(f"keeps.{action.name}", f"'{action.name}' keeps the invariant", invariant(), action)
+        return self.kept(f"keeps.{action.name}", f"'{action.name}' keeps the invariant", self.invariant, action)
 
     # --- Safety
 
