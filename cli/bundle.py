@@ -7,7 +7,16 @@ from typing import Any
 import click
 
 from firable.cli import text
-from firable.cli.options import analysis_options, answer, budget, format_option, load_net, net_argument
+from firable.cli.options import (
+    analysis_options,
+    answer,
+    budget,
+    format_option,
+    load_net,
+    net_argument,
+    page_option,
+    with_page,
+)
 from firable.cli.report import Report
 
 
@@ -15,8 +24,9 @@ from firable.cli.report import Report
 @net_argument
 @click.option("-o", "--output", metavar="FILE", required=True, help="The bundle to write.")
 @analysis_options
+@page_option
 @format_option
-def bundle(net: str, output: str, format_: str, **limits: Any) -> int:
+def bundle(net: str, output: str, page: str | None, format_: str, **limits: Any) -> int:
     """Check NET, split it, prove the split, and write subnets, table, verdicts and evidence as one sealed file.
 
     Nothing is written unless everything that the net must prove is proved. `firable run` refuses a bundle of which any
@@ -24,7 +34,7 @@ def bundle(net: str, output: str, format_: str, **limits: Any) -> int:
     """
     if output == "-":
         raise click.UsageError("a bundle cannot go to standard output, where the report goes: name a file")
-    return answer("bundle", format_, lambda: _report(net, output, limits), _show)
+    return answer("bundle", format_, with_page(lambda: _report(net, output, limits), page), _show)
 
 
 def _report(argument: str, output: str, limits: dict[str, Any]) -> Report:
@@ -50,6 +60,7 @@ def _report(argument: str, output: str, limits: dict[str, Any]) -> Report:
         figures={**found.figures.to_json(), "bundle_digest": made.digest},
         notes=loaded.notes,
         table=made.decomposition.table,
+        decomposition=made.decomposition,
         files=(output,),
     )
 

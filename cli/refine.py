@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
-from firable.cli.options import analysis_options, answer, budget, format_option, load_net, net_argument, write_text
+from firable.cli.options import (
+    analysis_options,
+    answer,
+    budget,
+    format_option,
+    load_net,
+    net_argument,
+    page_option,
+    with_page,
+    write_text,
+)
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
@@ -44,6 +54,7 @@ _METHODS = ("exploration of the task, closed", "the arcs and gates of the concep
     help="Compare both nets by exploring them, whatever their size or not at all; by default where they are small.",
 )
 @analysis_options
+@page_option
 @format_option
 def refine(
     net: str,
@@ -54,6 +65,7 @@ def refine(
     max_markings: int,
     max_memory: int,
     max_seconds: float | None,
+    page: str | None,
     format_: str,
 ) -> int:
     """Open every place of NET that names a registered task to the steps of that task.
@@ -65,7 +77,8 @@ def refine(
     if output == "-":
         raise click.UsageError("the net cannot go to standard output, where the report goes: name a file")
     most = budget(max_markings, max_memory, max_seconds)
-    return answer("refine", format_, lambda: _report(net, files, output, cell, confirm, most), _show)
+    make = with_page(lambda: _report(net, files, output, cell, confirm, most), page)
+    return answer("refine", format_, make, _show)
 
 
 def _report(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from firable.cli import text
-from firable.cli.options import answer, format_option, load_net, net_argument, write_folder
+from firable.cli.options import answer, format_option, load_net, net_argument, page_option, with_page, write_folder
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
     metavar="SECONDS",
     help="Give up so late which votes are persistent.",
 )
+@page_option
 @format_option
 def split(
     net: str,
@@ -67,6 +68,7 @@ def split(
     output: str | None,
     subnet_dir: str | None,
     max_seconds: float,
+    page: str | None,
     format_: str,
 ) -> int:
     """Split NET by ownership and tell what follows from it.
@@ -84,7 +86,7 @@ def split(
     if output is not None and not by_rule and suggest is None:
         raise click.UsageError("-o writes the net with new owners: give them by --own or --rules, or --suggest them")
     asked = _Asked(own, rules, suggest, slack, max_seconds)
-    return answer("split", format_, lambda: _report(net, asked, output, subnet_dir), _show)
+    return answer("split", format_, with_page(lambda: _report(net, asked, output, subnet_dir), page), _show)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +127,7 @@ def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | 
         found.verdicts,
         notes=loaded.notes,
         table=decomposition.table,
+        decomposition=decomposition,
         files=files,
         split=split_json,
     )
@@ -192,6 +195,7 @@ def _show(report: Report) -> None:
         click.echo(f"  written: {file}")
     if len(report.files) > _NAMES_MAX:
         click.echo(f"  and {len(report.files) - _NAMES_MAX} more beside it")
+    text.show_page(report)
 
 
 def _proposed(suggestion: Mapping[str, Any] | None) -> Iterator[str]:

@@ -164,5 +164,10 @@ def show_summary(report: Report) -> None:
         parts.append(counted(warnings, "warning"))
     word, colour = {0: ("all hold", "green"), 1: ("violated", "red")}.get(report.exit_code, ("not decided", "yellow"))
     click.echo(f"\n{click.style(word, fg=colour, bold=True)}: {', '.join(parts) or 'there is nothing to hold'}")
+    show_page(report)
+
+
+def show_page(report: Report) -> None:
+    """Print where the report stands as a page, if one was written."""
     if report.page:
         click.echo(f"  the report as a page: {report.page}")

@@ -15,7 +15,13 @@ from firable.cli.report import Report
 from firable.cli.text import counted
 from firable.nets.verdict import Weight
 
-_ASKED: Final = {"prove": "Proof of the decomposition", "check": "Check of the net", "bundle": "Bundle"}
+_ASKED: Final = {
+    "prove": "Proof of the decomposition",
+    "check": "Check of the net",
+    "bundle": "Bundle",
+    "refine": "Refinement of the net",
+    "split": "Split over its controllers",
+}
 _FAILING_MAX: Final = 6
 _POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'"
 
@@ -58,12 +64,20 @@ def _masthead(report: Report) -> Markup:
             tag("p", _ASKED.get(report.command, report.command)),
             tag("h1", net.name or "the net"),
             tag("p", net.description) if net.description else None,
-            tag("p", ", ".join(counted(n, word) for n, word in sizes if n)),
+            tag("p", ", ".join(counted(n, word) for n, word in sizes if n), _explored(report)),
             tag("div", overall_badge(report.verdicts), tag("ul", counts, cls="counts"), cls="verdict-line"),
             _failing(report),
         ),
         cls="masthead",
     )
+
+
+def _explored(report: Report) -> str:
+    """How much of the net was looked at, where that is known."""
+    figures = report.figures
+    known = [(figures.get("markings"), "marking"), (figures.get("edges"), "edge")]
+    said = ", ".join(counted(n, word) for n, word in known if n is not None)
+    return f"; {said}{'' if figures.get('complete', True) else ' so far'}" if said else ""
 
 
 def _failing(report: Report) -> Markup | None:

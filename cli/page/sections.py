@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from firable.cli.page.markup import Content, Markup, raw, tag, together
 from firable.cli.page.runs import strip
@@ -19,6 +19,9 @@ from firable.cli.report import Report
 from firable.cli.text import WORDS, counted, mark
 from firable.nets.decomposition import Decomposition
 from firable.nets.verdict import Status, Verdict, Weight, overall
+
+if TYPE_CHECKING:
+    from firable.decompose.proofs.family import Family
 
 LISTED_MAX: Final = 300
 """How many verdicts of one family are listed; of more, those that are not proved come first."""
@@ -106,17 +109,23 @@ def _standing(report: Report) -> Markup | None:
 
 
 def _obligations(report: Report) -> Markup | None:
-    from firable.decompose.proofs.families import FAMILIES
     from firable.decompose.proofs.family import proved_of
 
     rows = []
-    for family in FAMILIES:
+    for family in _families(report):
         if some := proved_of(family, report.verdicts):
             rows.append(_family(family.title, family.says, some))
-    if not rows or report.command == "check":
+    if not rows:
         return None
     lead = "Each obligation compares the central net with its parts, and a solver finds no case in which they differ."
     return together(tag("p", lead, cls="lead"), *rows)
+
+
+def _families(report: Report) -> Sequence[Family]:
+    """The families of obligations; a check has none, though a verdict of it may bear the name of one."""
+    from firable.decompose.proofs.families import FAMILIES
+
+    return FAMILIES if report.decomposition is not None else ()
 
 
 def _family(title: str, says: str, some: Sequence[Verdict]) -> Markup:
@@ -204,12 +213,9 @@ def _others(report: Report) -> Markup | None:
 
 
 def _shown_above(report: Report) -> set[int]:
-    if report.command == "check":
-        return set()
-    from firable.decompose.proofs.families import FAMILIES
     from firable.decompose.proofs.family import proved_of
 
-    found = {id(verdict) for family in FAMILIES for verdict in proved_of(family, report.verdicts)}
+    found = {id(verdict) for family in _families(report) for verdict in proved_of(family, report.verdicts)}
     return found | {id(verdict) for verdict in report.verdicts if verdict.name.startswith("o4.") and report.assumptions}
 
 
@@ -239,6 +245,12 @@ def refuted(report: Report) -> list[tuple[str, Verdict]]:
     some = [v for v in report.verdicts if v.status is Status.VIOLATED and v.witness is not None]
     some.sort(key=lambda verdict: list(_HEADINGS).index(verdict.weight))
     return [(f"run-{n}", verdict) for n, verdict in enumerate(some, start=1)]
+
+
+def _course(report: Report) -> Markup | None:
+    if not report.course:
+        return None
+    return tag("ul", [tag("li", line) for line in report.course])
 
 
 def _counterexamples(report: Report) -> Markup | None:
@@ -369,6 +381,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section("machines", "With its machines", _loop),
     Section("counterexamples", "Counterexamples", _counterexamples),
     Section("verdicts", "Verdicts", _others),
+    Section("course", "How it was found", _course),
     Section("table", "Coordinator table", _coordinator_table),
     Section("groups", "Arbitration", _groups),
     Section("controllers", "What each controller must know", _knowledge),

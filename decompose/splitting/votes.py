@@ -68,7 +68,7 @@ def votes(decomposition: Decomposition, deadline: Deadline = NEVER) -> tuple[Vot
 
     Cost: linear in the pairs of a part and an arc at its places, at most `FALSIFIERS_MAX` for each part.
     """
-    found = list(accused(decomposition))
+    found = list(_accused(decomposition))
     return tuple(_cleared(decomposition, found, deadline))
 
 
@@ -78,19 +78,15 @@ def needs(transition: Transition) -> tuple[frozenset[str], frozenset[str]]:
     return full, frozenset((*transition.outputs, *transition.inhibitive))
 
 
-def accused(decomposition: Decomposition) -> Iterator[Vote]:
-    """The votes with all that the arcs accuse, none of them cleared by a unit; a part that is missing has none."""
+def _accused(decomposition: Decomposition) -> Iterator[Vote]:
     net = decomposition.net
     subnets = {subnet.name: subnet for subnet in decomposition.subnets}
     required = [needs(transition) for transition in net.transitions]
     fires = [not full & empty and t.openable for t, (full, empty) in zip(net.transitions, required, strict=True)]
     for row in decomposition.coordinated:
-        own = net.transition_index.get(row.name)
+        own = net.transition_index[row.name]
         for part in row.parts:
-            subnet = subnets.get(part.controller)
-            if subnet is None or part.name not in subnet.transition_index:
-                continue
-            full, empty = needs(subnet.transition(part.name))
+            full, empty = needs(subnets[part.controller].transition(part.name))
             vote = Vote(row.name, part.controller, part.name, full, empty, (), ())
             if full & empty:  # a self-loop: there is no yes
                 yield vote

@@ -236,6 +236,23 @@ def test_the_loop_stands_beside_the_open_net(tmp_path: Path) -> None:
     assert "from here no transition of the cell ever fires again" in words
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["refine", "catalogue:conceptual_one_robot"], ("Refinement of the net", "How it was found")),
+        (["split", "catalogue:one_robot"], ("Split over its controllers", "What each controller must know")),
+        (["bundle", "catalogue:one_robot", "-o", "cell.bundle"], ("Bundle", "Obligations", "40 markings, 70 edges")),
+    ],
+)
+def test_every_command_that_answers_on_a_net_can_write_its_page(
+    arguments: list[str], said: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([*arguments, "--report", "page.html"]) == 0
+    words = Reading(Path("page.html").read_text("utf-8")).words
+    assert all(one in words for one in said)
+
+
 # --- The command
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -18,7 +17,6 @@ from firable.analysis.evidence.document import document_from_text
 from firable.analysis.goal import Limits
 from firable.decompose.bundling import make_bundle
 from firable.decompose.splitting import persistence as module
-from firable.decompose.splitting.checking import vote_problems
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import Persistence, persistence
 from firable.decompose.splitting.votes import FALSIFIERS_MAX, votes
@@ -28,7 +26,7 @@ from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
 from firable.nets.knowledge import undisturbing
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
-from firable.nets.verdict import Status, Witness
+from firable.nets.verdict import Status
 from firable.semantics.algebra import BOOL
 from firable.semantics.firing import firable
 from firable.semantics.player import Player, holds_in
@@ -213,72 +211,3 @@ def test_bundle_holds_the_verdicts_on_votes_with_a_document_that_shows_them() ->
     assert document.net == bundle.net
     assert [one.shown for one in check_document(document)] == [True] * 4
     assert Bundle.from_bytes(bundle.to_bytes()) == bundle
-
-
-@pytest.fixture(scope="module")
-def bundle() -> Bundle:
-    return make_bundle(check(catalogue_net("one_robot")))
-
-
-def with_verdict(bundle: Bundle, name: str, **changes: Any) -> Bundle:
-    changed = (replace(v, **changes) if v.name == f"persistent.{name}" else v for v in bundle.verdicts)
-    return replace(bundle, verdicts=tuple(changed))
-
-
-def test_what_a_bundle_says_of_its_votes_is_checked_from_the_bundle_alone(bundle: Bundle) -> None:
-    assert vote_problems(bundle) == ()
-
-
-def test_a_vote_that_is_said_to_stand_and_does_not_is_found(bundle: Bundle) -> None:
-    (problem,) = vote_problems(with_verdict(bundle, "t1-41", status=Status.PROVED, witness=None, subjects=()))
-    assert (problem.code, problem.subject) == ("F6002", ("verdicts", "persistent.t1-41"))
-
-
-@pytest.mark.parametrize("part", ["t1-31", "t0-1"])
-def test_a_vote_that_is_said_to_fall_and_stands_is_found(bundle: Bundle, part: str) -> None:
-    witness = next(verdict.witness for verdict in bundle.verdicts if verdict.name == "persistent.t1-41")
-    changed = with_verdict(bundle, part, status=Status.VIOLATED, witness=witness, subjects=("G2",))
-    assert [problem.subject[1] for problem in vote_problems(changed)] == [f"persistent.{part}"]
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"witness": None},
-        {"subjects": ("G8",)},
-        {"subjects": ("G2", "G8")},
-        {"witness": Witness((("G1",),))},
-        {"witness": Witness((("G2",), ("G1",)))},
-        {"witness": Witness((("G1",), ("no such",)))},
-    ],
-)
-def test_a_firing_sequence_that_takes_no_yes_back_is_found(bundle: Bundle, changes: dict[str, Any]) -> None:
-    assert vote_problems(with_verdict(bundle, "t1-41", **changes))
-
-
-def test_a_verdict_on_a_vote_that_is_missing_or_stands_twice_is_found(bundle: Bundle) -> None:
-    of_vote = next(verdict for verdict in bundle.verdicts if verdict.name == "persistent.t1-41")
-    without = tuple(verdict for verdict in bundle.verdicts if verdict is not of_vote)
-    assert vote_problems(replace(bundle, verdicts=without))
-    assert vote_problems(replace(bundle, verdicts=(*bundle.verdicts, of_vote)))
-    assert vote_problems(replace(bundle, verdicts=(*bundle.verdicts, replace(of_vote, name="persistent.x"))))
-
-
-def test_evidence_on_votes_that_is_missing_edited_or_of_another_net_is_found(bundle: Bundle) -> None:
-    name = "persistence.evidence.json"
-    text = bundle.evidence[name]
-    other = persistence(split(catalogue_net("one_robot_mc_late"))).evidence().to_text()
-    for changed in ("", text.replace("robot.back", "robot.free"), other):
-        assert vote_problems(replace(bundle, evidence={**bundle.evidence, name: changed}))
-    bare = {file: of for file, of in bundle.evidence.items() if file != name}
-    assert len(vote_problems(replace(bundle, evidence=bare))) == 2  # t1-31 and t1-51 rest on it
-
-
-def test_an_edited_part_is_another_vote(bundle: Bundle) -> None:
-    decomposition = bundle.decomposition
-    robot = decomposition.subnet("robot")
-    part = replace(robot.transition("t1-31"), permissive=("robot.to_cv1",))
-    edited = replace(robot, transitions=tuple(part if t.name == part.name else t for t in robot.transitions))
-    subnets = tuple(edited if subnet.name == "robot" else subnet for subnet in decomposition.subnets)
-    found = vote_problems(replace(bundle, decomposition=replace(decomposition, subnets=subnets)))
-    assert [problem.subject[1] for problem in found] == ["persistent.t1-31"]
