@@ -19,6 +19,7 @@ not release it or release it twice, against *ends clean* and *contact-free*. M0 
    M. A task that it ends is left without a rest (*ends clean*: t takes all the last steps), one that it starts was
    empty and is entered, and the resources that this one will release are pending from now on, as t makes them idle in
    N. They were not idle before, for N has no contact. The markings after t are related.
+   One that t borrows was idle in M', so it was not pending elsewhere, and is pending now; in N it stays idle.
 3. Let t fire in M. In M', each task that is running can be brought to where it can end by moves inside (*ends*); tasks
    share no steps, and by 1 all these markings are related to M. There nothing is pending, so every resource, and
    every place, is as in M; the last steps are there, and the first steps of what t starts are empty: t is firable.
@@ -30,10 +31,11 @@ hidden firings end: N' diverges nowhere, and neither does N, which hides nothing
 is no deadlock); the transitions of N are live and quasi-live in N' iff in N, and so for reversibility, home markings,
 and AG, EF and AG EF of formulas over the places that hold the same in both. A move inside is live if N is: its task is
 started again and again, and the move can fire then (*complete*). N' has no contact: at a transition of N it would be
-one of N, inside a task one of the task. Two transitions of N compete in N' only if in N, a move only inside its task
-(*orderly*). If all tasks settle, a run of N' that leaves no firable transition out for ever brings each task to its
-end, and what stays firable in N is firable from some moment on in N': so the run of N that it shows is weakly fair, and
-`leads_to` carries over, but under strong fairness, where "again and again" may fall between the moves.
+one of N, inside a task one of the task. Two transitions of N compete in N' only if in N, but for what they borrow, and
+a move only inside its task (*orderly*). If all tasks settle, a run of N' that leaves no firable transition out for ever
+brings each task to its end, and what stays firable in N is firable from some moment on in N': so the run of N that it
+shows is weakly fair, and `leads_to` carries over; not where resources are borrowed, which may be lent out again and
+again, and not under strong fairness, where "again and again" may fall between the moves.
 
 Sources: Valette (1979) replaces a transition by a well-formed block and carries over boundedness and liveness; Suzuki
 and Murata (1983) add refinement of places. Their blocks have one entry and one exit, with one token, in nets without
@@ -87,7 +89,8 @@ class Correspondence:
     """How a conceptual net and its detailed one correspond, in their names.
 
     `places` and `transitions` give the detailed name of each conceptual one; `moves` and `lasts`, for each place that
-    names a task, the transitions inside it and its last steps, in the detailed net.
+    names a task, the transitions inside it and its last steps, in the detailed net. `released` are the resources that a
+    task makes idle inside, `borrowed` those of them that some transition takes from their idle places.
     """
 
     conceptual: Net
@@ -97,6 +100,7 @@ class Correspondence:
     moves: Mapping[str, Sequence[str]]
     lasts: Mapping[str, Sequence[str]]
     released: frozenset[str]
+    borrowed: frozenset[str] = frozenset()
 
     def renamed(self, of: T) -> T:
         """A property or formula of the conceptual net in the names of the detailed one."""
@@ -154,8 +158,8 @@ def carried(correspondence: Correspondence, blocks: Sequence[BlockProof], report
         verdict = report.verdict(name)
         if name in {"doomed-markings", "deadlock-free"} and verdict.status is Status.VIOLATED and not settles:
             yield _unknown(verdict, _AVOIDED)
-        elif name == "effective-conflicts" and not (orderly and verdict.holds):
-            yield _unknown(verdict, "moves inside a task compete, or transitions of the conceptual net do")
+        elif name == "effective-conflicts" and (correspondence.borrowed or not (orderly and verdict.holds)):
+            yield _unknown(verdict, "moves inside a task compete, or transitions do, as for what they borrow")
         else:
             yield lift.verdict(verdict)
     for prop in report.net.properties:
@@ -168,6 +172,8 @@ def carried(correspondence: Correspondence, blocks: Sequence[BlockProof], report
                 why = "a run may stay inside a task for ever"
             elif prop.formula == Deadlock() and verdict.holds is (prop.kind is PropertyKind.REACHABLE):
                 why = _AVOIDED
+        if not why and correspondence.borrowed and verdict.holds and _is_weakly_fair(prop):
+            why = "who borrows a resource may find it lent out again and again, which weak fairness allows"
         yield _unknown(verdict, why) if why else lift.verdict(verdict)
 
 
@@ -244,6 +250,10 @@ class Lift:
             else:
                 raise AssertionError(f"the task of '{place}' was proved to end, and does not")
         return marking
+
+
+def _is_weakly_fair(of: Property | TemporalProperty) -> bool:
+    return isinstance(of, Property) and of.kind is PropertyKind.LEADS_TO and of.fairness is Fairness.WEAK
 
 
 def _unknown(of: Verdict, why: str) -> Verdict:

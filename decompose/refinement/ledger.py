@@ -7,6 +7,9 @@ releases a resource before its end is the one exception: the transition that sta
 in the conceptual net, and in the detailed net a move inside the task does. This is what lets a robot's conveyor take
 the next workpiece while the robot still carries the last one, and a conceptual net that does not say so is refused.
 
+Where such a resource is idle before, the conceptual net only asks for it (`if`): it is *borrowed*, idle again at once
+as far as that net can see, and the detailed net takes it from its idle place.
+
 The rejected alternative, to find such faults as contacts and deadlocks of the detailed net, shows them firings away
 from where they are made, and in names that the engineer did not write.
 """
@@ -36,14 +39,27 @@ def net_problems(net: Net, bound: Mapping[str, Binding]) -> Iterator[Diagnostic]
     resources = {place.name for place in net.places if place.resource}
     for t in net.transitions:
         for resource in _touched(t, holders):
-            yield from _problem(
-                t, resource, holders, resource in t.inputs, resource in t.outputs, ("transitions", t.name)
-            )
+            lent = resource in borrowed(t, holders)
+            taken, freed = lent or resource in t.inputs, lent or resource in t.outputs
+            yield from _problem(t, resource, holders, taken, freed, ("transitions", t.name))
         for resource in sorted(resources & {*t.inputs} & {*t.outputs}):
             yield Diagnostic(
                 "F4012", f"'{t.name}' both takes and frees '{resource}', so it can never fire",
-                "leave out one of the arcs", ("transitions", t.name, "to", resource),
+                f"write `if: {resource}` where a task borrows it", ("transitions", t.name, "to", resource),
             )  # fmt: skip
+
+
+def borrowings(net: Net, bound: Mapping[str, Binding]) -> Iterator[tuple[str, str]]:
+    """The transitions of a net, each with a resource that it borrows for a task."""
+    holders = {name: _held_by(binding.task, binding.resources) for name, binding in bound.items()}
+    yield from ((t.name, resource) for t in net.transitions for resource in borrowed(t, holders))
+
+
+def borrowed(t: Transition, holders: Mapping[str, Holder]) -> list[str]:
+    """What a transition asks for, and a task that it starts releases before its end."""
+    takers = [holders[p] for p in t.outputs if p in holders]
+    early = frozenset[str]().union(*(holder.takes - holder.keeps for holder in takers))
+    return [one for one in t.permissive if one in early and one not in t.outputs and one not in t.inputs]
 
 
 def task_problems(task: Task, catalogue: Catalogue) -> Iterator[Diagnostic]:
@@ -96,18 +112,17 @@ def _problem(
             f"{at} takes '{resource}' twice, from {_all(givers)}", "one of them must let it go before", subject
         )
     elif not givers and not is_taken:
-        wants = takers[0] if takers else "nobody"
-        yield (
-            _wrong(
-                f"{at} starts '{wants}', which needs '{resource}' from its start, and nobody hands it over",
-                f"take it there: add '{resource}' to `from`, or end a task or step that keeps it",
+        if not takers:
+            message = f"{at} frees '{resource}', which nobody holds there"
+            yield _wrong(message, "release a role where a step of it ends", subject)
+        else:
+            early = resource not in holders[takers[0]].keeps
+            way = f"borrow it: `if: {resource}`" if early else f"take it there: add '{resource}' to `from`"
+            yield _wrong(
+                f"{at} starts '{takers[0]}', which needs '{resource}' from its start, and nobody hands it over",
+                f"{way}, or end a task or step that keeps it",
                 subject,
             )
-            if takers
-            else _wrong(
-                f"{at} frees '{resource}', which nobody holds there", "release a role where a step of it ends", subject
-            )
-        )
     if len(takers) > 1:
         yield _wrong(f"{at} gives '{resource}' to {_all(takers)} at once", "give it to one of them", subject)
     elif takers and resource not in holders[takers[0]].keeps:

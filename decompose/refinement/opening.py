@@ -3,7 +3,8 @@
 The place of a task stays, so that whoever looks at it sees what it saw. A transition that leads into it starts the
 task: besides, it leads to the first steps. One that comes out of it ends the task: besides, it comes from the last
 steps. A resource that the task releases before its end is no longer made idle by the transition that starts the task,
-as the conceptual net says, but by the move that releases it. Everything else is untouched. So when two tasks follow
+as the conceptual net says, but by the move that releases it; one that is borrowed is taken where the conceptual net
+only asks for it. Everything else is untouched. So when two tasks follow
 each other, a resource goes from the last step of one to the first step of the next, with no rule for that. A subtask is
 opened by the same rule, with the move in the part of the transition, until no task is left.
 
@@ -127,7 +128,10 @@ class _Opening:
         self.released |= {binding.resources[role] for role in task.released}
         for t in self.starting.get(path, ()):
             t.starts.append(path)
+            lent = [one for one in t.permissive if one in early and one not in t.outputs]
+            t.permissive[:] = [one for one in t.permissive if one not in lent]
             t.outputs[:] = [one for one in t.outputs if one not in early]
+            self.lead(t, out_of=lent)
             self.lead(t, into=[f"{path}/{step}" for step in task.start.targets])
             t.external += self.gates(binding, task.start)
             t.words.append(binding.text(task.start.description))

@@ -15,7 +15,7 @@ from functools import cached_property
 from firable.decompose.refinement.binding import Binding, bindings, subtask_problems, tasks_used
 from firable.decompose.refinement.carrying import Correspondence, untold
 from firable.decompose.refinement.closed import BlockProof, prove_block
-from firable.decompose.refinement.ledger import net_problems, task_problems
+from firable.decompose.refinement.ledger import borrowings, net_problems, task_problems
 from firable.decompose.refinement.naming import Named, named, without_arbiters
 from firable.decompose.refinement.opening import Opened, open_tasks
 from firable.nets.diagnostics import Diagnostic, InputError, Severity, Span
@@ -105,6 +105,7 @@ def refine(net: Net, catalogue: Catalogue, cell: str = "") -> Refinement:
         {place: tuple(found.transitions[key] for key in keys) for place, keys in _moves_under(opened).items()},
         {place: tuple(found.places[key] for key in opened.lasts[place]) for place in bound},
         opened.released,
+        frozenset(resource for _, resource in borrowings(net, bound)),
     )
     detailed = replace(detailed, properties=tuple(map(correspondence.renamed, net.properties)))
     correspondence = replace(correspondence, detailed=detailed)

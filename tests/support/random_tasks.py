@@ -152,8 +152,12 @@ def random_conceptual(draw: random.Random, catalogue: Catalogue) -> Net:
     gateable = [name for name in draft.places if name not in released]
     transitions = []
     for t in draft.transitions:
-        permissive, inhibitive = list[str](), list[str]()
-        if draw.random() < 0.1 and (gate := draw.choice(list(draft.places))) not in {*t.inputs, *t.outputs}:
+        permissive, inhibitive = list(t.permissive), list[str]()
+        if draw.random() < 0.1 and (gate := draw.choice(list(draft.places))) not in {
+            *t.inputs,
+            *t.outputs,
+            *t.permissive,
+        }:
             permissive.append(gate)
         if draw.random() < 0.1 and (gate := draw.choice(gateable)) not in {*t.inputs, *t.outputs}:
             inhibitive.append(gate)
@@ -178,8 +182,8 @@ def _ring(draw: random.Random, draft: _Draft, name: str, pool: list[str], catalo
     before, held = source, set[str]()
     for i in range(draw.randint(1, 4)):
         place = f"{name}{i}"
-        early = [task for task in catalogue.values() if task.released]
-        choice = early if held and early and draw.random() < 0.6 else list(catalogue.values())
+        releasing = [task for task in catalogue.values() if task.released]
+        choice = releasing if held and releasing and draw.random() < 0.6 else list(catalogue.values())
         filled = _filled(draw, draw.choice(choice), held, pool)
         if filled is None:  # a buffer, in which nothing is held
             draft.places[place] = Place(place)
@@ -188,9 +192,11 @@ def _ring(draw: random.Random, draft: _Draft, name: str, pool: list[str], catalo
             continue
         task, roles = filled
         draft.places[place] = Place(place, task=TaskUse(task.name, tuple(roles.items())))
-        takes = sorted(set(roles.values()) - held)
-        frees = sorted(held - set(roles.values())) + sorted(roles[role] for role in task.released)
-        draft.transitions.append(Transition(f"{place}_in", (*before, *takes), (place, *frees)))
+        early = {roles[role] for role in task.released}
+        takes = sorted(set(roles.values()) - held - early)
+        frees = sorted(held - set(roles.values())) + sorted(early & held)
+        arcs = (*before, *takes), (place, *frees)
+        draft.transitions.append(Transition(f"{place}_in", *arcs, permissive=tuple(sorted(early - held))))
         before, held = (place,), {roles[role] for role in task.kept}
     back = () if draw.random() < 0.03 else source
     draft.transitions.append(Transition(f"{name}out", before, (*back, *sorted(held))))
@@ -200,7 +206,7 @@ def _filled(draw: random.Random, task: Task, held: set[str], pool: list[str]) ->
     """The roles of a task filled, the released ones from what is held; None where that is not enough."""
     roles: dict[str, str] = {}
     for role in sorted(task.released):
-        free = sorted(held - set(roles.values()))
+        free = sorted((set(pool) if draw.random() < 0.3 else held) - set(roles.values()))
         if not free:
             return None
         roles[role] = draw.choice(free)

@@ -155,6 +155,54 @@ def test_one_resource_that_does_a_task_for_two_places_gets_names_for_each() -> N
     }
 
 
+def test_a_move_keeps_its_inhibitive_gate_and_its_sensors() -> None:
+    tasks = PICK.replace("if: shelf.open}", "unless: [shelf.open, shelf.full]}")
+    with pytest.raises(InputError, match="from every marking inside"):
+        small(tasks=tasks)  # the shelf is open until the end
+    tasks = tasks.replace("steps: {open: }", "steps: {open: , shut: }").replace(
+        "moves: {", "moves: {s: {from: shelf.open, to: shelf.shut}, "
+    )
+    move = small(tasks=tasks).transition("G2")
+    assert move.inhibitive == ("store.open",)
+    assert ExternalGate("store.full", wanted=False) in move.external
+
+
+LENT = PICK.replace("to: robot.take, if: shelf.open}", "to: robot.take, release: shelf}").replace(
+    "{from: robot.go,", "{from: [robot.go, shelf.open],"
+)
+
+
+def test_a_resource_that_is_idle_before_and_released_inside_is_borrowed() -> None:
+    text = NET.replace("{from: [system.src, system.a, system.b],", "{from: [system.src, system.a], if: system.b,")
+    text = text.replace("[system.done, system.a, system.b]", "[system.done, system.a]")
+    refinement = refine(parse_net(text), parse_tasks(LENT))
+    net = refinement.net
+    assert refinement.correspondence.borrowed == {"system.b"}
+    assert net.transition("G1").inputs == ("system.src", "arm.free", "store.free")
+    assert net.transition("G1").permissive == ()
+    assert net.transition("G2").outputs == ("arm.take", "store.free")
+    assert net.transition("G3").inputs == ("system.work", "arm.take")
+
+
+def test_a_resource_that_is_neither_handed_over_nor_borrowed_is_told_how() -> None:
+    with pytest.raises(InputError) as refused:
+        small(NET.replace("[system.src, system.a, system.b]", "[system.src, system.a]"), LENT)
+    assert any("borrow it: `if: system.b`" in d.hint for d in refused.value.diagnostics)
+
+
+def test_a_resource_that_the_start_itself_releases_stays_idle() -> None:
+    tasks = (
+        PICK.replace("if: shelf.open", "")
+        .replace(", steps: {open: }", "")
+        .replace("    end:", "    start: {release: shelf}\n    end:")
+    )
+    text = NET.replace("{from: [system.src, system.a, system.b],", "{from: [system.src, system.a], if: system.b,")
+    text = text.replace("[system.done, system.a, system.b]", "[system.done, system.a]")
+    with pytest.raises(InputError, match="never makes it free"):
+        small(text.replace(", if: system.b", ""), tasks)
+    assert small(text, tasks).transition("G1").permissive == ("store.free",)
+
+
 MISTAKES = (
     ("an unknown task", "name: pick", "name: pik", "F4010", "'pik' of 'system.work' is not registered"),
     ("an unknown role", "robot: a,", "rob: a,", "F4011", "'rob' of 'system.work' is neither a role nor"),
