@@ -14,20 +14,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from itertools import permutations
 from typing import Final
 
 from firable.nets.drawing.rows import lane_order, rows_of
+from firable.nets.drawing.shapes import (
+    BAR_HALF_WIDTH,
+    BYPASS_FIRST,
+    BYPASS_STEP,
+    LABEL_LEFT,
+    Bar,
+    Edge,
+    Kind,
+    Lane,
+    Layout,
+    Spot,
+    Stub,
+)
 from firable.nets.drawing.text import COMMAND, NAME, NOTE, Style, width_of, wrapped
 from firable.nets.net import ExternalGate, Net, Place
-
-RADIUS: Final = 15.0
-BAR_HALF_WIDTH: Final = 24.0
-BAR_HALF_HEIGHT: Final = 3.5
-BYPASS_FIRST: Final = 34.0
-BYPASS_STEP: Final = 10.0
-LABEL_LEFT: Final = 24.0
 
 _BYPASS_HALF_WIDTH: Final = 5.0
 _ROW_HEIGHT: Final = 94.0
@@ -40,81 +45,6 @@ _HEADER_HEIGHT: Final = 52.0
 _TITLE_HEIGHT: Final = 66.0
 _MARGIN: Final = 24.0
 _TRACKS_PERMUTED_MAX: Final = 5
-
-
-class Kind(StrEnum):
-    """What joins a place and a transition."""
-
-    INPUT = "input"
-    OUTPUT = "output"
-    PERMISSIVE = "permissive"
-    INHIBITIVE = "inhibitive"
-
-
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """An arc or internal gate: a vertical line at `x` from the place to the height of the transition.
-
-    `bypass` counts the edges of the place that are nearer on the same side; with 0 the line is straight.
-    """
-
-    place: int
-    transition: int
-    kind: Kind
-    x: float
-    bypass: int
-
-
-@dataclass(frozen=True, slots=True)
-class Stub:
-    """An external gate at the bar of a transition, at `x`; `slot` counts the stubs at the same place."""
-
-    transition: int
-    gate: ExternalGate
-    label: str
-    x: float
-    slot: int
-
-
-@dataclass(frozen=True, slots=True)
-class Lane:
-    """The box of a controller; `owner` is None for what nobody owns."""
-
-    owner: str | None
-    x: float
-    width: float
-
-
-@dataclass(frozen=True, slots=True)
-class Spot:
-    """The centre of a place."""
-
-    x: float
-    y: float
-
-
-@dataclass(frozen=True, slots=True)
-class Bar:
-    """A transition at height `y`: thick between each pair of `segments`, tied together by a thin line."""
-
-    y: float
-    segments: tuple[tuple[float, float], ...]
-    is_global: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """The drawing in pixels, before it is written down; `places` and `bars` by the indexes of the net."""
-
-    lanes: tuple[Lane, ...]
-    places: tuple[Spot, ...]
-    bars: tuple[Bar, ...]
-    edges: tuple[Edge, ...]
-    stubs: tuple[Stub, ...]
-    margin_labels: float
-    top: float
-    bottom: float
-    width: float
 
 
 def local_name(name: str, owner: str | None) -> str:

@@ -14,7 +14,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 from xml.sax.saxutils import escape
 
-from firable.nets.drawing.layout import (
+from firable.nets.drawing.layout import label_lines, layout, transition_lines
+from firable.nets.drawing.shapes import (
     BAR_HALF_HEIGHT,
     BAR_HALF_WIDTH,
     LABEL_LEFT,
@@ -26,9 +27,6 @@ from firable.nets.drawing.layout import (
     Layout,
     Spot,
     Stub,
-    label_lines,
-    layout,
-    transition_lines,
 )
 from firable.nets.drawing.text import COMMAND, NAME, NOTE, width_of
 from firable.nets.net import Marking, Net

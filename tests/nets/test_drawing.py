@@ -9,8 +9,9 @@ from support.whole_nets import whole_nets
 
 from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.drawing import draw_net
-from firable.nets.drawing.layout import LABEL_LEFT, RADIUS, layout
+from firable.nets.drawing.layout import layout
 from firable.nets.drawing.rows import lane_order, rows_of
+from firable.nets.drawing.shapes import LABEL_LEFT, RADIUS
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, Transition
 
 SVG = "{http://www.w3.org/2000/svg}"
