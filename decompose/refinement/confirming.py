@@ -17,7 +17,7 @@ from firable.decompose.refinement.carrying import Correspondence
 from firable.nets.verdict import Cost, Status, Verdict, Weight
 from firable.semantics.trace import Discipline
 
-MARKINGS_MAX: Final = 20_000
+MARKINGS_MAX: Final = 5_000
 WEAK_MARKINGS_MAX: Final = 2_000
 """Weak bisimilarity is decided on the saturated graph, which grows with the square of the markings."""
 

@@ -167,6 +167,28 @@ def test_a_move_keeps_its_inhibitive_gate_and_its_sensors() -> None:
     assert ExternalGate("store.full", wanted=False) in move.external
 
 
+def test_what_the_conceptual_net_says_of_its_other_places_and_signals_stays() -> None:
+    text = NET.replace("      done:\n", "      done:  {send: {machine: L, command: LIGHT}, until: lit}\n")
+    text = text.replace("    places:\n", "    inputs: key\n    places:\n").replace("t3: {", "t3: {unless: system.key, ")
+    net = small(text)
+    assert str(net.place("system.done").command) == "L LIGHT"
+    assert net.transition("t3").external == (ExternalGate("system.lit"), ExternalGate("system.key", wanted=False))
+    assert [str(signal.kind) for signal in net.signals if signal.owner == "system"] == ["sensor", "completion"]
+    assert parse_net(format_net(net)) == net
+
+
+def test_places_without_an_owner_can_be_refined_too() -> None:
+    text = (
+        "firable: 1\ncell: c\ncontrollers: {x: }\nstart: [a, b]\n"
+        "places: {w: {task: {name: pick, robot: a, shelf: b}}, a: {opens: {to: x.a, machine: A}},\n"
+        "  b: {opens: {to: x.b, machine: B, side: up}}}\n"
+        "transitions: {t: {from: [a, b], to: w}, u: {from: w, to: [a, b]}}\n"
+    )
+    net = small(text)
+    assert [place.name for place in net.places] == ["x.a", "x.go", "x.take", "x.b", "x.open", "w"]
+    assert [t.name for t in net.transitions] == ["G1", "G2", "t1-a"]
+
+
 LENT = PICK.replace("to: robot.take, if: shelf.open}", "to: robot.take, release: shelf}").replace(
     "{from: robot.go,", "{from: [robot.go, shelf.open],"
 )
