@@ -73,10 +73,10 @@ def _report(argument: str, smt_dir: str | None, timeout: float, machines: str | 
     found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)))
     verdicts, loop, evidence = found.verdicts, None, dict[str, str | bytes](found.files)
     if machines is not None:
-        from firable.decompose.proofs.held_gates import distributed_loop, held_gates
+        from firable.decompose.proofs.held_gates import held_gates
 
-        loop = distributed_loop(loaded.net, read_machines(machines))
-        held = held_gates(decomposition, loop)
+        held = held_gates(decomposition, read_machines(machines))
+        loop = held.loop
         verdicts += held.verdicts
         if smt_dir is not None:
             evidence |= held.evidence()

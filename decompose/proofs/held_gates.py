@@ -2,18 +2,19 @@
 
 A part votes yes when it is firable and its gates are open. Its promise holds the places; whether a gate stays open is
 the machines' matter. In the closed loop this is a question about single firings: is there a reachable marking in which
-the part could have voted, its places as it found them and the gate open, and a firing that closes the gate? A firing
-counts that may come between vote and decision: each move of a machine, a workpiece or a sensor, and each transition of
-the cell but those that the promise excludes (O1) and the voted transition itself. If there is none, then a gate that
-was open at the vote is open when the transition fires, by induction over the firings between; so the assumption is
-proved, for these machines. If there is one, the run to it is shown, with the firing that closes the gate at its end.
+the part could have voted, its places as it found them and the gate open, and a move of a machine, a workpiece or a
+sensor that closes the gate? If there is none, then a gate that was open at the vote is open when the transition fires,
+by induction over the firings between; so the assumption is proved, for these machines. If there is one, the run to it
+is shown, with the move that closes the gate at its end.
 
 Gates of completions are asked as well, all in one verdict: that a completion is cleared only by sending its command,
 which the promise excludes, is what the list of assumptions leaves out by reasoning, and here it is confirmed.
 
 The loop is that of the distributed cell: each controller sends its commands when it comes to apply a firing, which may
-be long after the coordinator decided it, and votes again only then. What was decided at one instant reaches the
-machines at several, so it is also asked, of this loop, that no machine is given what it cannot do.
+be long after the coordinator decided it, and votes again only then. So a transition of the cell closes no gate itself:
+sending its commands is a move of its own, and counts like any other. What was decided at one instant reaches the
+machines at several, so it is also asked, of this loop, that no machine is given what it cannot do. Votes can be given
+in the loop as early as the coordinator has decided, earlier than in the cell: that errs on the safe side.
 
 Rejected: to ask whether the gate can close before the whole transition fires. Votes are taken one by one, so the gate
 is needed from the moment its own part is firable, and the others may take long.
@@ -34,7 +35,7 @@ from firable.nets.formula import And, Firable, Formula, Holds, Not
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Sending
 from firable.nets.machines.plant_file import PlantModel
-from firable.nets.net import Net, SignalKind, Transition
+from firable.nets.net import SignalKind, Transition
 from firable.nets.verdict import Status, Verdict, Witness
 from firable.semantics.player import Player
 
@@ -49,16 +50,15 @@ def name_of(assumption: Assumption) -> str:
     return f"o4.{assumption.transition}.{assumption.signal}"
 
 
-def distributed_loop(net: Net, model: PlantModel) -> ClosedLoop:
-    """The loop in which each controller sends its commands when it comes to apply a firing; raises as `close` does."""
-    return close(net, model, sending=Sending.LATE)
-
-
 @dataclass(frozen=True)
 class HeldGates:
-    """The verdicts on the gates, and what was found of the loop with the same questions as its properties."""
+    """The verdicts on the gates, and what was found of the loop with the same questions as its properties.
+
+    The runs of the verdicts are of the loop's net.
+    """
 
     verdicts: tuple[Verdict, ...]
+    loop: ClosedLoop
     asked: CheckReport
 
     def evidence(self, limits: Limits | None = None) -> dict[str, bytes]:
@@ -70,11 +70,12 @@ class HeldGates:
         return {EVIDENCE if data.startswith(b"{") else f"{EVIDENCE}.gz": data}
 
 
-def held_gates(decomposition: Decomposition, loop: ClosedLoop, budget: Budget | None = None) -> HeldGates:
-    """The verdict on each assumption O4 in a loop of the net, on the gates of completions, and on late commands.
+def held_gates(decomposition: Decomposition, model: PlantModel, budget: Budget | None = None) -> HeldGates:
+    """The verdict on each assumption O4 with the machines of a plant, on gates of completions, and on late commands.
 
-    Runs are those of the loop; `distributed_loop` makes the one that is meant.
+    Raises `InputError` as `close` does.
     """
+    loop = close(decomposition.net, model, sending=Sending.LATE)
     rows = {row.name: row for row in decomposition.table}
     families = []
     for one in assumptions(decomposition):
@@ -110,7 +111,7 @@ def held_gates(decomposition: Decomposition, loop: ClosedLoop, budget: Budget | 
     verdicts, report = answers(loop, families, budget)
     every = [(one,) for one in assumptions(decomposition)] + [tuple(completions), ()]
     shown = (_shown(loop, decomposition, verdict, ones) for verdict, ones in zip(verdicts, every, strict=True))
-    return HeldGates(tuple(shown), report)
+    return HeldGates(tuple(shown), loop, report)
 
 
 def _part(decomposition: Decomposition, row: Coordinated, controller: str | None) -> Transition:
@@ -129,26 +130,17 @@ def _vote(loop: ClosedLoop, part: Transition, one: Assumption) -> Formula:
     return all_of((*map(Holds, read), *(Not(Holds(name)) for name in bare), open_, Not(ENDED)))
 
 
-def _closing(loop: ClosedLoop, part: Transition, one: Assumption) -> Iterator[str]:
-    """The firings that close the gate and may come between the vote and the firing."""
+def _closing(loop: ClosedLoop, one: Assumption) -> Iterator[str]:
+    """The moves that close the gate."""
     place, means = loop.shown[one.signal]
-    written = {*part.inputs, *part.outputs}
-    read = written | {*part.permissive, *part.inhibitive}
-    excluded = set(loop.variants[one.transition])
-    for transition in loop.cell.transitions:
-        writes = {*transition.inputs, *transition.outputs}
-        reads = writes | {*transition.permissive, *transition.inhibitive}
-        if writes & read or reads & written:
-            excluded |= set(loop.variants[transition.name])
     for transition in loop.net.transitions:
-        changed = transition.inputs if means == one.wanted else transition.outputs
-        if place in changed and transition.name not in excluded:
+        if place in (transition.inputs if means == one.wanted else transition.outputs):
             yield transition.name
 
 
 def _closed_after_vote(loop: ClosedLoop, decomposition: Decomposition, row: Coordinated, one: Assumption) -> Formula:
     part = _part(decomposition, row, decomposition.net.signal(one.signal).owner)
-    return And((_vote(loop, part, one), any_of(map(Firable, _closing(loop, part, one)))))
+    return And((_vote(loop, part, one), any_of(map(Firable, _closing(loop, one)))))
 
 
 def _shown(loop: ClosedLoop, decomposition: Decomposition, verdict: Verdict, ones: tuple[Assumption, ...]) -> Verdict:
@@ -164,7 +156,7 @@ def _shown(loop: ClosedLoop, decomposition: Decomposition, verdict: Verdict, one
         if len(ones) > 1 and f"{one.signal} for {one.transition}" not in verdict.subjects[:1]:
             continue
         part = _part(decomposition, rows[one.transition], decomposition.net.signal(one.signal).owner)
-        for name in _closing(loop, part, one):
+        for name in _closing(loop, one):
             if name in may_fire:
                 after = player.fire(marking, [may_fire[name]])
                 note = f"'{part.name}' had voted yes, and the last firing makes '{one.signal}' {int(not one.wanted)}"

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from random import Random
 
 import pytest
-from support.bench_cell import bench, free_cell
+from support.bench_cell import COMMANDS, PLANT, bench, free_cell
 from support.examples import seeds
 
 from firable.analysis.check import check
@@ -267,6 +268,34 @@ transitions:
     assert gone.hint == "these go on whatever fails at it: u, u2; these can hold their token for ever: c.clamp"
 
 
+def test_a_fault_of_one_machine_takes_nothing_from_what_another_one_does() -> None:
+    text = """\
+firable: 1
+cell: two
+controllers:
+  c:
+    start: [a, b]
+    inputs: [entry, hand]
+    places:
+      a:
+      b:
+      moves: {send: {machine: R, command: MOVE, to: TABLE}, until: at_table}
+      frees: {send: {machine: M, command: UNCLAMP}, until: free}
+transitions:
+  t: {from: c.a, to: c.moves}
+  t2: {from: c.moves, to: c.a}
+  u: {from: c.b, to: c.frees}
+  u2: {from: c.frees, to: c.b}
+"""
+    old = "UNCLAMP: {does: release, station: table, takes_s: 1}"
+    assert old in PLANT
+    plant = parse_plant(PLANT.replace(old, f"{old[:-1]}, may_fail: for_good}}"))
+    verdicts = {verdict.name: verdict for verdict in check_faults(check_loop(parse_net(text), plant), plant)}
+    assert verdicts["fault.R"].subjects == ("t", "t2")
+    assert verdicts["fault.M"].subjects == ("u", "u2")
+    assert verdicts["fault.M"].hint.endswith("hold their token for ever: c.frees")
+
+
 def test_a_fault_that_leads_to_an_accident_is_not_safe() -> None:
     net = net_with("command: MOVE,  to: CV1},  until: at_cv1, ", "command: MOVE,  to: CV1}, ")
     assert faults_of(net, catalogue_plant("one_robot"))["fault.safe"] is Status.VIOLATED
@@ -288,10 +317,6 @@ def test_what_fails_for_good_is_not_said_to_be_repaired() -> None:
 @pytest.mark.seeds
 @pytest.mark.parametrize("seed", seeds(10))
 def test_what_can_never_happen_with_gates_free_never_happens_in_the_loop(seed: int) -> None:
-    from random import Random
-
-    from support.bench_cell import COMMANDS
-
     net = free_cell(tuple(Random(seed).sample(list(COMMANDS), 4)))
     report = check_loop(net, bench())
     places = [place.name for place in net.places]

@@ -9,7 +9,7 @@ from firable.analysis.evidence.checking.checker import check_document
 from firable.analysis.evidence.document import document_from_text
 from firable.analysis.loop.verdicts import check_loop
 from firable.decompose.proofs.assumptions import assumptions
-from firable.decompose.proofs.held_gates import COMMANDS, COMPLETIONS, distributed_loop, held_gates, name_of
+from firable.decompose.proofs.held_gates import COMMANDS, COMPLETIONS, held_gates, name_of
 from firable.decompose.splitting.cut import split
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.machines.plant_file import PlantModel, parse_plant
@@ -30,7 +30,7 @@ def plant_with(old: str, new: str) -> PlantModel:
 @pytest.mark.parametrize("cell", CELLS)
 def test_the_machines_of_the_catalogue_keep_every_assumption(cell: str) -> None:
     decomposition = split(catalogue_net(cell))
-    verdicts = held_gates(decomposition, distributed_loop(decomposition.net, catalogue_plant(cell))).verdicts
+    verdicts = held_gates(decomposition, catalogue_plant(cell)).verdicts
     assert [verdict.name for verdict in verdicts] == [*map(name_of, assumptions(decomposition)), COMPLETIONS, COMMANDS]
     assert all(verdict.holds for verdict in verdicts)
 
@@ -47,7 +47,7 @@ def test_a_sensor_that_is_not_exact_breaks_its_assumption(
 ) -> None:
     plant = plant_with(old, new)
     net = catalogue_net("one_robot")
-    verdicts = {verdict.name: verdict for verdict in held_gates(split(net), distributed_loop(net, plant)).verdicts}
+    verdicts = {verdict.name: verdict for verdict in held_gates(split(net), plant).verdicts}
     broken = verdicts.pop(name)
     assert broken.status is Status.VIOLATED
     assert "interlock" in broken.hint
@@ -56,7 +56,7 @@ def test_a_sensor_that_is_not_exact_breaks_its_assumption(
     # An entry that seems to be taken lets the conveyor start with nothing on it.
     assert {verdict.name for verdict in verdicts.values() if not verdict.holds} == others
 
-    loop = distributed_loop(net, plant)
+    loop = held_gates(split(net), plant).loop
     player, marking = Player(loop.net), loop.net.initial_marking
     place, means = loop.shown[name.split(".", 2)[2]]
     shown = []
@@ -79,7 +79,7 @@ def test_a_gate_that_another_machine_closes_is_found() -> None:
         "robot.touch:            {holding: R}", "robot.touch: {holding: R}\n  mc.entry_taken: {occupied: cv1_entry}"
     )
     net = parse_net(wrong)
-    verdicts = {verdict.name: verdict for verdict in held_gates(split(net), distributed_loop(net, plant)).verdicts}
+    verdicts = {verdict.name: verdict for verdict in held_gates(split(net), plant).verdicts}
     taken = verdicts["o4.G6.mc.entry_taken"]
     assert taken.status is Status.VIOLATED
     assert taken.witness is not None
@@ -112,9 +112,7 @@ transitions:
 def test_a_command_that_overtakes_that_of_another_controller_is_found_though_at_one_instant_all_is_well() -> None:
     net = parse_net(TWO_COMMAND_ONE_BELT)
     assert check_loop(net, bench()).verdict("loop.busy-machines").holds
-    late = {verdict.name: verdict for verdict in held_gates(split(net), distributed_loop(net, bench())).verdicts}[
-        COMMANDS
-    ]
+    late = {verdict.name: verdict for verdict in held_gates(split(net), bench()).verdicts}[COMMANDS]
     assert late.status is Status.VIOLATED
     assert late.witness is not None
     assert late.witness.note == "B is given WAIT while it is at another command"
@@ -124,7 +122,7 @@ def test_a_command_that_overtakes_that_of_another_controller_is_found_though_at_
 
 def test_the_verdicts_leave_evidence_that_the_checker_confirms() -> None:
     net = catalogue_net("one_robot")
-    held = held_gates(split(net), distributed_loop(net, catalogue_plant("one_robot")))
+    held = held_gates(split(net), catalogue_plant("one_robot"))
     (text,) = held.evidence().values()
     checked = list(check_document(document_from_text(text.decode())))
     asked = ["o4.G1.conveyor.part_at_entry", "o4.G4.mc.part_present", "o4.completion.0"]
