@@ -24,6 +24,7 @@ from firable.cli.text import show_errors
 _EXTRA = {
     **dict.fromkeys(("z3", "networkx", "numpy", "platformdirs"), ("prove", "all that checking and proving need")),
     "mtkahypar": ("split", "what looks for owners of large nets"),
+    "cvc5": ("verify", "the second solver; or ask the first one: --solver z3"),
 }
 
 

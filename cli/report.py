@@ -54,6 +54,7 @@ class Report:
     standing: Sequence[Standing] = ()
     files: Sequence[str] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
+    bundle: Mapping[str, str] = field(default_factory=dict)
     loop: Mapping[str, Any] = field(default_factory=dict)
     decomposition: Decomposition | None = None
     loop_net: Net | None = None
@@ -91,7 +92,7 @@ class Report:
         }
         if self.table:
             data["table"] = [_row_to_json(row) for row in self.table]
-        for key in ("discipline", "course", "figures", "assumptions", "files", "run", "loop", "split"):
+        for key in ("discipline", "course", "figures", "assumptions", "files", "run", "loop", "split", "bundle"):
             if value := getattr(self, key):
                 data[key] = list(value) if isinstance(value, tuple) else value
         if self.page:

@@ -1,8 +1,9 @@
-"""`firable verify`: does this evidence show what it claims?"""
+"""`firable verify`: does this evidence, or this bundle, show what it claims?"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,9 +25,16 @@ _CLAIMS_MAX = 3  # told of one verdict
 _CLAIM_MAX = 100  # characters told of one claim
 
 
-@click.command(short_help="Check evidence anew, without the technique that made it.")
+@click.command(short_help="Check evidence or a bundle anew, without what made it.")
 @click.argument("evidence", metavar="EVIDENCE...", nargs=-1, required=True)
 @click.option("--net", "of", metavar="NET", help="Refuse evidence on any other net than this one.")
+@click.option(
+    "--solver",
+    type=click.Choice(["cvc5", "z3"]),
+    default="cvc5",
+    show_default=True,
+    help="Which solver answers the obligations of a bundle, which z3 has proved.",
+)
 @click.option("--smt-dir", metavar="DIR", help="Write each obligation as an SMT-LIB 2 file, for another solver.")
 @click.option(
     "--timeout",
@@ -37,8 +45,10 @@ _CLAIM_MAX = 100  # characters told of one claim
     help="Give up an obligation after so much time.",
 )
 @format_option
-def verify(evidence: tuple[str, ...], of: str | None, smt_dir: str | None, timeout: float, format_: str) -> int:
-    """Check documents of EVIDENCE, written by `firable check --evidence DIR`.
+def verify(
+    evidence: tuple[str, ...], of: str | None, solver: str, smt_dir: str | None, timeout: float, format_: str
+) -> int:
+    """Check EVIDENCE again: documents that `firable check --evidence DIR` wrote, or bundles.
 
     Each verdict of a document is shown again, from the firing rule alone: firing sequences are played, listed markings
     fired through, decision diagrams found closed, the obligations of invariants derived anew from the net and decided
@@ -51,24 +61,65 @@ def verify(evidence: tuple[str, ...], of: str | None, smt_dir: str | None, timeo
     milliseconds = max(1, round(timeout * 1000))
     net = None if of is None else load_net(of).net
     many = len(evidence) > 1
-    makers = [partial(_report, file, net, smt_dir, milliseconds, many=many) for file in evidence]
+    asked = _Asked(net, solver, smt_dir, milliseconds, many=many)
+    makers = [partial(_of_bundle if _is_bundle(file) else _report, file, asked) for file in evidence]
     return answer_all("verify", format_, makers, _show)
 
 
-def _report(file: str, of: Net | None, smt_dir: str | None, timeout_ms: int, *, many: bool) -> Report:
+@dataclass(frozen=True)
+class _Asked:
+    """What the options ask for."""
+
+    of: Net | None
+    solver: str
+    smt_dir: str | None
+    timeout_ms: int
+    many: bool
+
+    def write(self, file: str, texts: Mapping[str, str]) -> tuple[str, ...]:
+        """Write SMT-LIB 2 files where that is asked for: of many inputs, in a folder for each."""
+        from firable.nets.bundle import file_stem
+
+        if self.smt_dir is None:
+            return ()
+        folder = str(Path(self.smt_dir) / file_stem(Path(file).stem)) if self.many else self.smt_dir
+        return write_folder(folder, texts)
+
+
+def _is_bundle(file: str) -> bool:
+    from firable.nets.archive import SIGNATURE
+
+    try:
+        with Path(file).open("rb") as stream:
+            return stream.read(len(SIGNATURE)) == SIGNATURE
+    except OSError:
+        return False  # which reading it as a document says
+
+
+def _of_bundle(file: str, asked: _Asked) -> Report:
+    from firable.decompose.verification.checking import check_bundle
+    from firable.nets.bundle import read_bundle
+
+    bundle = read_bundle(file)
+    if asked.of is not None:
+        _refuse_another_net(file, bundle.net, asked.of)
+    checked = check_bundle(bundle, solver=asked.solver, timeout_ms=asked.timeout_ms)
+    verdicts = [_told(one.verdict, one.method, one.only_claimed, shown=one.shown) for one in checked]
+    files = asked.write(file, {name: text for name, text in bundle.evidence.items() if name.endswith(".smt2")})
+    of = {"digest": bundle.digest, "solver": asked.solver}
+    return Report("verify", file, bundle.net, verdicts, files=files, bundle=of)
+
+
+def _report(file: str, asked: _Asked) -> Report:
     from firable.analysis.evidence.checking.checker import check_document
     from firable.analysis.evidence.document import read_document
-    from firable.nets.bundle import file_stem
 
     document = read_document(file)
-    if of is not None:
-        _refuse_another_net(file, document, of)
-    checked = list(check_document(document, timeout_ms=timeout_ms))
+    if asked.of is not None:
+        _refuse_another_net(file, document.net, asked.of)
+    checked = list(check_document(document, timeout_ms=asked.timeout_ms))
     verdicts = [_verdict(document, one) for one in checked]
-    files: tuple[str, ...] = ()
-    if smt_dir is not None:
-        folder = str(Path(smt_dir) / file_stem(Path(file).stem)) if many else smt_dir
-        files = write_folder(folder, dict(_obligations(document, timeout_ms)))
+    files = asked.write(file, dict(_obligations(document, asked.timeout_ms))) if asked.smt_dir is not None else ()
     discipline = document.discipline.value
     return Report("verify", file, document.net, tuple(verdicts), discipline=discipline, files=files)
 
@@ -97,15 +148,28 @@ def _shortened(text: str) -> str:
     return text if len(text) <= _CLAIM_MAX else f"{text[: _CLAIM_MAX - 1]}…"
 
 
-def _refuse_another_net(file: str, document: Document, of: Net) -> None:
+def _told(verdict: Verdict, method: str, only_claimed: str, *, shown: bool) -> Verdict:
+    """What is said of a verdict of a bundle."""
+    from firable.nets.verdict import Status, Verdict
+
+    violated = "" if verdict.holds else "it is violated: "
+    return Verdict(
+        verdict.name,
+        Status.PROVED if shown else Status.UNKNOWN,
+        f"{violated}{verdict.statement}",
+        method,
+        bound=only_claimed,
+        hint="allow more time" if only_claimed.endswith("gave up") else "",
+    )
+
+
+def _refuse_another_net(file: str, net: Net, of: Net) -> None:
     from firable.nets.diagnostics import Diagnostic, InputError, Span
     from firable.nets.interchange import net_digest
     from firable.nets.source import printable
 
-    if net_digest(document.net) != net_digest(of):
-        message = (
-            f"the evidence does not show what it claims of this net: it is about another one, '{document.net.name}'"
-        )
+    if net_digest(net) != net_digest(of):
+        message = f"the evidence does not show what it claims of this net: it is about another one, '{net.name}'"
         hint = "a change of a place, an arc or a gate makes another net; check it anew"
         raise InputError([Diagnostic("F6002", message, hint, span=Span(printable(file), 1, 1))])
 
@@ -133,9 +197,35 @@ def _obligations(document: Document, timeout_ms: int) -> Iterator[tuple[str, str
 
 def _show(report: Report) -> None:
     text.heading(report.net, report.input)
+    if report.bundle:
+        _show_bundle(report)
+        return
     words = {"interleaving": "interleaving", "step": "synchronous steps"}[report.discipline]
     click.echo(f"  {words}, external gates free")
     text.show_verdicts(report.net, report.verdicts, verbose=True, words=_WORDS)
+    _summary(report)
+    if report.files:
+        click.echo(f"\n  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
+
+
+def _show_bundle(report: Report) -> None:
+    from firable.decompose.verification.restating import HEADS
+
+    click.echo(f"  the bundle {report.bundle['digest'][:16]}…: split anew, and stated anew what it must prove")
+    titles = {**HEADS, "persistent": "of each vote it is shown whether it is persistent"}
+    families: dict[str, list[Verdict]] = {family: [] for family in titles}
+    others: list[Verdict] = []
+    for verdict in report.verdicts:
+        families.get(verdict.name.partition(".")[0], others).append(verdict)
+    click.echo(f"\n{click.style('obligations', bold=True)}, answered by {report.bundle['solver']}")
+    for family, some in families.items():
+        if some:
+            shown = sum(verdict.holds for verdict in some)
+            symbol, colour = ("✓", "green") if shown == len(some) else ("?", "yellow")
+            count = f"{shown:>4} of {len(some):<4}"
+            click.echo(f"  {click.style(symbol, fg=colour)} {count} {family:<16} {titles[family]}")
+    late = [verdict for some in families.values() for verdict in some if not verdict.holds]
+    text.show_verdicts(report.net, [*late, *others], verbose=True, words=_WORDS)
     _summary(report)
     if report.files:
         click.echo(f"\n  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")

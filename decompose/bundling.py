@@ -4,14 +4,18 @@ The obligations of the decomposition are proved here; what exploring the net sho
 `firable.analysis.check`, because verdicts alone do not say of which net they are: those on a good net would let any
 other run. So the net that is bundled is the one in the report. What is demanded of both is what the executor will
 demand when it reads the bundle: both ask `unproved`, so that no bundle is made that could not run. Which votes are
-persistent goes with them for information: nothing that runs rests on it.
+persistent goes with them for information: nothing that runs rests on it. The evidence on all of it goes along, so that
+the bundle can be checked again without anything that made it (`firable.decompose.verification`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
+from typing import Final
 
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.producing.producer import evidence_of_report
+from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
 from firable.decompose.proofs.proving import TIMEOUT_MS, prove
 from firable.decompose.splitting.cut import split
@@ -21,15 +25,19 @@ from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.right_to_run import unproved
 from firable.semantics.trace import Discipline
 
+EVIDENCE: Final = "check.evidence.json"
+"""The file of a bundle that shows the verdicts on its net, as `firable check --evidence` writes it."""
+SECONDS: Final = 30.0
+"""How long evidence for the verdicts on the net is looked for, unless somebody says otherwise."""
 
-def make_bundle(
-    report: CheckReport, evidence: Mapping[str, str] | None = None, *, timeout_ms: int = TIMEOUT_MS
-) -> Bundle:
+
+def make_bundle(report: CheckReport, limits: Limits | None = None, *, timeout_ms: int = TIMEOUT_MS) -> Bundle:
     """Split the net of a report, prove the decomposition and bundle both with all verdicts and their evidence.
 
-    `evidence` holds the text of each file that the verdicts of the report name. Raises `InputError`: F4001 and F2011
-    where the net cannot be split; F4003 where the report is not that of exploring this net by interleaving, which is
-    how it will be executed, and for everything that must be proved and is not.
+    `limits` are for the evidence on the verdicts of the report: what it cannot show in that time is only claimed, and
+    `firable verify` will say so. Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the
+    report is not that of exploring this net by interleaving, which is how it will be executed, and for everything that
+    must be proved and is not.
     """
     if report.net != report.space.net:
         message = f"the verdicts are on another net than '{report.net.name}'"
@@ -40,8 +48,12 @@ def make_bundle(
     decomposition = split(report.net)
     proof = prove(decomposition, timeout_ms=timeout_ms)
     voted, shown = persistence(decomposition, report.space).with_evidence()
-    verdicts = (*report.verdicts, *proof.verdicts, *voted)
-    bundle = Bundle(decomposition, verdicts, {**(evidence or {}), **proof.files, **shown})
+    document = evidence_of_report(report, (), limits or Limits(Deadline.after(SECONDS)))
+    named = {record.name for record in document.records if not record.lacking}
+    on_the_net = (replace(v, evidence=(*v.evidence, EVIDENCE)) if v.name in named else v for v in report.verdicts)
+    verdicts = (*on_the_net, *proof.verdicts, *voted)
+    files = {EVIDENCE: document.to_text(), **proof.files, **shown}
+    bundle = Bundle(decomposition, verdicts, files)
     if problems := unproved(bundle):
         raise InputError(replace(problem, code="F4003") for problem in problems)
     return bundle

@@ -86,3 +86,35 @@ def test_the_checker_of_evidence_loads_nothing_that_finds_any() -> None:
     assert not {name for name in of_evidence if name.startswith("evidence.producing")}
     # How a term is written for a solver, and how a deadline ends: nothing else of the room.
     assert loaded - of_evidence == {"deadline", "induction", "induction.encoding", "induction.smt"}
+
+
+def test_the_checker_of_bundles_loads_nothing_that_makes_them() -> None:
+    code = (
+        "import pkgutil, sys, firable.decompose.verification as room\n"
+        "names = [m.name for m in pkgutil.iter_modules(room.__path__)]\n"
+        "for name in names: __import__(f'firable.decompose.verification.{name}')\n"
+        "print(*(n for n in sys.modules if n.startswith('firable.')))"
+    )
+    # `firable.decompose` itself offers what makes bundles, and is loaded with any of its rooms: here an empty one
+    # stands in its place, so that only what the checker asks for is seen.
+    offered = "import sys, types\nroom = types.ModuleType('firable.decompose')\nroom.__path__ = ['decompose']\n"
+    offered += "import firable\nsys.modules['firable.decompose'] = room\n"
+    done = subprocess.run([sys.executable, "-c", offered + code], capture_output=True, text=True, check=True, cwd=ROOT)
+    loaded = {name.removeprefix("firable.") for name in done.stdout.split()}
+    made_by = {
+        name for name in loaded if name.startswith("decompose.") and not name.startswith("decompose.verification")
+    }
+    assert "decompose.verification.checking" in loaded
+    assert not made_by
+    assert not {name for name in loaded if name.startswith("analysis.evidence.producing")}
+    assert not {name for name in loaded if name.startswith(("analysis.spaces", "analysis.verdicts", "analysis.check"))}
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "decompose" / "verification").glob("*.py")), ids=lambda f: f.stem)
+def test_what_is_stated_anew_uses_no_text_of_the_rule_that_was_proved(file: Path) -> None:
+    rooms = {name.removeprefix("firable.") for name in imported(file) if name.startswith("firable.")}
+    assert not {
+        name for name in rooms if name.startswith(("decompose.proofs", "decompose.splitting", "decompose.protocol"))
+    }
+    if file.stem != "documents":  # which checks evidence on the net by the one checker of evidence
+        assert not {name for name in rooms if name.startswith(("analysis.", "semantics."))}

@@ -1,0 +1,61 @@
+"""Checking a bundle again, from the bundle alone: does what it holds show what it claims?
+
+It trusts nobody who made it. Hashes and seals say that nothing was damaged on the way; whoever edits a bundle can make
+them anew. So everything is derived a second time, by code that shares nothing with the first:
+
+1. the net is cut anew, and subnets, table and groups must be that cut, name for name (`recut`);
+2. what must be proved is stated anew; each SMT-LIB 2 file must say exactly this, and a second solver answer `unsat`
+   after every name (`restating`, `reading`, `obligations`);
+3. the verdicts on the central net must be those that its documents of evidence show (`documents`);
+4. nothing is left over: no file that nobody needs, no verdict that nobody knows.
+
+There are three endings. Everything is shown; something is only claimed, since no evidence is on it or a solver gave up;
+or something says what is not so, and then the bundle is refused.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from firable.decompose.verification.checked import CheckedVerdict, Examination
+from firable.decompose.verification.documents import check_verdicts_on_the_net
+from firable.decompose.verification.obligations import check_obligations
+from firable.decompose.verification.recut import check_cut
+from firable.decompose.verification.refusal import NotShownError
+from firable.decompose.verification.solvers import SOLVERS
+from firable.nets.bundle import Bundle
+from firable.nets.diagnostics import InputError
+from firable.nets.right_to_run import unproved
+from firable.nets.verdict import Status
+
+TIMEOUT_MS: Final = 60_000
+
+
+def check_bundle(bundle: Bundle, *, solver: str = "cvc5", timeout_ms: int = TIMEOUT_MS) -> tuple[CheckedVerdict, ...]:
+    """Judge every verdict of a bundle that claims something, in their order; `timeout_ms` is for each question.
+
+    Raises `InputError`: F5002 where a verdict that the net requires is not proved, F6002 where the bundle does not show
+    what it claims, and `ModuleNotFoundError` where the solver is not installed. Takes time linear in the bundle, but
+    for what its documents of evidence take.
+    """
+    if problems := unproved(bundle):
+        raise InputError(problems)
+    try:
+        return _checked(bundle, solver, timeout_ms)
+    except NotShownError as error:
+        raise error.as_input_error() from None
+
+
+def _checked(bundle: Bundle, solver: str, timeout_ms: int) -> tuple[CheckedVerdict, ...]:
+    answers = SOLVERS[solver]
+    answers("(set-logic QF_UF)", timeout_ms)  # a solver that is not there is missed before the work is done
+    examination = Examination(bundle)
+    cut = check_cut(bundle.decomposition)
+    check_obligations(examination, cut, solver, answers, timeout_ms)
+    check_verdicts_on_the_net(examination, answers, timeout_ms)
+    for verdict in list(examination.unjudged()):
+        if verdict.status is not Status.UNKNOWN:
+            raise NotShownError(f"nobody knows what '{verdict.name}' is on", "verdicts", verdict.name)
+    if unused := sorted(set(bundle.evidence) - examination.used):
+        raise NotShownError(f"no verdict rests on '{unused[0]}'", "evidence", unused[0])
+    return tuple(examination.checked[v.name] for v in bundle.verdicts if v.name in examination.checked)

@@ -1,0 +1,94 @@
+"""Boolean formulas in a normal form, so that two texts that state the same are the same number.
+
+A formula is a number of a `Formulas`: equal formulas have equal numbers. The normal form forgets by which definitions a
+text was shortened, and nothing else: what is written is what was made. Making a formula leaves out operands that change
+nothing or stand there already, a connective of a single operand, and double negation, as docs/bundle.md has it. It goes
+no further. In particular an equation is never decided, not even one of equal sides: every claim that is proved is
+worth `true`, and it is not the worth but the sentence that has to be the right one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+Formula = int
+
+TRUE: Final[Formula] = 0
+FALSE: Final[Formula] = 1
+
+
+def spelled(name: str) -> str:
+    """A name as a file spells it: what is not printable ASCII, a bar, a backslash or `%` by its number.
+
+    >>> spelled("robot.free"), spelled("é")
+    ('robot.free', '%e9.')
+    """
+    return "".join(c if " " <= c <= "~" and c not in "|\\%" else f"%{ord(c):x}." for c in name)
+
+
+class Formulas:
+    """The formulas that were made, each with one number.
+
+    >>> of = Formulas()
+    >>> p, q = of.variable("p"), of.variable("q")
+    >>> of.all_of([p, q, p]) == of.all_of([p, q]), of.negation(of.negation(p)) == p, of.any_of([]) == FALSE
+    (True, True, True)
+    >>> of.all_of([p, q]) == of.all_of([q, p])
+    False
+    >>> of.equal(p, p) == TRUE
+    False
+    """
+
+    def __init__(self) -> None:
+        self._numbers: dict[tuple[object, ...], Formula] = {("true",): TRUE, ("false",): FALSE}
+        self._negated: dict[Formula, Formula] = {TRUE: FALSE, FALSE: TRUE}
+        self._negations: set[Formula] = set()
+
+    def _number(self, key: tuple[object, ...]) -> Formula:
+        return self._numbers.setdefault(key, len(self._numbers))
+
+    def variable(self, name: str) -> Formula:
+        """The variable of a name of the net, or of a sentence of such names."""
+        return self.symbol(spelled(name))
+
+    def symbol(self, text: str) -> Formula:
+        """The variable that a file spells so."""
+        return self._number(("variable", text))
+
+    def negation(self, operand: Formula) -> Formula:
+        """The NOT of a formula."""
+        if (known := self._negated.get(operand)) is not None:
+            return known
+        made = self._number(("not", operand))
+        self._negated[operand], self._negated[made] = made, operand
+        self._negations.add(made)
+        return made
+
+    def is_negation(self, formula: Formula) -> bool:
+        """Whether a formula is the NOT of another one."""
+        return formula in self._negations
+
+    def literal(self, name: str, value: bool) -> Formula:
+        """The variable of this name, or its negation."""
+        return self.variable(name) if value else self.negation(self.variable(name))
+
+    def all_of(self, operands: Iterable[Formula]) -> Formula:
+        """The AND of some formulas; `true` of none."""
+        return self._connective("and", operands, neutral=TRUE, dominant=FALSE)
+
+    def any_of(self, operands: Iterable[Formula]) -> Formula:
+        """The OR of some formulas; `false` of none."""
+        return self._connective("or", operands, neutral=FALSE, dominant=TRUE)
+
+    def _connective(self, word: str, operands: Iterable[Formula], *, neutral: Formula, dominant: Formula) -> Formula:
+        kept = tuple(operand for operand in dict.fromkeys(operands) if operand != neutral)
+        if dominant in kept:
+            return dominant
+        if len(kept) < 2:
+            return kept[0] if kept else neutral
+        return self._number((word, kept))
+
+    def equal(self, left: Formula, right: Formula) -> Formula:
+        """The equation of two formulas."""
+        return self._number(("=", left, right))

@@ -1,0 +1,101 @@
+"""The static obligations of a bundle: each family's file says exactly what must be proved, and a solver says `unsat`.
+
+Three things are compared with what `restating` makes of the net, the subnets and the table: the verdicts, every field
+of them; the sentences of the file; and its formulas, in normal form. Then the solver answers the file itself. The
+order counts, too, so that no obligation can be left out and no other one put in its place.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from firable.decompose.verification.checked import Examination
+from firable.decompose.verification.formulas import Formulas, spelled
+from firable.decompose.verification.reading import ObligationFile, ReadingError, read_file
+from firable.decompose.verification.recut import Cut
+from firable.decompose.verification.refusal import NotShownError
+from firable.decompose.verification.restating import HEADS, Restated, Stated
+from firable.decompose.verification.solvers import Answers, SolverError
+from firable.nets.source import printable
+from firable.nets.verdict import Status, Verdict
+
+_METHOD: Final = "z3, of the negated obligation"  # what each such verdict says of itself
+_GIVEN_UP: Final = frozenset(("unknown", "timeout", "interrupted by timeout."))
+
+
+def check_obligations(examination: Examination, cut: Cut, solver: str, answers: Answers, timeout_ms: int) -> None:
+    """Judge the verdicts of all families; raises `NotShownError` where one is not shown."""
+    families = {family: compared(examination, cut, family) for family in HEADS}
+    # What needs no solver comes first, so that a bundle that says something else is refused at once.
+    for family, stated in families.items():
+        if stated:
+            shown = _answered(examination, family, stated, answers, timeout_ms)
+            _judge(examination, stated, solver, shown)
+
+
+def compared(examination: Examination, cut: Cut, family: str) -> list[Stated]:
+    """What must be proved of a family, once its file and its verdicts have been found to say exactly this."""
+    decomposition, formulas, name = examination.bundle.decomposition, Formulas(), _file(family)
+    stated = list(Restated(decomposition, cut, formulas).family(family))
+    if stated:
+        try:
+            file = read_file(examination.text(name), formulas)
+        except ReadingError as error:
+            raise NotShownError(f"'{name}' is no file of obligations: {error}", "evidence", name) from None
+        _compare(name, family, decomposition.net.name, file, stated)
+    for one in stated:
+        demanded = Verdict(one.name, Status.PROVED, one.sentence, _METHOD, subjects=one.subjects, evidence=(name,))
+        if examination.verdict(one.name) != demanded:
+            raise NotShownError(f"the verdict on '{one.name}' is not what its proof shows", "verdicts", one.name)
+    return stated
+
+
+def _file(family: str) -> str:
+    return f"{family}.smt2"
+
+
+def _compare(name: str, family: str, net: str, file: ObligationFile, stated: list[Stated]) -> None:
+    if file.head != (
+        printable(f"{family} of the decomposition of '{net}': {HEADS[family]}"),
+        "Each block asserts that its sentence does not hold, so the answer `unsat` proves it.",
+        "The constants: a place holds a token, a signal is 1, a transition fires or is enabled, a fact is so.",
+        "To check it with another solver: cvc5 --incremental FILE, or z3 FILE; every name is followed by `unsat`.",
+    ):
+        raise NotShownError(f"'{name}' does not say of what it is", "evidence", name)
+    for i, one in enumerate(stated):
+        if i >= len(file.blocks):
+            raise NotShownError(f"'{name}' lacks the obligation '{one.name}'", "evidence", name)
+        block = file.blocks[i]
+        if block.name != spelled(one.name):
+            raise NotShownError(f"'{name}' has '{block.name}' where '{one.name}' must be proved", "evidence", name)
+        if block.sentence != printable(one.sentence) or block.asserted != one.asserted:
+            raise NotShownError(f"'{name}' states something else than '{one.name}'", "evidence", name)
+    if len(file.blocks) > len(stated):
+        extra = file.blocks[len(stated)].name
+        raise NotShownError(f"'{name}' proves '{extra}', which nobody demands", "evidence", name)
+
+
+def _answered(
+    examination: Examination, family: str, stated: list[Stated], answers: Answers, timeout_ms: int
+) -> list[bool]:
+    """Of each obligation whether it is shown; an answer that refutes one is refused."""
+    name = _file(family)
+    try:
+        said = answers(examination.text(name), timeout_ms)
+    except SolverError as error:
+        raise NotShownError(f"the solver cannot read '{name}': {error}", "evidence", name) from None
+    if said[::2] != tuple(spelled(one.name) for one in stated) or len(said) % 2:
+        raise NotShownError(f"the solver does not answer one obligation of '{name}' after the other", "evidence", name)
+    found = []
+    for one, answer in zip(stated, said[1::2], strict=True):
+        if answer != "unsat" and answer not in _GIVEN_UP:
+            raise NotShownError(f"'{one.name}' is refuted: the solver says {answer}", "verdicts", one.name)
+        found.append(answer == "unsat")
+    return found
+
+
+def _judge(examination: Examination, stated: list[Stated], solver: str, shown: list[bool]) -> None:
+    for one, is_shown in zip(stated, shown, strict=True):
+        method = f"{solver}, of the negated obligation stated anew" if is_shown else "nothing"
+        late = "" if is_shown else f"{solver} gave up"
+        examination.judge(examination.verdict(one.name), shown=is_shown, method=method, only_claimed=late)

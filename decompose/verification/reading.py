@@ -1,0 +1,178 @@
+"""Reading an SMT-LIB 2 file of obligations: only what such a file may hold, everything else is refused.
+
+    file   ::= comment* (set-logic QF_UF) block*
+    block  ::= comment (push 1) (echo "NAME") declaration* definition* assertion+ (check-sat) (pop 1)
+    declaration ::= (declare-const |VARIABLE| Bool)
+    definition  ::= (define-fun WORD () Bool term)
+    assertion   ::= (assert term)
+    term   ::= |VARIABLE| | WORD | true | false | (not term) | (and term term+) | (or term term+) | (= term term)
+
+where no operand of an `and` or an `or` stands there twice or is a constant, and none of a `not` is one or a `not`.
+
+What a solver is asked could be bent by a command in between: an option, an assertion outside of the blocks, a variable
+that is declared and then defined. So the reader knows no other command, a word is one that the block has defined
+before, a variable one that it has declared, and each of them is used. What remains is what the terms say.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from firable.decompose.verification.formulas import FALSE, TRUE, Formula, Formulas
+
+_TOKEN: Final = re.compile(r"""\s+|(\(|\)|\|[^|\\]*\||"[^"]*"|;[^\n]*|[^\s()|";]+)""")
+_WORD: Final = re.compile(r"[a-z]+[0-9]*_*[0-9]*")
+_RESERVED: Final = frozenset(("true", "false", "not", "and", "or"))
+
+
+class ReadingError(Exception):
+    """The text is no file of obligations, and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One obligation of a file: its name, the sentence above it, and what is asserted."""
+
+    name: str
+    sentence: str
+    asserted: tuple[Formula, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ObligationFile:
+    """A file: the comments at its head, and its blocks."""
+
+    head: tuple[str, ...]
+    blocks: tuple[Block, ...]
+
+
+def read_file(text: str, formulas: Formulas) -> ObligationFile:
+    """Read a file; raises `ReadingError` for whatever is none.
+
+    >>> text = "; so\\n(set-logic QF_UF)\\n; it is\\n(push 1)\\n(echo \\"a\\")\\n(declare-const |p| Bool)\\n"
+    >>> text += "(assert (not |p|))\\n(check-sat)\\n(pop 1)\\n"
+    >>> of = Formulas()
+    >>> read_file(text, of).blocks == (Block("a", "it is", (of.literal("p", False),)),)
+    True
+    """
+    return _Reader(text, formulas).file()
+
+
+class _Reader:
+    def __init__(self, text: str, formulas: Formulas) -> None:
+        self.formulas = formulas
+        self.tokens = list(self._tokens(text))
+        self.tokens.append("")  # behind the last
+        self.position = 0
+
+    @staticmethod
+    def _tokens(text: str) -> Iterator[str]:
+        position = 0
+        while position < len(text):
+            found = _TOKEN.match(text, position)
+            if found is None:
+                raise ReadingError(f"nothing may be written as {text[position : position + 20]!r}")
+            if found[1] is not None:
+                yield found[1]
+            position = found.end()
+
+    def next(self) -> str:
+        token = self.tokens[self.position]
+        self.position += 1
+        return token
+
+    def expect(self, *tokens: str) -> None:
+        for token in tokens:
+            if (found := self.next()) != token:
+                raise ReadingError(f"expected {token!r}, found {found!r}" if found else f"cut off before {token!r}")
+
+    def comments(self) -> Iterator[str]:
+        while self.tokens[self.position].startswith(";"):
+            yield self.next().removeprefix(";").removeprefix(" ")
+
+    def file(self) -> ObligationFile:
+        head = tuple(self.comments())
+        self.expect("(", "set-logic", "QF_UF", ")")
+        blocks = []
+        while self.tokens[self.position]:
+            blocks.append(self.block())
+        return ObligationFile(head, tuple(blocks))
+
+    def block(self) -> Block:
+        sentences = tuple(self.comments())
+        if len(sentences) != 1:
+            raise ReadingError("each obligation has one sentence above it")
+        self.expect("(", "push", "1", ")", "(", "echo")
+        name = self.next()
+        if not name.startswith('"'):
+            raise ReadingError(f"the name of an obligation stands in quotes, not as {name!r}")
+        self.expect(")")
+        declared: dict[str, Formula] = {}
+        defined: dict[str, Formula] = {}
+        used: set[str] = set()
+        asserted: list[Formula] = []
+        while True:
+            self.expect("(")
+            match self.next():
+                case "declare-const" if not defined and not asserted:
+                    symbol = self.next()
+                    if symbol in declared or not symbol.startswith("|"):
+                        raise ReadingError(f"{symbol} cannot be declared here")
+                    self.expect("Bool", ")")
+                    declared[symbol] = self.formulas.symbol(symbol[1:-1])
+                case "define-fun" if not asserted:
+                    word = self.next()
+                    taken = word in defined or word in _RESERVED or f"|{word}|" in declared
+                    if taken or not _WORD.fullmatch(word):
+                        raise ReadingError(f"{word} cannot be defined here")
+                    self.expect("(", ")", "Bool")
+                    value = self.term(declared, defined, used)
+                    self.expect(")")
+                    defined[word] = value
+                case "assert":
+                    asserted.append(self.term(declared, defined, used))
+                    self.expect(")")
+                case "check-sat" if asserted:
+                    self.expect(")", "(", "pop", "1", ")")
+                    break
+                case other:
+                    raise ReadingError(f"'{other}' may not stand here")
+        if unused := sorted({*declared, *defined} - used):
+            raise ReadingError(f"{unused[0]} is of no use")
+        return Block(name[1:-1], sentences[0], tuple(asserted))
+
+    def term(self, declared: dict[str, Formula], defined: dict[str, Formula], used: set[str]) -> Formula:
+        stack: list[tuple[str, list[Formula]]] = []
+        while True:
+            token = self.next()
+            if token == "(":
+                stack.append((self.next(), []))
+                continue
+            if token == ")" and stack:
+                value = self._applied(*stack.pop())
+            elif token in declared:
+                used.add(token)
+                value = declared[token]
+            elif token in defined:
+                used.add(token)
+                value = defined[token]
+            elif token in ("true", "false"):
+                value = TRUE if token == "true" else FALSE
+            else:
+                raise ReadingError(f"{token!r} is nothing that was declared")
+            if not stack:
+                return value
+            stack[-1][1].append(value)
+
+    def _applied(self, operator: str, operands: list[Formula]) -> Formula:
+        match operator, len(operands):
+            case "not", 1 if operands[0] not in (TRUE, FALSE) and not self.formulas.is_negation(operands[0]):
+                return self.formulas.negation(operands[0])
+            case "and" | "or", n if n > 1 and len({*operands, TRUE, FALSE}) == n + 2:
+                return self.formulas.all_of(operands) if operator == "and" else self.formulas.any_of(operands)
+            case "=", 2:
+                return self.formulas.equal(*operands)
+        raise ReadingError(f"nobody writes '{operator}' of these {len(operands)} operands")

@@ -1,0 +1,138 @@
+"""The obligations on arbitration: the groups as facts, and the choice of each group.
+
+The choice goes through the considered transitions one after the other: under rotation and order the sequence, entered
+at a variable turn, then the sequence again; then the rest. Each is granted if it is enabled, its turn has come and none
+of the places that it competes for has been taken; what is granted takes them. docs/bundle.md has the formulas.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+from firable.decompose.verification.formulas import FALSE, TRUE, Formula, Formulas
+from firable.decompose.verification.restating_facts import agreeing
+from firable.nets.decomposition import ArbitrationGroup
+from firable.nets.net import ArbitrationRule, Net
+
+if TYPE_CHECKING:
+    from firable.decompose.verification.restating import Restated, Stated
+
+
+@dataclass(frozen=True)
+class _Contest:
+    """The places that each transition competes for, and who competes for each."""
+
+    for_what: Mapping[str, Sequence[Hashable]]
+    inputs: Mapping[str, Sequence[Hashable]]
+    who: Mapping[Hashable, Sequence[str]]
+
+
+def arbitration(of: Restated) -> Iterator[Stated]:
+    """The facts on the groups, and the choice of each."""
+    yield _facts(of)
+    central = _contest([(of.net, str)])
+    in_subnets = _contest((subnet, partial(of.whole_of, subnet.name)) for subnet in of.decomposition.subnets)
+    given = {group.name: group for group in of.decomposition.groups}
+    for group in of.cut.groups:
+        yield _choice(of, group, given[group.name], central, in_subnets)
+
+
+def _facts(of: Restated) -> Stated:
+    def facts(groups: Sequence[ArbitrationGroup], rows: Sequence[str]) -> Iterator[str]:
+        for g in groups:
+            yield f"{g.name} decides by {g.by.value} at {json.dumps(g.controller)}"
+            yield from (f"{g.name} takes {t} in turn {i}" for i, t in enumerate(g.sequence))
+            yield from (f"{g.name} takes {t} last, in turn {i}" for i, t in enumerate(g.rest))
+        yield from (f"the coordinator decides {name}" for name in rows)
+
+    central = facts(of.cut.groups, [row.name for row in of.cut.coordinated])
+    made = facts(of.decomposition.groups, [row.name for row in of.decomposition.coordinated])
+    sentence = "each conflict component is one group, decided by the coordinator where a global transition is in it"
+    return agreeing(of, "arbitration", sentence, central, made)
+
+
+def _contest(nets: Iterable[tuple[Net, Callable[[str], str]]]) -> _Contest:
+    """The contest in these nets: of each, first the places with several consumers, then those with several producers.
+
+    Transitions are told by their names in the central net.
+    """
+    for_what: dict[str, list[Hashable]] = {}
+    inputs: dict[str, list[Hashable]] = {}
+    who: dict[Hashable, list[str]] = {}
+    for net, whole in nets:
+        at: dict[tuple[str, str], list[str]] = {}
+        for t in net.transitions:
+            for kind, places in (("from", t.inputs), ("to", t.outputs)):
+                for place in places:
+                    at.setdefault((kind, place), []).append(whole(t.name))
+        for key in ((kind, place.name) for kind in ("from", "to") for place in net.places):
+            names = at.get(key, [])
+            if len(names) < 2:
+                continue
+            who[key] = names
+            for name in names:
+                for_what.setdefault(name, []).append(key)
+                if key[0] == "from":
+                    inputs.setdefault(name, []).append(key)
+    return _Contest(for_what, inputs, who)
+
+
+def _granted(of: Formulas, group: ArbitrationGroup, contest: _Contest) -> dict[str, Formula]:
+    """What the group grants, for whatever is enabled and whatever the turn is."""
+    considered: list[tuple[str, Formula]] = []
+    if group.by is not ArbitrationRule.PRIORITY:
+        begun = FALSE
+        for i, name in enumerate(group.sequence):
+            begun = of.any_of([begun, of.variable(f"turn({i})")])
+            considered.append((name, begun))
+    considered += [(name, TRUE) for name in (*group.sequence, *group.rest)]
+    granted: dict[str, Formula] = {}
+    taken: dict[Hashable, Formula] = {}
+    for name, its_turn in considered:
+        places = contest.for_what.get(name, ())
+        free = of.negation(of.any_of(taken.get(place, FALSE) for place in places))
+        now = of.all_of([of.variable(f"enabled({name})"), its_turn, free])
+        granted[name] = of.any_of([granted.get(name, FALSE), now])
+        for place in places:
+            taken[place] = of.any_of([taken.get(place, FALSE), now])
+    return granted
+
+
+def _winning(of: Formulas, granted: Mapping[str, Formula], contest: _Contest) -> dict[str, Formula]:
+    """Who wins an input conflict: it is granted, and one that is enabled and shares an input with it is not."""
+    losing: dict[Hashable, Formula] = {}
+    for place in dict.fromkeys(place for name in granted for place in contest.inputs.get(name, ())):
+        losing[place] = of.any_of(
+            of.all_of([of.variable(f"enabled({name})"), of.negation(granted[name])])
+            for name in contest.who[place]
+            if name in granted
+        )
+    return {
+        name: of.all_of([its, of.any_of(losing[place] for place in contest.inputs.get(name, ()))])
+        for name, its in granted.items()
+    }
+
+
+def _choice(
+    of: Restated, group: ArbitrationGroup, in_table: ArbitrationGroup, central: _Contest, in_subnets: _Contest
+) -> Stated:
+    wanted, given = _granted(of.of, group, central), _granted(of.of, in_table, in_subnets)
+    winning, won = _winning(of.of, wanted, central), _winning(of.of, given, in_subnets)
+    claims = []
+    for name in wanted:
+        claims += [of.of.equal(given[name], wanted[name]), of.of.equal(won[name], winning[name])]
+    taken: dict[Hashable, Formula] = {}
+    for place in dict.fromkeys(place for name in wanted for place in central.for_what.get(name, ())):
+        at = [given[name] for name in central.who[place]]
+        claims.append(of.at_most_one(at))
+        taken[place] = of.of.any_of(at)
+    for name in wanted:
+        against = [taken[place] for place in central.for_what.get(name, ())]
+        not_enabled = of.of.negation(of.of.variable(f"enabled({name})"))
+        claims.append(of.of.any_of([not_enabled, of.of.any_of([given[name], *against])]))
+    sentence = f"whatever is enabled, '{group.name}' grants a maximal set without conflict, as the central arbiter does"
+    return of.claim(f"arbitration.{group.name}", sentence, of.of.all_of(claims), tuple(wanted))

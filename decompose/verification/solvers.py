@@ -1,0 +1,62 @@
+"""Solvers that answer a file: cvc5, which shares nothing with the one of the prover, or z3 where there is no cvc5.
+
+Each reads the text itself, with its own parser, and nothing of it is built by us: so what it answers is the answer to
+the file. Whoever has neither can take the files out (`firable verify BUNDLE --smt-dir DIR`) and ask a third one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+Answers = Callable[[str, int], tuple[str, ...]]
+"""The lines that a solver prints for a text, without quotes, in so many milliseconds for each question."""
+
+
+class SolverError(Exception):
+    """The solver could not read a text."""
+
+
+def by_cvc5(text: str, timeout_ms: int) -> tuple[str, ...]:
+    """What cvc5 prints.
+
+    >>> by_cvc5("(set-logic QF_UF)(assert false)(check-sat)", 1000)
+    ('unsat',)
+    """
+    import cvc5
+
+    solver = cvc5.Solver()
+    solver.setOption("incremental", "true")
+    solver.setOption("tlimit-per", str(timeout_ms))
+    parser = cvc5.InputParser(solver)
+    parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, text, "evidence")
+    symbols = parser.getSymbolManager()
+    said: list[str] = []
+    try:
+        while not (command := parser.nextCommand()).isNull():
+            said += command.invoke(solver, symbols).splitlines()
+    except RuntimeError as error:  # the one exception of its binding
+        raise SolverError(str(error)) from None
+    return tuple(line.strip('"') for line in said)
+
+
+def by_z3(text: str, timeout_ms: int) -> tuple[str, ...]:
+    """What z3 prints.
+
+    >>> by_z3('(set-logic QF_UF)(echo "so")(assert true)(check-sat)', 1000)
+    ('so', 'sat')
+    """
+    import z3
+
+    context = z3.Context()
+    z3.Z3_eval_smtlib2_string(context.ref(), f"(set-option :timeout {timeout_ms})")
+    try:
+        said: str = z3.Z3_eval_smtlib2_string(context.ref(), text)
+    except z3.Z3Exception as error:
+        raise SolverError(str(error)) from None
+    return tuple(line.strip('"') for line in said.splitlines())
+
+
+SOLVERS: Final[Mapping[str, Answers]] = MappingProxyType({"cvc5": by_cvc5, "z3": by_z3})
+"""Each solver by its name, the one that is asked by default first."""

@@ -1,0 +1,101 @@
+"""`firable verify BUNDLE`: what it prints of a bundle, and how it refuses one that was edited and sealed anew."""
+
+import builtins
+import json
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from firable.cli.main import main
+from firable.nets.bundle import read_bundle, write_bundle
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("bundle") / "cell.bundle"
+    assert main(["bundle", "catalogue:conceptual_one_robot", "-o", str(path)]) == 0
+    return path
+
+
+def test_a_bundle_is_shown_family_by_family_and_verdict_by_verdict(
+    bundle: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["verify", str(bundle)]) == 0
+    told = capsys.readouterr().out
+    assert "obligations, answered by cvc5" in told
+    assert "6 of 6    eq7 " in told
+    assert "✓ shown     deadlock-free" in told
+    assert told.rstrip().endswith("shown")
+
+
+@pytest.mark.parametrize("solver", ["cvc5", "z3"])
+def test_a_report_on_a_bundle_is_as_published(bundle: Path, solver: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["verify", str(bundle), "--solver", solver, "--format", "json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    schema = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator(schema).validate(data)
+    (report,) = data["reports"]
+    assert (report["status"], report["bundle"]["solver"]) == ("proved", solver)
+    assert [v["name"] for v in report["verdicts"]] == [v.name for v in read_bundle(bundle).verdicts]
+
+
+def test_a_bundle_of_another_net_is_refused(bundle: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["verify", str(bundle), "--net", "catalogue:conceptual_one_robot"]) == 0
+    assert main(["verify", str(bundle), "--net", "catalogue:one_robot"]) == 2
+    assert "error[F6002]" in capsys.readouterr().err
+
+
+def test_the_files_of_a_bundle_go_to_another_solver(bundle: Path, tmp_path: Path) -> None:
+    assert main(["verify", str(bundle), "--smt-dir", str(tmp_path / "smt")]) == 0
+    assert {"eq7.smt2", "arbitration.smt2"} <= {file.name for file in (tmp_path / "smt").iterdir()}
+
+
+def test_a_damaged_bundle_is_refused(bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = bytearray(bundle.read_bytes())
+    data[len(data) // 2] ^= 1
+    (tmp_path / "damaged").write_bytes(data)
+    assert main(["verify", str(tmp_path / "damaged")]) == 2
+    assert "error[F5001]" in capsys.readouterr().err
+
+
+def test_a_bundle_that_was_edited_and_sealed_anew_is_refused(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = read_bundle(bundle)
+    text = whole.evidence["eq7.smt2"].replace("(assert (not", "(assert (or", 1)
+    write_bundle(tmp_path / "weak", replace(whole, evidence={**whole.evidence, "eq7.smt2": text}))
+    assert main(["verify", str(tmp_path / "weak")]) == 2
+    told = capsys.readouterr().err
+    assert "error[F6002]: the bundle does not show what it claims: 'eq7.smt2'" in told
+    assert "hint: make the bundle anew" in told
+
+
+def test_a_bundle_without_evidence_on_its_net_is_only_claimed(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = read_bundle(bundle)
+    kept = {file: text for file, text in whole.evidence.items() if file.endswith(".smt2")}
+    bare = tuple(replace(v, evidence=tuple(f for f in v.evidence if f in kept)) for v in whole.verdicts)
+    write_bundle(tmp_path / "bare", replace(whole, verdicts=bare, evidence=kept))
+    assert main(["verify", str(tmp_path / "bare")]) == 3
+    assert "? claimed   deadlock-free" in capsys.readouterr().out
+
+
+def test_a_missing_second_solver_is_named(
+    bundle: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real = builtins.__import__
+
+    def without_cvc5(name: str, *arguments: Any) -> Any:
+        if name == "cvc5":
+            raise ModuleNotFoundError("No module named 'cvc5'", name="cvc5")
+        return real(name, *arguments)
+
+    monkeypatch.setattr(builtins, "__import__", without_cvc5)
+    assert main(["verify", str(bundle)]) == 2
+    assert "pip install 'firable[verify]'" in capsys.readouterr().err
+    assert main(["verify", str(bundle), "--solver", "z3"]) == 0

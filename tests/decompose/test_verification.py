@@ -1,0 +1,335 @@
+"""Checking a bundle again: what was made passes, and every single change of what it holds does not."""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache, partial
+from typing import Any
+
+import pytest
+from support.bundle_mutants import decomposition_mutants, evidence_mutants, line_mutants, verdict_mutants
+
+from firable.analysis.check import check
+from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
+from firable.analysis.evidence.document import Document
+from firable.decompose.bundling import make_bundle
+from firable.decompose.proofs.families import FAMILIES
+from firable.decompose.proofs.proving import prove
+from firable.decompose.splitting.cut import split
+from firable.decompose.verification import documents
+from firable.decompose.verification.checked import Examination
+from firable.decompose.verification.checking import check_bundle
+from firable.decompose.verification.obligations import compared
+from firable.decompose.verification.recut import check_cut
+from firable.decompose.verification.refusal import NotShownError
+from firable.decompose.verification.restating import HEADS
+from firable.decompose.verification.solvers import SOLVERS, SolverError, by_cvc5
+from firable.nets.bundle import Bundle
+from firable.nets.catalogue import catalogue_net, family_net
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.right_to_run import unproved
+from firable.nets.verdict import Cost, Status, Verdict
+
+CELLS = ("conceptual_one_robot", "one_robot", "two_robots_shared")
+
+
+@cache
+def bundled(name: str) -> Bundle:
+    return make_bundle(check(family_net(name) if "-" in name else catalogue_net(name)))
+
+
+@pytest.fixture
+def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a solver answers to one text, and a checker to one document, is found once: a mutant changes few of them."""
+    answers: dict[str, tuple[str, ...]] = {}
+    records: dict[str, tuple[CheckedRecord, ...]] = {}
+
+    def solver(text: str, timeout_ms: int) -> tuple[str, ...]:
+        return answers[text] if text in answers else answers.setdefault(text, by_cvc5(text, timeout_ms))
+
+    def checker(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
+        text = document.to_text()
+        if text not in records:
+            records[text] = tuple(check_document(document, timeout_ms=timeout_ms))
+        return iter(records[text])
+
+    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", {"cvc5": solver})
+    monkeypatch.setattr(documents, "check_document", checker)
+
+
+def survives(make: Callable[[], Bundle], whole: Bundle) -> bool:
+    """Whether a mutant is a bundle of which everything is shown."""
+    try:
+        checked = check_bundle(make())
+    except (InputError, ValueError):  # not shown; not a net
+        return False
+    return len(checked) == len(whole.verdicts) and all(one.shown for one in checked)
+
+
+@pytest.mark.parametrize(
+    ("name", "solver"), [*((name, "cvc5") for name in CELLS), ("conceptual_one_robot", "z3"), ("one_robot", "z3")]
+)
+def test_everything_in_the_bundle_of_a_cell_is_shown(name: str, solver: str) -> None:
+    bundle = bundled(name)
+    checked = check_bundle(bundle, solver=solver)
+    assert [one.verdict for one in checked] == list(bundle.verdicts)
+    assert all(one.shown and one.method and not one.only_claimed for one in checked)
+
+
+def test_what_is_read_back_is_shown_too() -> None:
+    bundle = bundled("conceptual_one_robot")
+    assert check_bundle(Bundle.from_bytes(bundle.to_bytes())) == check_bundle(bundle)
+
+
+@pytest.mark.parametrize(
+    "name", ["workshop-6", "vehicles-2-8", "philosophers-4", "grid-3", "counter-3", "interlocked-3"]
+)
+def test_what_must_be_proved_is_stated_anew_as_the_prover_states_it(name: str) -> None:
+    decomposition = split(family_net(name))
+    proof = prove(decomposition)
+    examination = Examination(Bundle(decomposition, proof.verdicts, proof.files))
+    cut = check_cut(decomposition)
+    stated = [one.name for family in HEADS for one in compared(examination, cut, family)]
+    assert stated == [verdict.name for verdict in proof.verdicts]
+
+
+def test_layers_are_stated_anew() -> None:
+    decomposition = split(catalogue_net("two_cells"))
+    proof = prove(decomposition)
+    assert {row.at for row in decomposition.coordinated} == {None, "cell_a", "cell_b"}
+    examination = Examination(Bundle(decomposition, proof.verdicts, proof.files))
+    for family in HEADS:
+        assert compared(examination, check_cut(decomposition), family)
+    for i, row in enumerate(decomposition.coordinated):
+        other = replace(row, at="cell_a" if row.at is None else None)
+        rows = (*decomposition.coordinated[:i], other, *decomposition.coordinated[i + 1 :])
+        with pytest.raises(NotShownError):
+            check_cut(replace(decomposition, coordinated=rows))
+
+
+def test_names_in_any_script_are_stated_anew() -> None:
+    net = Net(
+        "größe",
+        (Place("a.weiß", "a", marked=True), Place("b.größe", "b")),
+        (Transition("füllt", ("a.weiß",), ("b.größe",)), Transition("leert", ("b.größe",), ("a.weiß",))),
+        controllers=(Controller("a"), Controller("b")),
+    )
+    decomposition = split(net)
+    proof = prove(decomposition)
+    assert proof.holds
+    examination = Examination(Bundle(decomposition, proof.verdicts, proof.files))
+    for family in HEADS:
+        compared(examination, check_cut(decomposition), family)
+
+
+def test_the_families_stated_anew_are_those_of_the_prover() -> None:
+    assert [(family.name, family.says) for family in FAMILIES] == list(HEADS.items())
+
+
+# --------------------------------------------------------------------------------------------------------------------
+# Mutants: everything sealed anew, so that all hashes are right
+
+
+@pytest.mark.usefixtures("remembering")
+@pytest.mark.parametrize("name", ["workshop-1", "one_robot"])
+def test_every_single_change_of_net_subnets_and_table_is_refused(name: str) -> None:
+    """Most by cutting the net anew; what the cut does not depend on (names, orders, properties) by the evidence."""
+    bundle = bundled(name)
+    count = 0
+    for how, make in decomposition_mutants(bundle):
+        try:
+            mutant = make()
+        except (InputError, ValueError):
+            continue  # not even a net: nothing that could be read
+        count += 1
+        try:
+            check_cut(mutant.decomposition)
+        except NotShownError:
+            continue
+        assert how.startswith("net: ")
+        assert not survives(make, bundle), how
+    assert count > 2000
+
+
+@pytest.mark.usefixtures("remembering")
+def test_another_net_split_rightly_is_not_shown_by_the_proofs_on_this_one() -> None:
+    bundle = bundled("workshop-1")
+    for how, net in consistent_edits(bundle.net):
+        edited = replace(bundle, decomposition=split(net))
+        assert not survives(partial(replace, edited), bundle), how
+
+
+def consistent_edits(net: Net) -> Iterator[tuple[str, Net]]:
+    """The net with each arc and gate left out, and each token moved."""
+    for i, t in enumerate(net.transitions):
+        for kind in ("inputs", "outputs", "permissive", "inhibitive", "external"):
+            there = getattr(t, kind)
+            for j in range(len(there)):
+                changes: dict[str, Any] = {kind: (*there[:j], *there[j + 1 :])}
+                changed = replace(t, **changes)
+                try:
+                    edited = replace(net, transitions=(*net.transitions[:i], changed, *net.transitions[i + 1 :]))
+                    split(edited)
+                except (InputError, ValueError):
+                    continue
+                yield f"{t.name} without {there[j]}", edited
+    for i, p in enumerate(net.places):
+        places = (*net.places[:i], replace(p, marked=not p.marked), *net.places[i + 1 :])
+        yield f"a token of {p.name}", replace(net, places=places)
+
+
+def rests_on_an_obligation(verdict: Verdict) -> bool:
+    return verdict.evidence[:1] != () and verdict.evidence[0].endswith(".smt2")
+
+
+def test_every_single_change_of_the_verdict_on_an_obligation_is_refused() -> None:
+    bundle = bundled("conceptual_one_robot")
+    cut = check_cut(bundle.decomposition)
+    mutants = [(how, make) for how, make in verdict_mutants(bundle) if changed_family(how) in HEADS]
+    assert len(mutants) > 500
+    for how, make in mutants:
+        with pytest.raises(NotShownError):
+            pytest.fail(how) if compared(Examination(make()), cut, changed_family(how)) else None
+
+
+def changed_family(how: str) -> str:
+    return how.removeprefix("verdict ").partition(":")[0].partition(".")[0]
+
+
+@pytest.mark.usefixtures("remembering")
+def test_every_single_change_of_a_verdict_on_the_net_or_on_a_vote_is_refused_or_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bundle = bundled("workshop-1")
+
+    def shown_before(examination: Examination, *_: object) -> None:
+        for verdict in filter(rests_on_an_obligation, bundle.verdicts):
+            examination.text(verdict.evidence[0])
+            examination.judge(verdict, shown=True, method="the test above")
+
+    monkeypatch.setattr("firable.decompose.verification.checking.check_obligations", shown_before)
+    monkeypatch.setattr(documents, "obligations", lambda *_: ())  # no document is changed here
+    mutants = [(how, make) for how, make in verdict_mutants(bundle) if changed_family(how) not in HEADS]
+    assert len(mutants) > 300
+    assert [how for how, make in mutants if survives(make, bundle)] == []
+
+
+@pytest.mark.usefixtures("remembering")
+def test_evidence_that_is_missing_exchanged_or_added_is_refused() -> None:
+    bundle = bundled("conceptual_one_robot")
+    assert [how for how, make in evidence_mutants(bundle) if survives(make, bundle)] == []
+
+
+@pytest.mark.usefixtures("remembering")
+def test_how_a_verdict_on_the_net_was_found_is_told_and_not_shown() -> None:
+    """The changes that no check notices: nothing rests on them, and nothing that `verify` says depends on them."""
+    bundle = bundled("conceptual_one_robot")
+    before = check_bundle(bundle)
+    for i, verdict in enumerate(bundle.verdicts):
+        if verdict.evidence != ("check.evidence.json",):
+            continue
+        changed = replace(verdict, method="by hand", hint="be glad", bound="none", cost=Cost(1, 2))
+        verdicts = (*bundle.verdicts[:i], changed, *bundle.verdicts[i + 1 :])
+        mutant = replace(bundle, verdicts=verdicts)
+        after = check_bundle(mutant)
+        assert [replace(one, verdict=verdict) for one in after[i : i + 1]] == list(before[i : i + 1])
+        assert unproved(mutant) == ()
+
+
+def family_refused(bundle: Bundle, file: str, text: str) -> bool:
+    mutant = replace(bundle, evidence={**bundle.evidence, file: text})
+    try:
+        compared(Examination(mutant), check_cut(bundle.decomposition), file.removesuffix(".smt2"))
+    except NotShownError:
+        return True
+    return False
+
+
+@pytest.mark.parametrize("family", [family for family in HEADS if family != "o8"])  # one layer
+def test_every_change_of_a_line_of_an_obligation_is_refused(family: str) -> None:
+    bundle, file = bundled("workshop-1"), f"{family}.smt2"
+    text = "\n\n".join(bundle.evidence[file].split("\n\n")[:9])  # its head, and eight of its obligations
+    rest = bundle.evidence[file].removeprefix(text)
+    for how, changed in line_mutants(text):
+        mutant = changed + rest
+        assert family_refused(bundle, file, mutant) or same_declarations(changed, text), how
+
+
+def same_declarations(text: str, of: str) -> bool:
+    """Whether two files differ in the order of declarations and definitions alone: then both state the same."""
+    ordered = [[line for line in one.splitlines() if not line.startswith(DECLARING)] for one in (text, of)]
+    return ordered[0] == ordered[1] and sorted(text.splitlines()) == sorted(of.splitlines())
+
+
+DECLARING = ("(declare-const ", "(define-fun ")
+TOKEN = re.compile(r'\|[^|]*\||"[^"]*"|[^\s()|"]+|[()]')
+
+
+@pytest.mark.parametrize("family", [family for family in HEADS if family != "o8"])  # one layer
+def test_every_change_of_a_word_of_an_obligation_is_refused(family: str) -> None:
+    bundle, file = bundled("workshop-1"), f"{family}.smt2"
+    text = bundle.evidence[file]
+    found = list(TOKEN.finditer("\n\n".join(text.split("\n\n")[:3])))  # its head, and two of its obligations
+    swap = {"and": "or", "or": "and", "not": "or", "=": "or", "true": "false", "false": "true"}
+    for token in found[:: max(1, len(found) // 100)]:
+        for words in ("", swap.get(token[0], "true"), f"{token[0]} {token[0]}"):
+            mutant = text[: token.start()] + words + text[token.end() :]
+            assert family_refused(bundle, file, mutant), (token[0], words, token.start())
+
+
+def test_weaker_assertions_and_sly_commands_are_refused() -> None:
+    bundle = bundled("workshop-1")
+    text = bundle.evidence["eq7.smt2"]
+    first = text.index("(push 1)")
+    for changed in (
+        text.replace("(assert (not\n", "(assert false)\n(assert (not\n", 1),
+        text[:first] + "(assert false)\n" + text[first:],
+        text[:first] + "(set-option :timeout 1)\n" + text[first:],
+        text.replace("(check-sat)", '(check-sat)\n(echo "unsat")', 1),
+        text.replace("(pop 1)", "", 1),
+        text.replace("(set-logic QF_UF)", "(set-logic ALL)"),
+        text.replace("; ", "; not ", 1),
+        text.replace("(declare-const ", "(declare-const |shared1| Bool)\n(declare-const ", 1),
+        text + "(exit)\n",
+    ):
+        assert changed != text
+        assert family_refused(bundle, "eq7.smt2", changed)
+
+
+def test_an_answer_that_refutes_is_refused_and_one_that_is_missing_only_claims(monkeypatch: pytest.MonkeyPatch) -> None:
+    bundle = bundled("conceptual_one_robot")
+
+    def saying(answer: str) -> dict[str, Callable[[str, int], tuple[str, ...]]]:
+        return {"cvc5": lambda text, ms: tuple(answer if line == "unsat" else line for line in by_cvc5(text, ms))}
+
+    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", saying("sat"))
+    with pytest.raises(InputError, match="is refuted: the solver says sat"):
+        check_bundle(bundle)
+    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", saying("unknown"))
+    checked = check_bundle(bundle)
+    assert {one.shown for one in checked if one.verdict.name.startswith("eq7.")} == {False}
+    assert {one.only_claimed for one in checked if not one.shown} == {"cvc5 gave up"}
+
+
+def test_a_solver_that_cannot_read_a_file_says_so() -> None:
+    for answers in SOLVERS.values():
+        with pytest.raises(SolverError):
+            answers("(assert nothing)", 1000)
+
+
+def test_a_bundle_without_documents_is_only_claimed() -> None:
+    bundle = bundled("conceptual_one_robot")
+    kept = {file: text for file, text in bundle.evidence.items() if file.endswith(".smt2")}
+    bare = tuple(replace(v, evidence=tuple(f for f in v.evidence if f in kept)) for v in bundle.verdicts)
+    checked = check_bundle(replace(bundle, verdicts=bare, evidence=kept))
+    claimed = {one.verdict.name for one in checked if not one.shown}
+    assert {"deadlock-free", "live", "contact-free"} <= claimed
+    assert not [name for name in claimed if name.startswith(("eq7.", "o3."))]
+
+
+def test_an_unproved_bundle_is_refused_for_that() -> None:
+    bundle = bundled("conceptual_one_robot")
+    doubted = tuple(replace(v, status=Status.UNKNOWN) if v.name == "eq7.G1" else v for v in bundle.verdicts)
+    with pytest.raises(InputError, match="F5002"):
+        check_bundle(replace(bundle, verdicts=(*doubted, Verdict("x", Status.UNKNOWN, "x", "x"))))
