@@ -59,9 +59,10 @@ from firable.analysis.methods import GOAL_LANES
 from firable.analysis.question import Answer, Question, listed, no, unknown, yes
 from firable.analysis.settling import Settling
 from firable.analysis.spaces.reachability import Budget, explore
-from firable.analysis.spaces.space import StateSpace, Witnesses
+from firable.analysis.spaces.space import StateSpace, WitnessError, Witnesses
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.decompose.splitting.votes import Vote, votes
+from firable.decompose.splitting.walking import fallen
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import Formula, Not
 from firable.nets.knowledge import undisturbing
@@ -69,13 +70,20 @@ from firable.nets.net import Net
 from firable.nets.queries import Query
 from firable.nets.temporal import ForAll, Globally
 from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
+from firable.semantics.algebra import BOOL
+from firable.semantics.firing import firable
+from firable.semantics.player import FiringSet, holds_in
 from firable.semantics.trace import Discipline
 
 PREFIX: Final = "persistent."
 SECONDS: Final = 20.0
 EVIDENCE: Final = "persistence.evidence.json"
 """The file of a bundle that shows which votes are persistent."""
+WALK_VOTES: Final = 64
+"""With more votes open than this, a walk looks out for all of them before any is asked for by itself."""
+_WALK_SHARE: Final = 0.6  # of the time
 _DIAGRAM_SHARE: Final = 0.4  # of the time, for all markings in a diagram
+_TOKENS_MAX: Final = 200  # told of the marking after a run
 _ARCS: Final = "arcs: no other transition can take it back"
 _UNITS: Final = "arcs and P-invariants with one token"
 
@@ -209,6 +217,9 @@ class _Deciding:
 
     def decide(self, open_: Sequence[Vote]) -> None:
         """Find a verdict on each vote, as far as there is time."""
+        if len(open_) > WALK_VOTES and self.space is None:
+            self._walk(open_)
+            open_ = [vote for vote in open_ if vote.part not in self.found]
         if open_ and self.space is None:
             self.space = self._held()
         for vote in open_:
@@ -219,6 +230,17 @@ class _Deciding:
         for left, vote in zip(range(len(open_), 0, -1), open_, strict=True):
             if vote.part not in self.found and not self.limits.deadline.over:
                 self._race(vote, self.limits.deadline.within(_share(self.limits.deadline, 1 / left)))
+
+    def _walk(self, open_: Sequence[Vote]) -> None:
+        """Find those that a walk meets."""
+        met = fallen(self.net, open_, self.limits.deadline.within(_share(self.limits.deadline, _WALK_SHARE)))
+        for vote in open_:
+            if self.limits.deadline.over:
+                return
+            if by := met.get(vote.part):
+                names = [name for name in vote.falsifiers if name in by]
+                answer = self._taken_back(vote, [(t,) for t in by[names[0]]], names)
+                self.found[vote.part] = _settled(vote, answer, "walk at random, sliced")
 
     def _held(self) -> StateSpace[Any] | None:
         """All markings, where a moment finds them or a diagram holds them."""
@@ -240,9 +262,10 @@ class _Deciding:
             witness = space.witness(standing)
             if witness is None:
                 return yes()
-            firable = (space.may_fire(self.net.transition_index[name]) for name in vote.falsifiers)
-            both = (space.count(space.algebra.conjunction([standing, may])) for may in firable)
-            return self._taken_back(vote, witness, [name for name, n in zip(vote.falsifiers, both, strict=True) if n])
+            may_fire = (space.may_fire(self.net.transition_index[name]) for name in vote.falsifiers)
+            both = (space.count(space.algebra.conjunction([standing, where])) for where in may_fire)
+            by = [name for name, n in zip(vote.falsifiers, both, strict=True) if n]
+            return self._taken_back(vote, self._run(witness), by)
 
         verdict = _question(vote).ask(space, find)
         if verdict.status is not Status.UNKNOWN:
@@ -266,22 +289,30 @@ class _Deciding:
                 raise AssertionError(f"{finding.method} says that a goal is reachable and does not show how")
             marking = self.net.marking(finding.witness.marking)
             may = {self.net.transitions[t].name for t in self.witnesses.player.may_fire(marking)}
-            answer = self._taken_back(vote, finding.witness, [name for name in vote.falsifiers if name in may])
+            answer = self._taken_back(
+                vote, self._run(finding.witness), [name for name in vote.falsifiers if name in may]
+            )
         self.found[vote.part] = _settled(vote, answer, verdict.method, verdict.cost)
 
-    def _taken_back(self, vote: Vote, witness: Witness, by: Sequence[str]) -> Answer:
-        """The yes is taken back: the way to where it stands, and the firing that does it, replayed."""
-        marking = self.net.marking(witness.marking)
-        may = {self.net.transitions[t].name for t in self.witnesses.player.may_fire(marking)}
-        last = next(name for name in by if name in may)
+    def _taken_back(self, vote: Vote, run: Sequence[FiringSet], by: Sequence[str]) -> Answer:
+        """The yes is taken back: the run to where it stands, and the firing that does it, played by the reference."""
+        before = self.witnesses.play(self.net.initial_marking, run)
         index = self.net.transition_index
-        firings = [*(tuple(index[name] for name in fired) for fired in witness.firings), (index[last],)]
-        after = self.witnesses.play(self.net.initial_marking, firings)
+        last = next(index[name] for name in by if firable(BOOL, self.net, index[name], holds_in(before)))
+        after = self.witnesses.play(before, [(last,)])
         full, empty = self.net.marking(vote.full), self.net.marking(vote.empty)
-        if marking & full != full or marking & empty or (after & full == full and not after & empty):
-            raise AssertionError(f"'{last}' does not take back the yes of '{vote.part}'")
+        stands, falls = before & full == full and not before & empty, after & full != full or after & empty
+        if not stands or not falls:
+            raise WitnessError(f"'{self.net.transitions[last].name}' does not take back the yes of '{vote.part}'")
         note = f"before the last firing '{vote.part}' votes yes, after it no"
-        return no(tuple(by), self.witnesses.replayed(firings, after, note), f"taken back by {listed(by)}")
+        # Thousands of runs through a large net, each told with its thousands of tokens, would fill the report.
+        told = after if after.bit_count() <= _TOKENS_MAX else 0
+        witness = self.witnesses.named([*run, (last,)], told, note=note)
+        return no(tuple(by), witness, f"taken back by {listed(by)}")
+
+    def _run(self, witness: Witness) -> list[FiringSet]:
+        """A firing sequence by the indexes of its transitions."""
+        return [tuple(self.net.transition_index[name] for name in fired) for fired in witness.firings]
 
 
 def claim_of(vote: Vote, *, persistent: bool) -> Claim:

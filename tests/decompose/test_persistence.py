@@ -17,9 +17,11 @@ from firable.analysis.evidence.document import document_from_text
 from firable.analysis.goal import Limits
 from firable.decompose.bundling import make_bundle
 from firable.decompose.splitting import persistence as module
+from firable.decompose.splitting import walking
 from firable.decompose.splitting.cut import split
-from firable.decompose.splitting.persistence import Persistence, persistence
+from firable.decompose.splitting.persistence import WALK_VOTES, Persistence, persistence
 from firable.decompose.splitting.votes import FALSIFIERS_MAX, votes
+from firable.decompose.splitting.walking import RUN_MAX, fallen
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.decomposition import Decomposition
@@ -211,3 +213,53 @@ def test_bundle_holds_the_verdicts_on_votes_with_a_document_that_shows_them() ->
     assert document.net == bundle.net
     assert [one.shown for one in check_document(document)] == [True] * 4
     assert Bundle.from_bytes(bundle.to_bytes()) == bundle
+
+
+@given(owned_nets())
+@examples(30)
+def test_what_a_walk_meets_is_what_takes_a_yes_back_and_its_run_leads_there(net: Net) -> None:
+    try:
+        decomposition = split(net)
+    except InputError:
+        return
+    expected, player = falsified(decomposition), Player(net)
+    cast = votes(decomposition)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(walking, "WITHOUT_NEWS_MAX", 2000)
+        met = fallen(net, cast, Deadline())
+    for vote in cast:
+        assert met.get(vote.part, {}).keys() <= set(expected[vote.part])
+        for name, run in met.get(vote.part, {}).items():
+            marking = net.initial_marking
+            for t in run:
+                marking = player.fire(marking, [t])
+            full, empty = net.marking(vote.full), net.marking(vote.empty)
+            assert marking & full == full
+            assert not marking & empty
+            assert net.transition_index[name] in player.firable(marking)
+
+
+def test_a_walk_through_a_large_plant_finds_each_vote_that_falls_with_a_short_run() -> None:
+    net = family_net("workshop-40")
+    cast = votes(split(net))
+    met = fallen(net, cast, Deadline())
+    open_ = [vote for vote in cast if vote.falsifiers]
+    assert len(open_) > WALK_VOTES
+    assert met.keys() == {vote.part for vote in open_}
+    assert max(len(run) for by in met.values() for run in by.values()) <= RUN_MAX
+    assert fallen(net, cast, Deadline()) == met
+
+
+def test_a_walk_begins_anew_where_nothing_can_fire() -> None:
+    """`G` is dead after `l`, and after `G` nothing is left: either is met from M0 only."""
+    places = (Place("a.p", "a", marked=True), Place("a.r", "a"), Place("b.q", "b"))
+    transitions = (Transition("G", ("a.p",), ("b.q",)), Transition("l", ("a.p",), ("a.r",)))
+    net = Net("n", places, transitions, controllers=(A, B))
+    cast = votes(split(net))
+    assert fallen(net, cast, Deadline()) == {"t1-11": {"l": ()}, "l": {"G": ()}}
+
+
+def test_many_open_votes_are_looked_out_for_by_one_walk() -> None:
+    found = persistence(split(family_net("workshop-40")))
+    assert {verdict.method for verdict in found.verdicts if not verdict.holds} == {"walk at random, sliced"}
+    assert not any(verdict.status is Status.UNKNOWN for verdict in found.verdicts)
