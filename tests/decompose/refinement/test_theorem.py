@@ -145,6 +145,105 @@ def test_a_deadlock_is_not_carried_over_where_a_task_can_go_on_for_ever() -> Non
     assert found["property.back"].status is Status.VIOLATED
 
 
+LENT = """\
+firable: 1
+cell: c
+controllers:
+  system:
+    start: [one, two, a, b, store]
+    places:
+      one:
+      two:
+      first:  {task: {name: fetch, robot: a, shelf: store}}
+      second: {task: {name: fetch, robot: b, shelf: store}}
+      a:      {opens: {to: x.a, machine: A}}
+      b:      {opens: {to: x.b, machine: B}}
+      store:  {opens: {to: x.store, machine: S}}
+  x:
+transitions:
+  t1: {from: [system.one, system.a], to: system.first, if: system.store}
+  t2: {from: system.first, to: [system.one, system.a]}
+  t3: {from: [system.two, system.b], to: system.second, if: system.store}
+  t4: {from: system.second, to: [system.two, system.b]}
+properties:
+  served: {leads_to: [system.two, system.second]}
+"""
+FETCH = """\
+firable_tasks: 1
+tasks:
+  fetch:
+    roles: {robot: {steps: {go: {place: "go_{robot}"}, hold: {place: "hold_{robot}"}}}, shelf: {steps: {open: }}}
+    moves: {m: {from: [robot.go, shelf.open], to: robot.hold, release: shelf}}
+"""
+
+
+def test_what_is_borrowed_can_be_lent_to_others_for_ever() -> None:
+    refinement = refine(parse_net(LENT), parse_tasks(FETCH))
+    report, other = report_on(explore(refinement.correspondence.conceptual)), report_on(explore(refinement.net))
+    found = carry(refinement)
+    for name in ("property.served", "effective-conflicts"):
+        # Proved of the conceptual net, in which nobody ever takes the store, and not so of the detailed one.
+        assert report.verdict(name).status is Status.PROVED
+        assert found[name].status is Status.UNKNOWN
+        assert other.verdict(name).status is Status.VIOLATED
+    assert found["live"].status is Status.PROVED
+    assert alike(report.net, refinement.net, dict(refinement.correspondence.transitions), divergence=True)
+
+
+MEETING = """\
+firable: 1
+cell: c
+controllers:
+  system:
+    start: [s, a, b, x]
+    places:
+      s:
+      x:
+      done:
+      left:
+      one:   {task: {name: work, robot: a}}
+      two:   {task: {name: work, robot: b}}
+      a:     {opens: {to: x.a, machine: A}}
+      b:     {opens: {to: x.b, machine: B}}
+  x:
+transitions:
+  t1: {from: [system.s, system.a], to: system.one}
+  t2: {from: system.b, to: system.two, if: system.one, unless: system.left}
+  t3: {from: system.one, to: [system.left, system.a], if: system.two}
+  t4: {from: [system.two, system.left], to: [system.s, system.b]}
+  u:  {from: [system.two, system.x], to: [system.done, system.b], if: system.one}
+properties:
+  met: {leads_to: {from: system.x, to: system.done, fairness: strong}}
+"""
+
+
+def test_strong_fairness_sees_markings_that_the_detailed_net_can_avoid() -> None:
+    refinement = refine(
+        parse_net(MEETING),
+        parse_tasks(WORK.replace("go: , hold: ", 'go: {place: "go_{robot}"}, hold: {place: "hold_{robot}"}')),
+    )
+    report, other = report_on(explore(refinement.correspondence.conceptual)), report_on(explore(refinement.net))
+    assert report.verdict("contact-free").holds
+    assert report.verdict("property.met").status is Status.PROVED
+    assert carry(refinement)["property.met"].status is Status.UNKNOWN
+    assert other.verdict("property.met").status is Status.VIOLATED
+
+
+def test_a_choice_inside_a_task_is_a_conflict_of_the_detailed_net_alone() -> None:
+    text = LENT.partition("  t3:")[0].replace("shelf: store", "shelf: b").replace("if: system.store", "if: system.b")
+    text = text.replace("      second: {task: {name: fetch, robot: b, shelf: b}}\n", "")
+    tasks = FETCH + "      n: {from: [robot.go, shelf.open], to: robot.hold, release: shelf}\n"
+    refinement = refine(
+        parse_net(text), parse_tasks(tasks.replace("moves: {m: ", "moves:\n      m: ").replace("shelf}}", "shelf}"))
+    )
+    plain = replace(refinement.correspondence, borrowed=frozenset())  # the other reason not to conclude
+    report = report_on(explore(plain.conceptual))
+    found = {verdict.name: verdict for verdict in carried(plain, refinement.blocks, report)}
+    assert report.verdict("effective-conflicts").holds
+    assert found["effective-conflicts"].status is Status.UNKNOWN
+    assert report_on(explore(refinement.net)).verdict("effective-conflicts").status is Status.VIOLATED
+
+
 def test_nothing_is_carried_over_from_a_net_with_contact() -> None:
     text = RESERVED_LATE.replace("properties:", "  more: {to: system.b}\nproperties:")
     refinement = refine(parse_net(text), parse_tasks(WORK))
