@@ -304,6 +304,14 @@ def test_a_task_whose_resources_do_not_add_up_is_refused(old: str, new: str, cod
     assert any(one == code and words in message for one, message in found), found
 
 
+def test_two_tasks_that_keep_one_resource_may_not_end_together() -> None:
+    text = NET.replace("      done:\n", "      done:\n      more:  {task: {name: pick, robot: a, shelf: b}}\n")
+    text = text.replace("t2: {from: system.work,", "t2: {from: [system.work, system.more],").replace(
+        "t3:", "t4: {from: [system.src, system.a, system.b], to: system.more}\n  t3:"
+    )
+    assert ("F4012", "'t2' takes 'system.a' twice, from 'system.work' and 'system.more'") in refusal(text)
+
+
 def test_what_is_wrong_with_a_task_is_said_with_its_line() -> None:
     tasks = parse_tasks(PICK.replace("to: robot.take,", ""), "own.tasks.yaml")
     with pytest.raises(InputError) as refused:
