@@ -18,8 +18,8 @@ not release it or release it twice, against *ends clean* and *contact-free*. M0 
    that is the same in both; an output of t in N, full in M and empty in M', would be a contact of N. So t is firable in
    M. A task that it ends is left without a rest (*ends clean*: t takes all the last steps), one that it starts was
    empty and is entered, and the resources that this one will release are pending from now on: t makes them idle in N,
-   and they were not idle before, for N has no contact; or t borrows them, then they were idle in M', so pending nowhere,
-   and in N they stay idle. The markings after t are related.
+   and they were not idle before, for N has no contact; or t borrows them: then they were idle in M', so pending
+   nowhere, and stay idle in N. The markings after t are related.
 3. Let t fire in M. In M', each task that is running can be brought to where it can end by moves inside (*ends*); tasks
    share no steps, and by 1 all these markings are related to M. There nothing is pending, so every resource, and
    every place, is as in M; the last steps are there, and the first steps of what t starts are empty: t is firable.
