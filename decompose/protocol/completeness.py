@@ -17,7 +17,8 @@ Where this does not succeed, the closures are made for each transition.
 A transition without inputs and outputs changes no marking when it fires, so the closure within one central marking
 would take it for hidden; with such nets the closure goes back by hidden steps alone, one at a time.
 
-Under faults the same is asked with the faults hidden: something may be lost if no restart comes.
+Under faults the same is asked with the faults hidden, of the configurations where faults have ceased: to cease is a
+hidden step. Something is lost if no restart comes.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explor
 from firable.analysis.spaces.space import StateSpace, WitnessError, Witnesses
 from firable.decompose.protocol.building import ProtocolNet
 from firable.decompose.protocol.draft import ASTRAY, central
-from firable.nets.formula import And, Holds, Not
+from firable.decompose.protocol.faulty import GO_ON
+from firable.nets.formula import And, Holds, Not, Or
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Witness
 from firable.semantics.player import Player
@@ -76,14 +78,15 @@ class _Completeness:
         self.net, self.central = protocol.net, protocol.parts.net
         self.plain = all(t.inputs or t.outputs for t in protocol.parts.transitions)
         self.quiet = space.satisfying(protocol.quiet)
-        self.astray = space.satisfying(Holds(ASTRAY))
+        outside = [Holds(ASTRAY), *([Holds(GO_ON)] if GO_ON in self.net.place_index else [])]
+        self.outside = space.satisfying(Or(tuple(outside)))
         self.player = Player(self.net)
         self.witnesses = Witnesses(self.net, Discipline.INTERLEAVING)
 
     def lost_in(self, marking: Marking, may_fire: tuple[int, ...]) -> Iterator[Lost]:
         """What is lost in the configurations of one central marking."""
         algebra = self.space.algebra
-        inside = algebra.conjunction([self._carrying(marking), algebra.negation(self.astray)])
+        inside = algebra.conjunction([self._carrying(marking), algebra.negation(self.outside)])
         if not may_fire or not self.space.count(inside):
             return
         home = algebra.conjunction([inside, self.quiet])

@@ -148,7 +148,7 @@ class Draft:
         return [] if step.kind in OUTSIDE else self.down_places(step.controller)
 
 
-OUTSIDE: Final = frozenset({"lose", "double", "late", "crash", "restart", "forget"})
+OUTSIDE: Final = frozenset({"lose", "double", "late", "crash", "restart", "forget", "cease"})
 """The kinds of steps that nobody takes: they happen, or belong to a crash."""
 
 

@@ -1,8 +1,10 @@
 """The faults as steps: a message is lost or doubled, a controller or the coordinator crashes and starts again.
 
 A fault that may happen once takes its token from a place of its own, so that all runs with at most one such fault are
-runs of the one net. Delay and overtaking need no step: each message has a channel of its own, and waits there for as
-long as it likes.
+runs of the one net. Faults that may happen again and again do so as long as `faults-go-on` holds a token, and at some
+time they cease: so what is possible *after* faults is not mistaken for what is possible by means of them, as the loss
+of a message that is in the way. Delay and overtaking need no step: each message has a channel of its own, and waits
+there for as long as it likes.
 
 A message that is doubled arrives once as it would have, and a copy is *late*. Within its round a second copy is what
 the sender does anyway, by repeating; so a late copy is one that comes when its round is over. With its number it is
@@ -33,15 +35,22 @@ WORDS: Final = {
 }
 """What each message is called."""
 
+KINDS: Final = ("loss", "duplication", "crash", "coordinator")
+
+GO_ON: Final = "faults-go-on"
+"""Faults that may happen again and again have not ceased."""
+
 IGNORED: Final = "late-copy-of-old-round"
 """A copy of a message of an older round is on its way, and will be ignored."""
 
 
 def declare_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[str]) -> None:
     """Add the places of the faults that belong to no part: what may still happen, and who is down."""
-    for kind in ("loss", "duplication", "crash", "coordinator"):
+    for kind in KINDS:
         if getattr(faults, kind) is Often.ONCE:
             draft.place(budget(kind), marked=True)
+    if any(getattr(faults, kind) is Often.ALWAYS for kind in KINDS):
+        draft.place(GO_ON, marked=True)
     if faults.duplication and any(is_numbered(parts, channel) for channel in channels):
         draft.place(IGNORED)
     if faults.coordinator:
@@ -68,15 +77,24 @@ def add_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[st
     def taken(kind: str) -> list[str]:
         return [budget(kind)] if getattr(faults, kind) is Often.ONCE else []
 
+    def allowed(kind: str) -> list[str]:
+        return [GO_ON] if getattr(faults, kind) is Often.ALWAYS else []
+
+    if GO_ON in draft.places:
+        draft.step("cease", Step("cease", "no fault happens from now on"), [GO_ON])
+
     for part in (part for its in parts.coordinated.values() for part in its):
         for channel in channels:
             message, words = at(channel, part), WORDS[channel].format(t=part.whole, c=part.controller)
             if faults.loss:
-                draft.step(f"lose/{message}", Step("lose", f"{words} is lost"), [message, *taken("loss")])
+                draft.step(
+                    f"lose/{message}", Step("lose", f"{words} is lost"), [message, *taken("loss")], (), allowed("loss")
+                )
             if faults.duplication:
                 copy = IGNORED if is_numbered(parts, channel) else late(message)
                 twice = Step("double", f"{words} is doubled, and the copy is late")
-                draft.step(f"double/{message}", twice, taken("duplication"), [copy], [message], [copy])
+                needed = [message, *allowed("duplication")]
+                draft.step(f"double/{message}", twice, taken("duplication"), [copy], needed, [copy])
                 if copy != IGNORED:
                     obeyed = Step("late", f"the late copy of {words} comes, as if it were of this round")
                     draft.step(f"late-copy/{message}", obeyed, [copy], [message], (), [message])
@@ -86,7 +104,8 @@ def add_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[st
     if faults.crash:
         for controller in crashing(parts, faults):
             crash = Step("crash", f"{controller} {'stops' if faults.restart else 'stops for ever'}", controller)
-            draft.step(f"crash/{controller}", crash, taken("crash"), [down(controller)], (), [down(controller)])
+            here = [down(controller)]
+            draft.step(f"crash/{controller}", crash, taken("crash"), here, allowed("crash"), here)
             if faults.restart:
                 again = Step("restart", f"{controller} starts again", controller)
                 draft.step(f"restart/{controller}", again, [down(controller)])

@@ -81,9 +81,9 @@ class Variant:
     conflicting transitions are decided together (O2); else local ones fire by themselves, and global ones have rounds
     of their own, neither minding what is promised to those that they conflict with. `gate_copies`: the owner of a gate
     takes no part, its gate is read from a copy that is brought up to date at some time (against O3). `vote_rounds` and
-    `order_rounds`: votes, and orders to fire, carry the number of their round, so that old ones are known (O5). `unanimous`: a
-    commit needs all votes. `stable`: promises survive a crash (O6). Of the bare skeleton: `recheck`, a part is applied
-    only if it is still firable, else blindly; `serial`, one order at a time.
+    `order_rounds`: votes, and orders to fire, carry the number of their round, so that old ones are known (O5).
+    `unanimous`: a commit needs all votes. `stable`: promises survive a crash (O6). Of the bare skeleton: `recheck`, a
+    part is applied only if it is still firable, else blindly; `serial`, one order at a time.
 
     Raises `ValueError` for votes other than promised in the skeleton with rounds.
 

@@ -104,7 +104,8 @@ def test_crash_after_a_yes_is_safe_and_says_what_is_lost() -> None:
     verdict = explored(load_net("ring"), "locked_crash")
     assert (verdict.refines, verdict.complete.status) == (Status.PROVED, Status.VIOLATED)
     assert verdict.complete.subjects[0] in {"G", "l", "m"}
-    assert blocked(verdict)[-1].endswith("stops for ever")
+    assert blocked(verdict)[-2].endswith("stops for ever")
+    assert blocked(verdict)[-1] == "no fault happens from now on"
 
 
 def test_late_duplicate_is_known_by_its_round() -> None:
