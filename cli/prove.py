@@ -10,11 +10,14 @@ import click
 from firable.cli import text
 from firable.cli.loop import machines_option, read_machines
 from firable.cli.options import answer, format_option, load_net, net_argument, page_option, with_page, write_folder
+from firable.cli.protocol import Answered, Asked, ask, protocol_options
+from firable.cli.protocol import show as show_protocol
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
 
@@ -30,19 +33,32 @@ if TYPE_CHECKING:
     help="Give up an obligation after so much time.",
 )
 @machines_option
+@protocol_options
 @page_option
 @format_option
-def prove(net: str, smt_dir: str | None, timeout: float, machines: str | None, page: str | None, format_: str) -> int:
+def prove(
+    net: str,
+    smt_dir: str | None,
+    timeout: float,
+    machines: str | None,
+    protocol: bool,
+    faults: bool,
+    wrong: bool,
+    page: str | None,
+    format_: str,
+) -> int:
     """Split NET by ownership, print the coordinator table, and discharge every obligation with z3.
 
     Eq. (7) and (8) for every transition, (9)-(10) for every place, one decider for all that compete (O2), no gate read
     from a copy (O3), ownership, initial marking, commands, and that the arbiters together choose as the central one
     does. Of each of O1-O9 it is told whether it is proved, and where, or assumed. A violated obligation shows the
     values of the net's own names that refute it. With --machines the gates that a vote relies on (O4) are asked of the
-    loop that the plant closes, instead of being assumed.
+    loop that the plant closes, instead of being assumed. With --protocol the voting protocol of the split is explored
+    as a net of its own, with --faults under faults too, and with --wrong the protocols known to be wrong are tried.
     """
-    make = with_page(lambda: _report(net, smt_dir, timeout, machines), page)
-    return answer("prove", format_, make, _show)
+    asked, answered = Asked(protocol, faults, wrong), list[Answered]()
+    make = with_page(lambda: _report(net, smt_dir, timeout, machines, asked, answered), page)
+    return answer("prove", format_, make, lambda report: _show(report, answered))
 
 
 def show_obligations(verdicts: Sequence[Verdict]) -> None:
@@ -61,7 +77,9 @@ def show_obligations(verdicts: Sequence[Verdict]) -> None:
         click.echo(f"  {click.style(symbol, fg=colour)} {count} {family.title:<16} {family.says}")
 
 
-def _report(argument: str, smt_dir: str | None, timeout: float, machines: str | None) -> Report:
+def _report(
+    argument: str, smt_dir: str | None, timeout: float, machines: str | None, asked: Asked, answered: list[Answered]
+) -> Report:
     from firable.decompose.proofs.assumptions import assumptions
     from firable.decompose.proofs.proving import prove as prove_split
     from firable.decompose.proofs.standing import standing
@@ -80,6 +98,11 @@ def _report(argument: str, smt_dir: str | None, timeout: float, machines: str | 
         verdicts += held.verdicts
         if smt_dir is not None:
             evidence |= held.evidence()
+    nets: Mapping[str, Net] = {}
+    if asked:
+        answered[:] = [ask(decomposition, asked, timeout, evidence=smt_dir is not None)]
+        verdicts, nets = verdicts + answered[0].verdicts, answered[0].nets
+        evidence |= answered[0].files
     files = write_folder(smt_dir, evidence) if smt_dir is not None else ()
     return Report(
         "prove",
@@ -92,11 +115,12 @@ def _report(argument: str, smt_dir: str | None, timeout: float, machines: str | 
         standing=tuple(standing(decomposition, verdicts)),
         decomposition=decomposition,
         loop_net=None if loop is None else loop.net,
+        nets_of=nets,
         files=files,
     )
 
 
-def _show(report: Report) -> None:
+def _show(report: Report, answered: Sequence[Answered]) -> None:
     from firable.decompose.splitting.table import table_text
 
     for note in report.notes:
@@ -114,8 +138,11 @@ def _show(report: Report) -> None:
         click.echo(f"      {line.status}: {line.by}")
     if report.assumptions:
         _show_assumptions(report)
+    for one in answered:
+        show_protocol(one)
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
-    for net in (report.net, report.loop_net):
+    refuted = [verdict for verdict in refuted if not verdict.name.startswith("wrong.")]  # told above, by their events
+    for net in (report.net, report.loop_net, *report.nets_of.values()):
         if net is not None and (some := [verdict for verdict in refuted if report.net_of(verdict) is net]):
             text.show_verdicts(net, some)
     text.show_summary(report)

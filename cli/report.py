@@ -37,8 +37,9 @@ class ExitCode(IntEnum):
 class Report:
     """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON.
 
-    `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`). `page` is the report as a page
-    for a person, where one was written. `again` says that the same was decided before, which a program need not know.
+    `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`), and `nets_of` are others, by
+    the names or the families of the verdicts on them. `page` is the report as a page for a person, where one was
+    written. `again` says that the same was decided before, which a program need not know.
     """
 
     command: str
@@ -58,13 +59,18 @@ class Report:
     loop: Mapping[str, Any] = field(default_factory=dict)
     decomposition: Decomposition | None = None
     loop_net: Net | None = None
+    nets_of: Mapping[str, Net] = field(default_factory=dict)
     split: Mapping[str, Any] = field(default_factory=dict)
     page: str = ""
     again: bool = False
 
     def net_of(self, verdict: Verdict) -> Net:
         """The net that the runs of a verdict are of."""
-        of_loop = verdict.name.partition(".")[0] in _OF_THE_LOOP
+        family = verdict.name.partition(".")[0]
+        for of in (verdict.name, family):
+            if of in self.nets_of:
+                return self.nets_of[of]
+        of_loop = family in _OF_THE_LOOP
         return self.loop_net if of_loop and self.loop_net is not None else self.net
 
     @property

@@ -99,7 +99,9 @@ class Draft:
 
         self.steps[name] = step
         closed = once((*empty, *self._up(step)))
-        self.transitions.append(Transition(name, once(inputs), once(outputs), once(full), closed))
+        self.transitions.append(
+            Transition(name, once(inputs), once(outputs), once(full), closed, description=str(step))
+        )
 
     def fire(
         self,

@@ -19,7 +19,7 @@ A machine stands still if no transition goes on that sends it a command.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -59,9 +59,13 @@ class Outage:
         return self.who or "the coordinator"
 
 
-def fault_verdicts(decomposition: Decomposition, limits: Limits | None = None) -> tuple[Verdict, ...]:
+def fault_exploration(decomposition: Decomposition, limits: Limits | None = None) -> Exploration:
+    """All runs of the protocol under any number of faults of each kind, which includes one of each."""
+    return explore_protocol(decomposition, PROTOCOL, ANY_FAULTS, limits=limits)
+
+
+def fault_verdicts(found: Exploration) -> tuple[Verdict, ...]:
     """The verdicts on faults that pass: safe while they last, and nothing lost when they have ceased."""
-    found = explore_protocol(decomposition, PROTOCOL, ANY_FAULTS, limits=limits)
     faults = "while messages are lost and doubled, and controllers and the coordinator crash and restart"
     safe = [
         replace(
@@ -73,15 +77,18 @@ def fault_verdicts(decomposition: Decomposition, limits: Limits | None = None) -
     return (*safe, replace(found.complete, name="faults.resumes", statement=resumes))
 
 
-def outages(decomposition: Decomposition, limits: Limits | None = None) -> Iterator[Outage]:
-    """What stands still and what goes on while each controller is dead, and while the coordinator is."""
+def outages(decomposition: Decomposition, limits: Callable[[], Limits] = Limits) -> Iterator[Outage]:
+    """What stands still and what goes on while each controller is dead, and while the coordinator is.
+
+    The limits are made anew for each.
+    """
     for subnet in decomposition.subnets:
-        yield _outage(decomposition, subnet.name, limits)
+        yield _outage(decomposition, subnet.name, limits())
     if decomposition.coordinated:
-        yield _outage(decomposition, "", limits)
+        yield _outage(decomposition, "", limits())
 
 
-def _outage(decomposition: Decomposition, who: str, limits: Limits | None) -> Outage:
+def _outage(decomposition: Decomposition, who: str, limits: Limits) -> Outage:
     faults = Faults(restart=False, doomed=who)
     faults = replace(faults, crash=Often.ONCE) if who else replace(faults, coordinator=Often.ONCE)
     found = explore_protocol(decomposition, PROTOCOL, faults, limits=limits)

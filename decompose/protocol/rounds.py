@@ -57,7 +57,8 @@ def decided(parts: Parts, t: str) -> str:
 def _coordinator(draft: Draft, parts: Parts, t: str, group: Sequence[str], over: str) -> None:
     its = parts.coordinated[t]
     heard = [at("heard", part) for part in its]
-    draft.step(f"ask/{t}", Step("ask", f"the coordinator asks for {t}"), (), [asked(t)], (), [asked(t), over])
+    others = [asked(u) for u in parts.coordinated if u != t] if parts.variant.one_round else []
+    draft.step(f"ask/{t}", Step("ask", f"the coordinator asks for {t}"), (), [asked(t)], (), [asked(t), over, *others])
     given_up = Step("give-up", f"the round of {_listed(group)} is given up")
     draft.step(f"give-up/{t}", given_up, (), [over], [asked(t)], [over])
     decide = Step("decide", f"{t} is decided", fires=t)

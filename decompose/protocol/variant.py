@@ -84,6 +84,7 @@ class Variant:
     `order_rounds`: votes, and orders to fire, carry the number of their round, so that old ones are known (O5).
     `unanimous`: a commit needs all votes. `stable`: promises survive a crash (O6). Of the bare skeleton: `recheck`, a
     part is applied only if it is still firable, else blindly; `serial`, one order at a time.
+    `one_round` asks for one transition at a time: fewer runs, so that what goes wrong in one of them is found sooner.
 
     Raises `ValueError` for votes other than promised in the skeleton with rounds.
 
@@ -102,6 +103,7 @@ class Variant:
     stable: bool = True
     recheck: bool = False
     serial: bool = False
+    one_round: bool = False
 
     def __post_init__(self) -> None:
         if self.acknowledged and (self.votes is not Votes.PROMISED or self.recheck or self.serial):

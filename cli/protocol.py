@@ -1,0 +1,131 @@
+"""`firable prove NET --protocol`: the protocol of the split, explored as a net of its own.
+
+Three options, from the question to the details: does the protocol do what the net does (`--protocol`), what does a
+fault do to the cell (`--faults`), and which of the protocols known to be wrong would go wrong on this very net
+(`--wrong`), which tells what the cell lives on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import click
+
+from firable.cli import text
+
+if TYPE_CHECKING:
+    from firable.decompose.protocol.outages import Outage
+    from firable.decompose.protocol.refuting import Refutation
+    from firable.nets.decomposition import Decomposition
+    from firable.nets.net import Net
+    from firable.nets.verdict import Verdict
+
+EVENTS_SHOWN: Final = 40
+"""How many of the last events of a run are told; a cell may need many to come to where it goes wrong."""
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Which questions about the protocol are asked."""
+
+    protocol: bool
+    faults: bool
+    wrong: bool
+
+    def __bool__(self) -> bool:
+        """Whether any is."""
+        return self.protocol or self.faults or self.wrong
+
+
+@dataclass(frozen=True)
+class Answered:
+    """What was found: verdicts, the nets that their runs are of, and what is told beside them."""
+
+    verdicts: tuple[Verdict, ...] = ()
+    nets: Mapping[str, Net] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    outages: tuple[Outage, ...] = ()
+    refutations: tuple[Refutation, ...] = ()
+
+
+def protocol_options(command: F) -> F:
+    """The options that ask about the protocol."""
+    for option in (
+        click.option(
+            "--wrong", is_flag=True, help="Try on NET the protocols known to be wrong; tells what the cell lives on."
+        ),
+        click.option("--faults", is_flag=True, help="Say what lost messages, crashes and dead controllers do; slower."),
+        click.option("--protocol", is_flag=True, help="Explore the voting protocol of the split, as a net of its own."),
+    ):
+        command = option(command)
+    return command
+
+
+def ask(decomposition: Decomposition, asked: Asked, seconds: float, *, evidence: bool) -> Answered:
+    """Ask about the protocol; `seconds` are for each exploration."""
+    from firable.analysis.deadline import Deadline
+    from firable.analysis.goal import Limits
+    from firable.decompose.protocol.outages import outage_verdict, outages
+    from firable.decompose.protocol.refuting import WRONG, refute
+    from firable.decompose.protocol.verdicts import protocol_verdicts
+
+    def limits() -> Limits:
+        return Limits(Deadline.after(seconds))
+
+    verdicts: tuple[Verdict, ...] = ()
+    nets: dict[str, Net] = {}
+    files: dict[str, bytes] = {}
+    if asked.protocol or asked.faults:
+        found = protocol_verdicts(decomposition, limits, faults=asked.faults)
+        verdicts, nets = found.verdicts, found.nets
+        files = found.evidence() if evidence else {}
+    dead = tuple(outages(decomposition, limits)) if asked.faults else ()
+    refutations = tuple(refute(wrong, decomposition, limits()) for wrong in WRONG) if asked.wrong else ()
+    verdicts += tuple(map(outage_verdict, dead)) + tuple(one.verdict for one in refutations)
+    nets |= {refutation.verdict.name: refutation.protocol.net for refutation in refutations}
+    return Answered(verdicts, nets, files, dead, refutations)
+
+
+def show(answered: Answered) -> None:
+    """Print what was found of the protocol."""
+    required = [v for v in answered.verdicts if v.name.partition(".")[0] in {"protocol", "faults"}]
+    shown = [verdict for verdict in required if not verdict.name.startswith("faults.dead.")]
+    if shown:
+        click.echo(f"\n{click.style('the protocol', bold=True)}")
+        width = max(len(verdict.name) for verdict in shown)
+        for verdict in shown:
+            click.echo(text.verdict_line(verdict, width))
+        cost = shown[0].cost
+        if cost.markings is not None:
+            click.echo(f"  {text.counted(cost.markings, 'configuration')} of the protocol ({shown[0].method})")
+    if answered.outages:
+        from firable.decompose.protocol.outages import outage_text
+
+        click.echo(f"\n{click.style('what stands still while somebody is dead', bold=True)}")
+        for line in outage_text(answered.outages).splitlines():
+            click.echo(f"  {line}")
+    if answered.refutations:
+        click.echo(f"\n{click.style('what this cell lives on', bold=True)}")
+        for refutation in answered.refutations:
+            _show_refutation(refutation)
+
+
+def _show_refutation(refutation: Refutation) -> None:
+    wrong = refutation.wrong
+    words = {"violated": "goes wrong here", "proved": "cannot go wrong here", "unknown": "not decided here"}
+    status = refutation.status.value
+    click.echo(f"  {wrong.name}: {wrong.says} ({wrong.obligation})")
+    click.echo(f"      {words[status]}{f', after {len(refutation.events)} events' if refutation.events else ''}")
+    left_out = max(0, len(refutation.events) - EVENTS_SHOWN)
+    if left_out:
+        click.echo(f"      ... {left_out} events, then")
+    for k, event in enumerate(refutation.events[left_out:], start=left_out + 1):
+        click.echo(f"      {k:>3}. {event}")
+    if refutation.sentence:
+        click.echo(f"      {refutation.sentence}")
+    if status == "unknown":
+        click.echo(f"      reached: {refutation.bound}")

@@ -1,0 +1,87 @@
+"""The verdicts on the protocol of a decomposition, and the evidence for them.
+
+The sentences of refinement are properties of the protocol's net, so what shows them is what shows any property: a
+document that `firable verify` checks from the firing rule alone, for the whole cell a diagram that is found closed
+under all steps. It holds the protocol's net as text, and says nothing of how that net was made. Completeness and
+divergence are not sentences of that kind; what they rest on is in `completeness` and `divergence`, and no document of
+theirs leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.document import Document, Record
+from firable.analysis.evidence.meaning import tidy
+from firable.analysis.evidence.producing.claims import Certifier, LackingError
+from firable.analysis.goal import Limits
+from firable.decompose.protocol.exploring import Exploration, explore_protocol
+from firable.decompose.protocol.outages import fault_exploration, fault_verdicts
+from firable.nets.decomposition import Decomposition
+from firable.nets.net import Net, Property
+from firable.nets.verdict import Status, Verdict
+
+EVIDENCE: Final = "protocol.evidence.json"
+EVIDENCE_SECONDS: Final = 60.0
+FAULTS_EVIDENCE: Final = "protocol-faults.evidence.json"
+
+
+@dataclass(frozen=True)
+class ProtocolVerdicts:
+    """Verdicts, and for each family (`protocol`, `faults`) the exploration that they are of."""
+
+    verdicts: tuple[Verdict, ...]
+    explorations: Mapping[str, Exploration]
+
+    @property
+    def nets(self) -> dict[str, Net]:
+        """For each family the net that its runs are of."""
+        return {family: exploration.protocol.net for family, exploration in self.explorations.items()}
+
+    def evidence(self, limits: Limits | None = None) -> dict[str, bytes]:
+        """The documents, by the names of their files; one that is large is packed, and its name ends in `.gz`."""
+        files = {}
+        for family, exploration in self.explorations.items():
+            data = document(exploration, limits).to_bytes()
+            name = EVIDENCE if family == "protocol" else FAULTS_EVIDENCE
+            files[name if data.startswith(b"{") else f"{name}.gz"] = data
+        return files
+
+
+def protocol_verdicts(
+    decomposition: Decomposition, limits: Callable[[], Limits] = Limits, *, faults: bool = False
+) -> ProtocolVerdicts:
+    """What holds of the protocol of a decomposition without faults, and with `faults` under all that pass.
+
+    The limits are made anew for each of the two explorations.
+    """
+    quiet = explore_protocol(decomposition, limits=limits())
+    verdicts, explorations = quiet.verdicts, {"protocol": quiet}
+    if faults:
+        explorations["faults"] = fault_exploration(decomposition, limits())
+        verdicts += fault_verdicts(explorations["faults"])
+    return ProtocolVerdicts(verdicts, explorations)
+
+
+def document(exploration: Exploration, limits: Limits | None = None) -> Document:
+    """The evidence for the sentences of refinement that are decided; what nothing shows says why."""
+    net, space = exploration.protocol.net, exploration.space
+    limits = limits or Limits(Deadline.after(EVIDENCE_SECONDS))
+    certifier = Certifier(net, space.discipline, limits, space if space.complete else None)
+    verdicts = {verdict.name.partition(".")[2]: verdict for verdict in exploration.safety}
+    records = []
+    for of in net.properties:
+        verdict = verdicts[of.name]
+        if verdict.status is not Status.UNKNOWN and isinstance(of, Property):
+            proved = verdict.status is Status.PROVED
+            claim = Claim(ClaimKind.NEVER if proved else ClaimKind.REACHABLE, tidy(of.formula))
+            name = f"property.{of.name}"
+            try:
+                records.append(Record(name, proved, ((claim, certifier.certify(claim, verdict.witness)),)))
+            except LackingError as error:
+                records.append(Record(name, proved, (), str(error)))
+    return Document(net, space.discipline, tuple(records))

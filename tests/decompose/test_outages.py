@@ -1,0 +1,101 @@
+"""What faults do: safe while they last, everything resumes, and what stands still while somebody is dead."""
+
+import pytest
+from support.reference import load_net
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.checking.checker import check_document
+from firable.analysis.evidence.document import document_from_text
+from firable.analysis.goal import Limits
+from firable.decompose.protocol.outages import Outage, outage_text, outage_verdict, outages
+from firable.decompose.protocol.verdicts import document, protocol_verdicts
+from firable.decompose.splitting.cut import split
+from firable.nets.net import Command, Controller, Net, Place, Transition
+from firable.nets.verdict import Status, Weight
+
+A, B, C = Controller("a"), Controller("b"), Controller("c")
+
+
+def cell() -> Net:
+    """`a` and `b` hand over to each other; `c` goes round by itself; `a` and `c` command machines."""
+    places = (
+        Place("a.p", "a", marked=True),
+        Place("a.q", "a", command=Command("arm", "MOVE")),
+        Place("b.r", "b", marked=True),
+        Place("b.s", "b"),
+        Place("c.u", "c", marked=True),
+        Place("c.v", "c", command=Command("mill", "RUN")),
+    )
+    transitions = (
+        Transition("G", ("a.p", "b.r"), ("a.q", "b.s")),
+        Transition("l", ("a.q",), ("a.p",)),
+        Transition("m", ("b.s",), ("b.r",)),
+        Transition("on", ("c.u",), ("c.v",)),
+        Transition("off", ("c.v",), ("c.u",)),
+    )
+    return Net("cell", places, transitions, (), (A, B, C))
+
+
+def by_name(net: Net) -> dict[str, Outage]:
+    return {outage.who: outage for outage in outages(split(net))}
+
+
+def test_what_needs_a_dead_controller_stands_still_and_the_rest_goes_on() -> None:
+    found = by_name(cell())
+    assert (found["a"].at_once, found["a"].at_last, found["a"].goes_on) == (("l",), ("G", "m"), ("on", "off"))
+    assert (found["a"].still, found["a"].running) == (("arm",), ("mill",))
+    assert (found["c"].at_once, found["c"].at_last) == (("on", "off"), ())
+    assert found["c"].goes_on == ("G", "l", "m")
+    assert (found["c"].still, found["c"].running) == (("mill",), ("arm",))
+
+
+def test_dead_coordinator_decides_nothing_and_what_is_local_finishes() -> None:
+    outage = by_name(cell())[""]
+    assert outage.name == "the coordinator"
+    assert (outage.at_once, outage.at_last, outage.goes_on) == (("G",), ("l", "m"), ("on", "off"))
+
+
+def test_firing_that_was_decided_before_the_crash_can_still_be_finished_by_the_others() -> None:
+    """`b` obeys, and fires `m`, though `a` is dead; so `m` stands still at last, not at once."""
+    assert "m" in by_name(cell())["a"].at_last
+
+
+def test_transition_that_never_fires_is_not_blamed_on_the_fault() -> None:
+    places = (Place("a.p", "a"), Place("b.q", "b", marked=True))
+    net = Net("n", places, (Transition("G", ("a.p", "b.q")),), (), (A, B))
+    assert all((*o.at_once, *o.at_last, *o.goes_on) == () for o in outages(split(net)))
+
+
+def test_net_without_coordinated_transitions_has_no_coordinator_to_lose() -> None:
+    net = Net("n", (Place("a.p", "a", marked=True),), (Transition("l", ("a.p",)),), (), (A,))
+    assert [outage.who for outage in outages(split(net))] == ["a"]
+
+
+@pytest.mark.parametrize("name", ["ring", "local_conflict", "remote_gate"])
+def test_any_faults_are_safe_and_everything_resumes(name: str) -> None:
+    found = protocol_verdicts(split(load_net(name)), faults=True)
+    assert {verdict.status for verdict in found.verdicts} == {Status.PROVED}
+    names = [verdict.name for verdict in found.verdicts]
+    assert names[:3] == ["protocol.follows", "protocol.agrees", "protocol.orders-fit"]
+    assert names[-4:] == ["faults.follows", "faults.agrees", "faults.orders-fit", "faults.resumes"]
+
+
+def test_outage_is_not_known_where_time_is_over() -> None:
+    found = list(outages(split(load_net("cell1")), lambda: Limits(Deadline.after(0.05))))
+    assert all(outage.bound for outage in found)
+    verdict = outage_verdict(found[0])
+    assert (verdict.status, verdict.weight) == (Status.UNKNOWN, Weight.INFORMATION)
+    assert "not known: " in outage_text(found)
+
+
+def test_evidence_for_the_protocol_is_checked_by_who_knows_nothing_of_protocols() -> None:
+    found = protocol_verdicts(split(load_net("ring")))
+    text = document(found.explorations["protocol"]).to_text()
+    checked = list(check_document(document_from_text(text)))
+    assert [one.record.name for one in checked] == ["property.follows", "property.agrees", "property.orders-fit"]
+    assert all(one.shown for one in checked)
+
+
+def test_evidence_is_a_file_for_each_exploration() -> None:
+    found = protocol_verdicts(split(load_net("local_gate")))
+    assert list(found.evidence()) == ["protocol.evidence.json"]
