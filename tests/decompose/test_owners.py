@@ -206,3 +206,10 @@ def test_a_large_net_is_partitioned_into_its_lines() -> None:
     found = suggest(family_net("manufacturing_cells-200"), 5)
     assert (found.proposed.n_cut, found.optimal) == (4, False)  # a line cut into five pieces
     assert suggest(family_net("manufacturing_cells-200"), 5) == found
+
+
+def test_one_transition_may_tie_many_parts_together() -> None:
+    graph = Hypergraph((("p",), ("q",), ("r",), ("s",), ("x",)), (1,) * 5, ((0, 1, 2, 3), (3, 4)), ("t", "u"))
+    assert [graph.fewest(n) for n in (1, 2, 3, 4, 5)] == [0, 1, 1, 1, 2]
+    apart = Hypergraph((("p",), ("q",)), (1, 1), (), ())
+    assert apart.fewest(2) == 0

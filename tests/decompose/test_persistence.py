@@ -105,8 +105,20 @@ def test_a_race_of_techniques_finds_the_same_where_no_space_is_held(net: Net) ->
 
 
 def test_arcs_and_units_of_the_cell_leave_two_parts_to_its_markings() -> None:
-    left = {vote.part: vote.falsifiers for vote in votes(split(load_net("cell1"))) if vote.falsifiers}
+    cast = votes(split(load_net("cell1")))
+    # What fills an input place of the part, or needs an output place of it full, is not even accused.
+    accused = {"t1-21": ("G6",), "t1-31": ("G8",), "t1-41": ("G2",), "t1-51": ("G5",)}
+    assert {vote.part: vote.accused for vote in cast if vote.accused} == accused
+    left = {vote.part: vote.falsifiers for vote in cast if vote.falsifiers}
     assert left == {"t1-21": ("G6",), "t1-41": ("G2",)}
+
+
+def test_a_transition_that_needs_empty_what_the_yes_needs_full_is_not_accused() -> None:
+    places = (Place("a.p", "a", marked=True), Place("a.r", "a", marked=True), Place("b.q", "b"))
+    other = Transition("u", ("a.r",), (), (), ("a.p",))  # takes a.r, which G reads, but never while a.p is full
+    crossing = Transition("G", ("a.p",), ("b.q",), ("a.r",))
+    (vote, _) = votes(split(Net("n", places, (crossing, other), controllers=(A, B))))
+    assert (vote.part, vote.accused) == ("t1-11", ())
 
 
 def test_firing_sequence_of_a_part_that_is_not_persistent_ends_with_the_firing_that_takes_its_yes_back() -> None:
