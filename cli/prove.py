@@ -136,7 +136,7 @@ def _show(report: Report, answered: Sequence[Answered]) -> None:
     for line in report.standing:
         click.echo(f"  {line.name}  {line.says}")
         click.echo(f"      {line.status}: {line.by}")
-    if report.assumptions:
+    if report.assumptions or report.loop_net is not None:
         _show_assumptions(report)
     for one in answered:
         show_protocol(one)

@@ -31,6 +31,7 @@ from firable.nets.machines.plant_file import (
     Put,
     Release,
     Stop,
+    Work,
 )
 from firable.nets.net import Command, Net, Place
 
@@ -240,6 +241,8 @@ class Laws:
                 fixed = self.clamped(station)
                 yield Case(((fixed, True),), ((fixed, False),))
                 yield Case(((fixed, False),), tag="again")
+            case Work():
+                yield Case()
             case Stop():
                 return
 
@@ -270,7 +273,7 @@ class Laws:
             case Clamp(station=station) | Process(station=station):
                 words = f"{name} does {_words(place)} on {station}, where no workpiece lies"
                 yield self._accident(((self.empty(station), True),), "nothing", words)
-            case Move() | Release() | Stop():
+            case Move() | Release() | Work() | Stop():
                 return
 
     def arrives(self) -> Case:

@@ -122,6 +122,12 @@ class Release(_Timed):
     station: Name
 
 
+class Work(_Timed):
+    """Do something that moves no workpiece and touches none: go home, open a door, measure."""
+
+    does: Literal["work"]
+
+
 class Stop(_Model):
     """Stop whatever the machine does, at once."""
 
@@ -129,7 +135,7 @@ class Stop(_Model):
 
 
 Action = Annotated[
-    Move | Grasp | Put | Carry | Clamp | Process | Release | Stop,
+    Move | Grasp | Put | Carry | Clamp | Process | Release | Work | Stop,
     Field(discriminator="does"),
 ]
 

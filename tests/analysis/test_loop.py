@@ -13,9 +13,10 @@ from support.examples import seeds
 from firable.analysis.check import check
 from firable.analysis.loop.faults import check_faults
 from firable.analysis.loop.verdicts import LoopReport, check_loop
-from firable.analysis.spaces.reachability import Budget
+from firable.analysis.spaces.reachability import Budget, explore
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.formula import Deadlock, parse_formula
+from firable.nets.machines.closing import close
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
 from firable.nets.temporal import Logic, parse_temporal
@@ -75,6 +76,15 @@ def test_sizes_of_the_loops_of_the_catalogue(cell: str) -> None:
     figures = report.closed.figures
     net = report.loop.net
     assert (len(net.places), len(net.transitions), figures.markings, figures.edges) == SIZES[cell]
+
+
+def test_no_accident_happens_in_two_cells_and_every_transition_is_live_there() -> None:
+    loop = close(catalogue_net("two_cells"), catalogue_plant("two_cells"))
+    space = explore(loop.net)
+    assert (space.n_markings, space.n_edges) == (75_464, 358_254)
+    assert not any(space.fired()[loop.net.transition_index[name]] for name in loop.accidents)
+    live = space.live()
+    assert all(any(live[loop.net.transition_index[name]] for name in variants) for variants in loop.variants.values())
 
 
 @pytest.mark.parametrize("cell", [cell for cell in SIZES if cell != "one_robot_mc_late"])

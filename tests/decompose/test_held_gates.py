@@ -8,10 +8,14 @@ from support.bench_cell import bench
 from firable.analysis.evidence.checking.checker import check_document
 from firable.analysis.evidence.document import document_from_text
 from firable.analysis.loop.verdicts import check_loop
+from firable.analysis.spaces.reachability import explore
 from firable.decompose.proofs.assumptions import assumptions
 from firable.decompose.proofs.held_gates import COMMANDS, COMPLETIONS, held_gates, name_of
 from firable.decompose.splitting.cut import split
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
+from firable.nets.machines.closing import close
+from firable.nets.machines.laws import ACCIDENT
+from firable.nets.machines.loop import Sending
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
@@ -118,6 +122,19 @@ def test_a_command_that_overtakes_that_of_another_controller_is_found_though_at_
     assert late.witness.note == "B is given WAIT while it is at another command"
     assert ("hand_over",) in late.witness.firings
     assert ("sent/c.stops/stops-c.runs",) not in late.witness.firings
+
+
+def test_in_two_cells_a_robot_that_does_not_wait_meets_the_workpiece_that_a_late_conveyor_has_not_taken() -> None:
+    text = catalogue_path("two_cells").with_name("two_cells.plant.yaml").read_text("utf-8")
+    impatient = text.replace("jitter_s: 0.2, when_full: wait}", "jitter_s: 0.2}")
+    assert impatient != text
+    found = []
+    for plant, sending in ((text, Sending.LATE), (impatient, Sending.AT_ONCE), (impatient, Sending.LATE)):
+        loop = close(catalogue_net("two_cells"), parse_plant(plant), sending=sending)
+        space = explore(loop.net)
+        accident = space.marked(loop.net.place_index[ACCIDENT])
+        found.append((space.complete, space.count(accident) > 0))
+    assert found == [(True, False), (True, False), (True, True)]
 
 
 def test_the_verdicts_leave_evidence_that_the_checker_confirms() -> None:

@@ -106,6 +106,12 @@ def test_a_run_of_the_executor_is_one_of_the_loop(cell: str, sending: Sending) -
     assert follow(cell, trace, sending) > 10
 
 
+def test_two_cells_in_a_line_carry_their_workpieces_through_as_the_loop_allows() -> None:
+    state, trace = trace_of("two_cells", 2)
+    assert state is State.DONE
+    assert follow("two_cells", trace) > 40
+
+
 @pytest.mark.parametrize(("machine", "command"), [("R", "GRASP"), ("MC", "RUN"), ("CV2", "RUN")])
 def test_a_run_with_a_machine_that_never_completes_is_one_of_the_loop_with_faults(machine: str, command: str) -> None:
     state, trace = trace_of("one_robot", 8, NeverCompletes(machine, command, 2))

@@ -26,6 +26,7 @@ machines:
       CLAMP:   {does: clamp, station: table, takes_s: 1}
       RUN:     {does: process, station: table, takes_s: 3, may_fail: for_good}
       UNCLAMP: {does: release, station: table, takes_s: 1}
+      DOOR:    {does: work, takes_s: 1}
   B:
     commands:
       RUN:  {does: carry, from: entry, to: table, takes_s: 4}
@@ -44,6 +45,7 @@ COMMANDS = {
     "clamp": ("M", "CLAMP", ()),
     "run": ("M", "RUN", (("program", "O1"),)),
     "unclamp": ("M", "UNCLAMP", ()),
+    "door": ("M", "DOOR", ()),
     "belt": ("B", "RUN", ()),
     "belt_out": ("B", "WAIT", ()),
     "belt_stop": ("B", "STOP", ()),
