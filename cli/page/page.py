@@ -6,14 +6,15 @@ same report gives the same bytes: there is no date and no measured time in it, s
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from firable.cli.page.markup import Markup, raw, tag, together
-from firable.cli.page.sections import SECTIONS, counts_of, overall_badge, refuted
+from firable.cli.page.sections import SECTIONS, TONES, classes, refuted
 from firable.cli.page.style import STYLE
 from firable.cli.report import Report
 from firable.cli.text import counted
-from firable.nets.verdict import Weight
+from firable.nets.verdict import Status, Verdict, Weight, overall
 
 _ASKED: Final = {
     "prove": "Proof of the decomposition",
@@ -56,7 +57,7 @@ def page_of(report: Report) -> str:
 def _masthead(report: Report) -> Markup:
     net = report.net
     sizes = [(len(net.places), "place"), (len(net.transitions), "transition"), (len(net.controllers), "controller")]
-    counts = [tag("li", tag("b", f"{n:,}"), f" {word}") for n, word in counts_of(report.verdicts)]
+    counts = [tag("li", tag("b", f"{n:,}"), f" {word}") for n, word in _counts_of(report.verdicts)]
     return tag(
         "header",
         tag(
@@ -65,7 +66,7 @@ def _masthead(report: Report) -> Markup:
             tag("h1", net.name or "the net"),
             tag("p", net.description) if net.description else None,
             tag("p", ", ".join(counted(n, word) for n, word in sizes if n), _explored(report)),
-            tag("div", overall_badge(report.verdicts), tag("ul", counts, cls="counts"), cls="verdict-line"),
+            tag("div", _overall_badge(report.verdicts), tag("ul", counts, cls="counts"), cls="verdict-line"),
             _failing(report),
         ),
         cls="masthead",
@@ -101,3 +102,21 @@ def _foot(report: Report) -> Markup:
     notes = [tag("p", str(note)) for note in report.notes]
     words = f"firable {__version__}, of {report.input}; the net is {net_digest(report.net)} (SHA-256)"
     return tag("footer", together(*notes), tag("p", words))
+
+
+def _counts_of(verdicts: Sequence[Verdict]) -> Iterator[tuple[int, str]]:
+    """How many verdicts that must hold ended in each way, and how many warnings there are."""
+    required = [verdict for verdict in verdicts if verdict.weight is Weight.REQUIRED]
+    for status in (Status.VIOLATED, Status.UNKNOWN, Status.PROVED):
+        if n := sum(verdict.status is status for verdict in required):
+            yield n, str(status)
+    warnings = sum(v.weight is Weight.WARNING and not v.holds for v in verdicts)
+    if warnings:
+        yield warnings, "warning" if warnings == 1 else "warnings"
+
+
+def _overall_badge(verdicts: Sequence[Verdict]) -> Markup:
+    """How all together ended."""
+    status = overall(verdicts)
+    word = {Status.PROVED: "✓ all hold", Status.VIOLATED: "✗ violated", Status.UNKNOWN: "? not decided"}[status]
+    return tag("span", word, cls=classes(TONES[word[0]]))

@@ -18,7 +18,7 @@ from firable.cli.page.runs import strip
 from firable.cli.report import Report
 from firable.cli.text import WORDS, counted, mark
 from firable.nets.decomposition import Decomposition
-from firable.nets.verdict import Status, Verdict, Weight, overall
+from firable.nets.verdict import Status, Verdict, Weight
 
 if TYPE_CHECKING:
     from firable.decompose.proofs.family import Family
@@ -30,7 +30,7 @@ _DRAWN_TRANSITIONS_MAX: Final = 80
 _ROWS_MAX: Final = 400
 _COLUMNS_MAX: Final = 9
 _NAMES_MAX: Final = 200
-_TONES: Final = {"✓": "good", "✗": "bad", "?": "open", "!": "open", "·": None}
+TONES: Final = {"✓": "good", "✗": "bad", "?": "open", "!": "open", "·": None}
 _HEADINGS: Final = {
     Weight.REQUIRED: "must hold",
     Weight.WARNING: "warnings",
@@ -50,16 +50,17 @@ class Section:
 def badge(verdict: Verdict) -> Markup:
     """How a verdict ended, as a sign and a word."""
     sign, word, _ = mark(verdict, WORDS)
-    return tag("span", f"{sign} {word}", cls=_classes(_TONES[sign]))
+    return tag("span", f"{sign} {word}", cls=classes(TONES[sign]))
 
 
 def status_badge(status: Status) -> Markup:
     """A status by itself."""
     sign = {Status.PROVED: "✓", Status.VIOLATED: "✗", Status.UNKNOWN: "?"}[status]
-    return tag("span", f"{sign} {status}", cls=_classes(_TONES[sign]))
+    return tag("span", f"{sign} {status}", cls=classes(TONES[sign]))
 
 
-def _classes(tone: str | None) -> str:
+def classes(tone: str | None) -> str:
+    """The classes of a badge."""
     return f"badge {tone}" if tone else "badge"
 
 
@@ -100,7 +101,7 @@ def _standing(report: Report) -> Markup | None:
     for line in report.standing:
         tone = "good" if line.status.startswith(("proved", "by the protocol", "shown")) else None
         tone = {"violated": "bad", "unknown": "open", "assumed": "open"}.get(line.status, tone)
-        rows.append((line.name, line.says, tag("span", line.status, cls=_classes(tone)), line.by))
+        rows.append((line.name, line.says, tag("span", line.status, cls=classes(tone)), line.by))
     lead = "What the running, distributed cell needs so that it does what the central net does."
     return together(
         tag("p", lead, cls="lead"),
@@ -158,7 +159,7 @@ def _assumptions(report: Report) -> Markup | None:
     rows = []
     for assumption in report.assumptions:
         verdict = asked.get(assumption)
-        state = tag("span", "assumed", cls=_classes("open")) if verdict is None else badge(verdict)
+        state = tag("span", "assumed", cls=classes("open")) if verdict is None else badge(verdict)
         how = "to be checked on the cell" if verdict is None else "asked of the loop with its machines"
         rows.append((assumption, state, how))
     for verdict in asked.values():
@@ -388,21 +389,3 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section("cell", "The cell", _picture),
 )
 """Every section, in the order of the page."""
-
-
-def counts_of(verdicts: Sequence[Verdict]) -> Iterator[tuple[int, str]]:
-    """How many verdicts that must hold ended in each way, and how many warnings there are."""
-    required = [verdict for verdict in verdicts if verdict.weight is Weight.REQUIRED]
-    for status in (Status.VIOLATED, Status.UNKNOWN, Status.PROVED):
-        if n := sum(verdict.status is status for verdict in required):
-            yield n, str(status)
-    warnings = sum(v.weight is Weight.WARNING and not v.holds for v in verdicts)
-    if warnings:
-        yield warnings, "warning" if warnings == 1 else "warnings"
-
-
-def overall_badge(verdicts: Sequence[Verdict]) -> Markup:
-    """How all together ended."""
-    status = overall(verdicts)
-    word = {Status.PROVED: "✓ all hold", Status.VIOLATED: "✗ violated", Status.UNKNOWN: "? not decided"}[status]
-    return tag("span", word, cls=_classes(_TONES[word[0]]))
