@@ -142,7 +142,7 @@ def _show(report: Report, answered: Sequence[Answered]) -> None:
         show_protocol(one)
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
     refuted = [verdict for verdict in refuted if not verdict.name.startswith("wrong.")]  # told above, by their events
-    for net in (report.net, report.loop_net, *report.nets_of.values()):
+    for net in (report.net, report.loop_net, *{id(net): net for net in report.nets_of.values()}.values()):
         if net is not None and (some := [verdict for verdict in refuted if report.net_of(verdict) is net]):
             text.show_verdicts(net, some)
     text.show_summary(report)

@@ -38,7 +38,7 @@ class Report:
     """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON.
 
     `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`), and `nets_of` are others, by
-    the names or the families of the verdicts on them. `page` is the report as a page for a person, where one was
+    the names of the verdicts on them. `page` is the report as a page for a person, where one was
     written. `again` says that the same was decided before, which a program need not know.
     """
 
@@ -67,9 +67,8 @@ class Report:
     def net_of(self, verdict: Verdict) -> Net:
         """The net that the runs of a verdict are of."""
         family = verdict.name.partition(".")[0]
-        for of in (verdict.name, family):
-            if of in self.nets_of:
-                return self.nets_of[of]
+        if verdict.name in self.nets_of:
+            return self.nets_of[verdict.name]
         of_loop = family in _OF_THE_LOOP
         return self.loop_net if of_loop and self.loop_net is not None else self.net
 

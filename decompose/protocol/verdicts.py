@@ -39,8 +39,9 @@ class ProtocolVerdicts:
 
     @property
     def nets(self) -> dict[str, Net]:
-        """For each family the net that its runs are of."""
-        return {family: exploration.protocol.net for family, exploration in self.explorations.items()}
+        """For each verdict the net that its runs are of."""
+        of = {family: exploration.protocol.net for family, exploration in self.explorations.items()}
+        return {verdict.name: of[verdict.name.partition(".")[0]] for verdict in self.verdicts}
 
     def evidence(self, limits: Limits | None = None) -> dict[str, bytes]:
         """The documents, by the names of their files; one that is large is packed, and its name ends in `.gz`."""

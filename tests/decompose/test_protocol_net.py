@@ -3,8 +3,14 @@
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.examples import examples
+from support.owned_nets import owned_nets
 from support.reference import load_net
 
+from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Limits
 from firable.analysis.spaces.equivalence import branching_bisimilar
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.decompose.protocol.building import ProtocolNet, protocol_net
@@ -160,3 +166,24 @@ def test_no_faults_add_no_steps() -> None:
     quiet = protocol_net(decomposition, PROTOCOL, NO_FAULTS)
     assert not any(step.kind in {"lose", "crash", "double"} for step in quiet.steps.values())
     assert len(protocol_net(decomposition, PROTOCOL, ANY_FAULTS).net.transitions) > len(quiet.net.transitions)
+
+
+@examples(6)
+@given(owned_nets())
+def test_protocol_of_random_nets_refines_and_loses_nothing(net: Net) -> None:
+    found = explore_protocol(net, limits=Limits(Deadline.after(2)))
+    assert Status.VIOLATED not in statuses(found)
+    assert found.space.bound or statuses(found) == {Status.PROVED}
+
+
+@examples(12)
+@given(owned_nets(), st.sampled_from([NO_FAULTS, Faults(crash=Often.ONCE, restart=False)]))
+def test_closures_and_partition_refinement_agree_on_random_nets(net: Net, faults: Faults) -> None:
+    """What has fired determines the central marking, so what is lost keeps any relation from being a bisimulation."""
+    found = explore_protocol(net, PROTOCOL, faults, budget=Budget(2_000))
+    central = explore(net, budget=Budget(2_000))
+    if not (found.space.complete and central.complete and isinstance(found.space, ReachabilityGraph)):
+        return
+    labels = {t.name: t.name for t in net.transitions}
+    bisimilar = branching_bisimilar(found.space, central, visible(found.protocol), labels, divergence=False)
+    assert bisimilar == (found.refines is found.complete.status is Status.PROVED)
