@@ -209,10 +209,11 @@ def _show(report: Report) -> None:
 
 
 def _show_bundle(report: Report) -> None:
+    from firable.decompose.verification.protocol import TITLE
     from firable.decompose.verification.restating import HEADS
 
     click.echo(f"  the bundle {report.bundle['digest'][:16]}…: split anew, and stated anew what it must prove")
-    titles = {**HEADS, "persistent": "of each vote it is shown whether it is persistent"}
+    titles = {**HEADS, "protocol": TITLE, "persistent": "of each vote it is shown whether it is persistent"}
     families: dict[str, list[Verdict]] = {family: [] for family in titles}
     others: list[Verdict] = []
     for verdict in report.verdicts:

@@ -14,7 +14,7 @@ from firable.decompose.proofs.arbitration import arbitration
 from firable.decompose.proofs.commands import commands
 from firable.decompose.proofs.deciders import deciders
 from firable.decompose.proofs.discharging import static
-from firable.decompose.proofs.family import Family
+from firable.decompose.proofs.family import Family, Kind, Proved, Task
 from firable.decompose.proofs.firability import firability
 from firable.decompose.proofs.initial_marking import initial_marking
 from firable.decompose.proofs.layers import layers
@@ -24,6 +24,7 @@ from firable.decompose.proofs.openness import openness
 from firable.decompose.proofs.ownership import ownership
 from firable.decompose.proofs.reading import reading
 from firable.decompose.proofs.sides import Sides
+from firable.decompose.protocol.parametric.proving import FILE, theorem
 
 
 def _static(
@@ -31,6 +32,18 @@ def _static(
 ) -> Family:
     return Family(name, title, says, static(name, says, obligations), serves)
 
+
+def protocol(task: Task) -> Proved:
+    """The theorem on the protocol, which is the same for every net.
+
+    What it assumes of a decomposition (`parametric.side_conditions`) is what the families above prove, each with its
+    file: ownership, O3, Eq. (7)-(10), M0 and commands.
+    """
+    verdicts, text = theorem(task.timeout_ms)
+    return Proved(verdicts, {FILE: text})
+
+
+_RUNS: Final = "whatever is lost or crashes, what runs is a run of the net"
 
 FAMILIES: Final[tuple[Family, ...]] = (
     _static("eq7", "Eq. (7)", "a transition is firable iff all its parts are", firability),
@@ -43,5 +56,13 @@ FAMILIES: Final[tuple[Family, ...]] = (
     _static("commands", "commands", "the subnets send the commands of the net, on the same places", commands),
     _static("o8", "O8", "votes add up layer by layer, and conflicts meet in one coordinator", layers, "O8"),
     _static("arbitration", "arbitration", "conflicts are decided as in the central net", arbitration, "O2"),
+    Family(
+        "protocol",
+        "protocol",
+        "whatever is lost or crashes, what runs is a run of the net",
+        protocol,
+        ("O1", "O5"),
+        Kind.PROTOCOL,
+    ),
 )
 """Every family, in the order of a report."""

@@ -6,8 +6,9 @@ them anew. So everything is derived a second time, by code that shares nothing w
 1. the net is cut anew, and subnets, table and groups must be that cut, name for name (`recut`);
 2. what must be proved is stated anew; each SMT-LIB 2 file must say exactly this, and a second solver answer `unsat`
    after every name (`restating`, `reading`, `obligations`);
-3. the verdicts on the central net must be those that its documents of evidence show (`documents`);
-4. nothing is left over: no file that nobody needs, no verdict that nobody knows.
+3. the theorem on the protocol must be the one that is published, and the second solver confirm it (`protocol`);
+4. the verdicts on the central net must be those that its documents of evidence show (`documents`);
+5. nothing is left over: no file that nobody needs, no verdict that nobody knows.
 
 There are three endings. Everything is shown; something is only claimed, since no evidence is on it or a solver gave up;
 or something says what is not so, and then the bundle is refused.
@@ -20,6 +21,7 @@ from typing import Final
 from firable.decompose.verification.checked import CheckedVerdict, Examination
 from firable.decompose.verification.documents import check_verdicts_on_the_net
 from firable.decompose.verification.obligations import check_obligations
+from firable.decompose.verification.protocol import check_protocol
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import SOLVERS
@@ -52,6 +54,7 @@ def _checked(bundle: Bundle, solver: str, timeout_ms: int) -> tuple[CheckedVerdi
     examination = Examination(bundle)
     cut = check_cut(bundle.decomposition)
     check_obligations(examination, cut, solver, answers, timeout_ms)
+    check_protocol(examination, solver, answers, timeout_ms)
     check_verdicts_on_the_net(examination, answers, timeout_ms)
     for verdict in list(examination.unjudged()):
         if verdict.status is not Status.UNKNOWN:

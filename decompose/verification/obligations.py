@@ -15,12 +15,11 @@ from firable.decompose.verification.reading import ObligationFile, ReadingError,
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS, Restated, Stated
-from firable.decompose.verification.solvers import Answers, SolverError
+from firable.decompose.verification.solvers import GIVEN_UP, Answers, SolverError
 from firable.nets.source import printable
 from firable.nets.verdict import Status, Verdict
 
 _METHOD: Final = "z3, of the negated obligation"  # what each such verdict says of itself
-_GIVEN_UP: Final = frozenset(("unknown", "timeout", "interrupted by timeout."))
 
 
 def check_obligations(examination: Examination, cut: Cut, solver: str, answers: Answers, timeout_ms: int) -> None:
@@ -88,7 +87,7 @@ def _answered(
         raise NotShownError(f"the solver does not answer one obligation of '{name}' after the other", "evidence", name)
     found = []
     for one, answer in zip(stated, said[1::2], strict=True):
-        if answer != "unsat" and answer not in _GIVEN_UP:
+        if answer != "unsat" and answer not in GIVEN_UP:
             raise NotShownError(f"'{one.name}' is refuted: the solver says {answer}", "verdicts", one.name)
         found.append(answer == "unsat")
     return found

@@ -14,6 +14,10 @@ Answers = Callable[[str, int], tuple[str, ...]]
 """The lines that a solver prints for a text, without quotes, in so many milliseconds for each question."""
 
 
+GIVEN_UP: Final = frozenset(("unknown", "timeout", "interrupted by timeout."))
+"""What a solver says that did not come to an end."""
+
+
 class SolverError(Exception):
     """The solver could not read a text."""
 

@@ -11,6 +11,7 @@ from support.reference import load_net
 from support.second_solver import by_cvc5
 
 from firable.analysis.induction.smt import Answer
+from firable.decompose.proofs.proving import prove
 from firable.decompose.proofs.script import Reader
 from firable.decompose.protocol.parametric.fragment import dependencies, order
 from firable.decompose.protocol.parametric.logic import Formula, Relation, Sort, Variable, exists, forall
@@ -47,8 +48,8 @@ def test_every_obligation_lies_in_a_decidable_fragment() -> None:
 
 def test_file_is_the_same_for_every_net_and_every_time() -> None:
     files = [dict(parametric_verdicts(split(catalogue_net(name)))[1]) for name in ("one_robot", "two_robots_shared")]
-    theorem.cache_clear()
-    assert files[0] == files[1] == {"protocol.smt2": theorem()[1]}
+    # Another limit is another question, which is answered anew.
+    assert files[0] == files[1] == {"protocol.smt2": theorem(9_999)[1]}
 
 
 def test_what_is_left_out_of_a_block_is_missed() -> None:
@@ -83,6 +84,15 @@ related = Relation("related", (A, B))
 )
 def test_what_exists_depends_on_what_it_is_asked_for(formula: Formula, found: set[tuple[Sort, Sort]]) -> None:
     assert dependencies([formula]) == found
+
+
+def test_what_is_not_proved_is_told_and_not_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Reader, "answer", lambda *_: Answer.UNKNOWN)
+    assert {verdict.status for verdict in theorem(9_998)[0]} == {Status.UNKNOWN}
+    monkeypatch.setattr(Reader, "answer", lambda *_: Answer.SAT)
+    assert {verdict.status for verdict in theorem(9_998)[0]} == {Status.VIOLATED}
+    monkeypatch.undo()
+    assert {verdict.status for verdict in theorem(9_998)[0]} == {Status.PROVED}
 
 
 # --- The side conditions
@@ -226,3 +236,10 @@ def test_neither_groups_nor_the_coordination_of_local_rivals_are_asked_for() -> 
     assert violated(replace(gated(), groups=())) == {}
     assert [row.name for row in gated().coordinated] == ["G", "l"]
     assert violated(replace(gated(), coordinated=gated().coordinated[:1])) == {}
+
+
+@pytest.mark.parametrize("edit", [b[1] for b in BROKEN], ids=[b[0] for b in BROKEN])
+def test_what_violates_a_side_condition_is_refuted_with_evidence_too(edit: Edit) -> None:
+    refuted = [verdict for verdict in prove(edit(gated())).verdicts if verdict.status is Status.VIOLATED]
+    assert refuted
+    assert all(verdict.evidence for verdict in refuted)

@@ -15,11 +15,13 @@ from firable.analysis.evidence.document import Document
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.families import FAMILIES
 from firable.decompose.proofs.proving import prove
+from firable.decompose.protocol.parametric.proving import theorem
 from firable.decompose.splitting.cut import split
 from firable.decompose.verification import documents
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.obligations import compared
+from firable.decompose.verification.protocol import TITLE, blocks, published
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS
@@ -91,7 +93,7 @@ def test_what_must_be_proved_is_stated_anew_as_the_prover_states_it(name: str) -
     examination = Examination(Bundle(decomposition, proof.verdicts, proof.files))
     cut = check_cut(decomposition)
     stated = [one.name for family in HEADS for one in compared(examination, cut, family)]
-    assert stated == [verdict.name for verdict in proof.verdicts]
+    assert stated == [v.name for v in proof.verdicts if not v.name.startswith("protocol.")]
 
 
 def test_layers_are_stated_anew() -> None:
@@ -124,7 +126,28 @@ def test_names_in_any_script_are_stated_anew() -> None:
 
 
 def test_the_families_stated_anew_are_those_of_the_prover() -> None:
-    assert [(family.name, family.says) for family in FAMILIES] == list(HEADS.items())
+    assert [(family.name, family.says) for family in FAMILIES] == [*HEADS.items(), ("protocol", TITLE)]
+
+
+def test_the_theorem_on_the_protocol_is_published_as_it_is_proved() -> None:
+    """To publish it anew: write `theorem()[1]` to the file, and read it."""
+    verdicts, text = theorem()
+    assert published() == text
+    assert blocks() == tuple((verdict.name, verdict.statement) for verdict in verdicts)
+
+
+def test_another_theorem_on_the_protocol_is_refused() -> None:
+    bundle = bundled("one_robot")
+    text = bundle.evidence["protocol.smt2"]
+    for changed in (
+        text.replace("(assert invariant)", "(assert false)", 1),
+        text.replace("; assumed of every net", "(assert false)\n; assumed of every net", 1),
+        text[: text.rindex("\n; ")],
+        text.replace("'apply' keeps", "'apply' has kept"),
+    ):
+        assert changed != text
+        with pytest.raises(InputError, match="is not the theorem on the protocol"):
+            check_bundle(replace(bundle, evidence={**bundle.evidence, "protocol.smt2": changed}))
 
 
 # --------------------------------------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 One file holds the whole theorem: what is assumed of every net, the protocol's relations, the invariant, and each
 obligation in a block of its own, as in the files of `firable.decompose.proofs`. It is the same for every net, so
-it is decided once in a process. z3 reads the very text.
+it is proved once in a process. z3 reads the very text.
 """
 
 from __future__ import annotations
@@ -40,9 +40,24 @@ def parametric_verdicts(
     return (*verdicts, *side_conditions(decomposition)), {FILE: text}
 
 
-@cache
 def theorem(timeout_ms: int = TIMEOUT_MS) -> tuple[tuple[Verdict, ...], str]:
     """The verdict on each obligation of the theorem, and the file that holds all of them."""
+    try:
+        return _proved(timeout_ms)
+    except _NotProvedError as error:
+        return error.verdicts, error.text
+
+
+class _NotProvedError(Exception):
+    """Something is not proved, which is not remembered: with more time it may be."""
+
+    def __init__(self, verdicts: tuple[Verdict, ...], text: str) -> None:
+        super().__init__()
+        self.verdicts, self.text = verdicts, text
+
+
+@cache
+def _proved(timeout_ms: int) -> tuple[tuple[Verdict, ...], str]:
     obligations = tuple(parametric_obligations())
     sorts = order({edge for obligation in obligations for edge in dependencies(obligation.script.formulas)})
     assert sorts is not None, "the theorem is outside the decidable fragment"
@@ -50,7 +65,10 @@ def theorem(timeout_ms: int = TIMEOUT_MS) -> tuple[tuple[Verdict, ...], str]:
     beginning = head + start()
     reader = Reader(timeout_ms, beginning)
     verdicts = tuple(_verdict(obligation, reader.answer(obligation.block)) for obligation in obligations)
-    return verdicts, beginning + "".join(obligation.block for obligation in obligations)
+    text = beginning + "".join(obligation.block for obligation in obligations)
+    if not all(verdict.holds for verdict in verdicts):
+        raise _NotProvedError(verdicts, text)
+    return verdicts, text
 
 
 def start(protocol: Protocol = PROTOCOL, conjuncts: Sequence[Conjunct] = INVARIANT) -> str:
