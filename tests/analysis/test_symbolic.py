@@ -16,7 +16,7 @@ from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import explore
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.nets.catalogue.families import FAMILIES, family_net
-from firable.nets.formula import parse_formula
+from firable.nets.formula import And, Formula, Holds, Not, Or, parse_formula
 from firable.nets.net import Net, Place, Transition
 from firable.semantics.player import Player
 
@@ -172,3 +172,22 @@ def test_edges_not_counted_in_time_are_none_and_counted_edges_are_kept() -> None
     known = again.n_edges
     assert known is not None
     assert again.until(Deadline.after(0)).n_edges == known
+
+
+def test_a_given_order_of_the_places_changes_the_diagram_and_not_the_markings() -> None:
+    net = family_net("philosophers_either-6")
+    order = list(range(len(net.places) - 1, -1, -1))
+    given_, own = explore_symbolically(net, order=order), explore_symbolically(net)
+    assert given_.engine.order == order
+    assert given_.n_markings == own.n_markings
+    assert given_.count(given_.deadlocks) == own.count(own.deadlocks)
+
+
+def test_conjunction_of_literals_is_the_conjunction_of_its_parts() -> None:
+    net = family_net("philosophers_either-4")
+    space = explore_symbolically(net)
+    a, b, c = (Holds(place.name) for place in net.places[:3])
+    cases: list[tuple[Formula, ...]] = [(a, Not(b)), (Not(a), Not(b), Or((b, c))), (a, Not(a)), ()]
+    for parts in cases:
+        apart = [space.satisfying(part) for part in parts]
+        assert space.satisfying(And(parts)) == space.algebra.conjunction(apart)
