@@ -14,6 +14,7 @@ from typing import Final
 import explicit
 import public_nets
 import reading
+import splitting
 import whole_spaces
 from measuring import REPOSITORY, build_examples, is_busy, machine
 
@@ -21,6 +22,7 @@ BENCHMARKS: Final = {
     "explicit": explicit.tables,
     "whole_spaces": whole_spaces.tables,
     "reading": reading.tables,
+    "splitting": splitting.tables,
     "public_nets": public_nets.tables,
 }
 
