@@ -40,7 +40,7 @@ def test_the_wheel_holds_every_module_and_every_data_file(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     for room in ROOMS:
         for path in (ROOT / room).rglob("*"):
-            if path.suffix in {".py", ".pyi", ".yaml"} or path.name.endswith(".schema.json"):
+            if path.suffix in {".py", ".pyi", ".yaml", ".smt2"} or path.name.endswith(".schema.json"):
                 relative = path.relative_to(ROOT)
                 if "engine" not in relative.parts:
                     assert f"firable/{relative}" in names
