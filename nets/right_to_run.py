@@ -32,13 +32,24 @@ EXECUTED_BY: Final = "interleaving"
 CHECKED: Final = ("contact-free", "deadlock-free", "quasi-live", "conflicting-commands", "shared-completions")
 """The verdicts on every net, whatever its file states, without which it may not run."""
 
+_ADVANCES: Final = ("promise", "hear", "give-up", "restart", "apply", "release", "note", "close", "forget")
+PROTOCOL: Final = (
+    "protocol.starts",
+    *(f"protocol.keeps.{action}" for action in ("ask", "promise", "hear", "decide", *_ADVANCES[2:], "fire", "sense")),
+    *("protocol.follows.decide", "protocol.follows.fire", "protocol.rest", "protocol.once", "protocol.expected"),
+    *(f"protocol.home.{step}" for step in ("some", "give-up", "apply", "release", "note", "close")),
+    *(f"protocol.complete.{step}" for step in ("ask", "promise", "hear", "decide", "fire", "sense")),
+    *(f"protocol.advances.{action}" for action in _ADVANCES),
+)
+"""The theorem on the protocol by which every net is executed (docs/protocol-invariant.md)."""
+
 
 def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
     """The names of the verdicts that must be PROVED before a net may run: derived from the net, not from what is there.
 
     Of the net what `CHECKED` names and every property of the file; of the decomposition Eq. (7), (8) and O3 for every
     transition, Eq. (9)-(10) for every place, O2 for every global transition and wherever transitions compete,
-    O8 where there are layers, ownership, M0, commands, and arbitration.
+    O8 where there are layers, ownership, M0, commands, and arbitration; and the theorem on the protocol.
     """
     net = decomposition.net
     yield from _required_of_the_net(net)
@@ -55,6 +66,7 @@ def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
         yield from (f"o8.{t.name}" for t in net.transitions if len(_owners(net, t)) > 1)
     yield from ("ownership", "initial-marking", "commands", "arbitration")
     yield from (f"arbitration.{group.name}" for group in decomposition.groups)
+    yield from PROTOCOL
 
 
 def _owners(net: Net, transition: Transition) -> set[str | None]:

@@ -59,7 +59,7 @@ FAMILIES: Final[tuple[Family, ...]] = (
     Family(
         "protocol",
         "protocol",
-        "whatever is lost or crashes, what runs is a run of the net",
+        _RUNS,
         protocol,
         ("O1", "O5"),
         Kind.PROTOCOL,

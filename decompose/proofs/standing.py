@@ -35,7 +35,7 @@ OTHERWISE: Final = {
     "O4": ("assumed", "of the cell; completion signals are levels, which their command clears"),
     "O5": ("assumed", "of the protocol"),
     "O6": ("assumed", "of the hosts and their storage"),
-    "O7": ("assumed", "of the protocol"),
+    "O7": ("assumed", "of the executor, which sends a command in the act of applying"),
     "O8": ("nothing to show", "there is one layer: no coordinator is under another one"),
     "O9": ("not claimed", "what is proved is the equivalence of interleaving"),
 }

@@ -18,7 +18,7 @@ from firable.nets.diagnostics import InputError
 from firable.nets.formula import Holds
 from firable.nets.interchange import canonical_json
 from firable.nets.net import ArbitrationRule, Command, Controller, Net, Place, Property, PropertyKind, Transition
-from firable.nets.right_to_run import CHECKED, required_verdicts, unproved
+from firable.nets.right_to_run import CHECKED, PROTOCOL, required_verdicts, unproved
 from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
 
 A, B = Controller("a"), Controller("b")
@@ -299,6 +299,7 @@ def test_required_verdicts_follow_from_the_net() -> None:
         *("eq7.G", "eq8.G", "o3.G", "eq7.l", "eq8.l", "o3.l", "eq9-10.a.p", "eq9-10.b.q", "eq9-10.a.r"),
         *("o2.G", "o2.a.p"),
         *("ownership", "initial-marking", "commands", "arbitration", "arbitration.next"),
+        *PROTOCOL,
     ]
 
 
