@@ -92,7 +92,7 @@ def ask(decomposition: Decomposition, asked: Asked, seconds: float, *, evidence:
 
 def show(answered: Answered) -> None:
     """Print what was found of the protocol."""
-    required = [v for v in answered.verdicts if v.name.partition(".")[0] in {"protocol", "faults"}]
+    required = [v for v in answered.verdicts if v.name.partition(".")[0] in {"explored", "faults"}]
     shown = [verdict for verdict in required if not verdict.name.startswith("faults.dead.")]
     if shown:
         click.echo(f"\n{click.style('the protocol', bold=True)}")

@@ -50,18 +50,18 @@ STATEMENTS: Final = {
     FIT: "an order to fire finds its part firable",
 }
 COMPLETE: Final = Question(
-    "protocol.complete",
+    "explored.complete",
     "whatever the central net may fire next, the protocol can still fire next (branching bisimilar, its steps hidden)",
     code="F4002",
     hint="the last event of the run is what it is lost by",
 )
 ONE_TOKEN: Final = Question(
-    "protocol.one-token",
+    "explored.one-token",
     "no step finds a full place that it would fill, but where the central net has contact",
     code="F4002",
 )
 DIVERGENCE: Final = Question(
-    "protocol.divergence",
+    "explored.divergence",
     "while nothing fires, a run goes on for ever only by repeating requests or orders, or giving rounds up, for ever",
     code="F4002",
     method="weights on places that every other hidden step lowers",
@@ -169,7 +169,7 @@ class Exploration:
         name = verdict.name.removeprefix("property.")
         return replace(
             verdict,
-            name=f"protocol.{name}",
+            name=f"explored.{name}",
             statement=STATEMENTS[name],
             code="F4002" if verdict.status is Status.VIOLATED else verdict.code,
             witness=None if verdict.witness is None else replace(verdict.witness, note=_note(name)),

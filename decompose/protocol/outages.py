@@ -69,7 +69,7 @@ def fault_verdicts(found: Exploration) -> tuple[Verdict, ...]:
     faults = "while messages are lost and doubled, and controllers and the coordinator crash and restart"
     safe = [
         replace(
-            verdict, name=f"faults.{verdict.name.removeprefix('protocol.')}", statement=f"{verdict.statement}, {faults}"
+            verdict, name=f"faults.{verdict.name.removeprefix('explored.')}", statement=f"{verdict.statement}, {faults}"
         )
         for verdict in found.safety
     ]

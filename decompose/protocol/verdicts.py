@@ -32,7 +32,7 @@ FAULTS_EVIDENCE: Final = "protocol-faults.evidence.json"
 
 @dataclass(frozen=True)
 class ProtocolVerdicts:
-    """Verdicts, and for each family (`protocol`, `faults`) the exploration that they are of."""
+    """Verdicts, and for each family (`explored`, `faults`) the exploration that they are of."""
 
     verdicts: tuple[Verdict, ...]
     explorations: Mapping[str, Exploration]
@@ -48,7 +48,7 @@ class ProtocolVerdicts:
         files = {}
         for family, exploration in self.explorations.items():
             data = document(exploration, limits).to_bytes()
-            name = EVIDENCE if family == "protocol" else FAULTS_EVIDENCE
+            name = EVIDENCE if family == "explored" else FAULTS_EVIDENCE
             files[name if data.startswith(b"{") else f"{name}.gz"] = data
         return files
 
@@ -61,7 +61,7 @@ def protocol_verdicts(
     The limits are made anew for each of the two explorations.
     """
     quiet = explore_protocol(decomposition, limits=limits())
-    verdicts, explorations = quiet.verdicts, {"protocol": quiet}
+    verdicts, explorations = quiet.verdicts, {"explored": quiet}
     if faults:
         explorations["faults"] = fault_exploration(decomposition, limits())
         verdicts += fault_verdicts(explorations["faults"])

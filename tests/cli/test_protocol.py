@@ -35,13 +35,13 @@ def test_protocol_is_explored_on_demand(capsys: pytest.CaptureFixture[str], net:
     assert main(["prove", net, "--protocol"]) == 0
     told = capsys.readouterr().out
     assert "the protocol\n" in told
-    assert "✓ proved    protocol.complete" in told
+    assert "✓ proved    explored.complete" in told
     assert "3,782 configurations of the protocol" in told
 
 
 def test_protocol_is_not_explored_unasked(capsys: pytest.CaptureFixture[str], net: str) -> None:
     assert main(["prove", net]) == 0
-    assert "protocol.complete" not in capsys.readouterr().out
+    assert "explored.complete" not in capsys.readouterr().out
 
 
 def test_faults_tell_what_stands_still(capsys: pytest.CaptureFixture[str], net: str) -> None:
@@ -66,7 +66,7 @@ def test_json_holds_the_verdicts_and_the_runs(capsys: pytest.CaptureFixture[str]
     assert main(["prove", net, "--protocol", "--faults", "--wrong", "--format", "json"]) == 0
     report = json.loads(capsys.readouterr().out)["reports"][0]
     verdicts = {verdict["name"]: verdict for verdict in report["verdicts"]}
-    assert verdicts["protocol.follows"]["status"] == "proved"
+    assert verdicts["explored.follows"]["status"] == "proved"
     assert verdicts["faults.dead.robot"]["subjects"] == ["fetch", "hand_over", "unload"]
     assert verdicts["wrong.missing-vote"]["weight"] == "information"
     assert verdicts["wrong.missing-vote"]["witness"]["firings"][0] == ["ask/hand_over"]

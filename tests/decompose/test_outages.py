@@ -76,7 +76,7 @@ def test_any_faults_are_safe_and_everything_resumes(name: str) -> None:
     found = protocol_verdicts(split(load_net(name)), faults=True)
     assert {verdict.status for verdict in found.verdicts} == {Status.PROVED}
     names = [verdict.name for verdict in found.verdicts]
-    assert names[:3] == ["protocol.follows", "protocol.agrees", "protocol.orders-fit"]
+    assert names[:3] == ["explored.follows", "explored.agrees", "explored.orders-fit"]
     assert names[-4:] == ["faults.follows", "faults.agrees", "faults.orders-fit", "faults.resumes"]
 
 
@@ -90,7 +90,7 @@ def test_outage_is_not_known_where_time_is_over() -> None:
 
 def test_evidence_for_the_protocol_is_checked_by_who_knows_nothing_of_protocols() -> None:
     found = protocol_verdicts(split(load_net("ring")))
-    text = document(found.explorations["protocol"]).to_text()
+    text = document(found.explorations["explored"]).to_text()
     checked = list(check_document(document_from_text(text)))
     assert [one.record.name for one in checked] == ["property.follows", "property.agrees", "property.orders-fit"]
     assert all(one.shown for one in checked)
