@@ -15,7 +15,7 @@ from firable.decompose.verification.reading import ObligationFile, ReadingError,
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS, Restated, Stated
-from firable.decompose.verification.solvers import GIVEN_UP, Answers, SolverError
+from firable.decompose.verification.solvers import Answers, SolverError, gave_up
 from firable.nets.source import printable
 from firable.nets.verdict import Status, Verdict
 
@@ -87,7 +87,7 @@ def _answered(
         raise NotShownError(f"the solver does not answer one obligation of '{name}' after the other", "evidence", name)
     found = []
     for one, answer in zip(stated, said[1::2], strict=True):
-        if answer != "unsat" and answer not in GIVEN_UP:
+        if answer != "unsat" and not gave_up(answer):
             raise NotShownError(f"'{one.name}' is refuted: the solver says {answer}", "verdicts", one.name)
         found.append(answer == "unsat")
     return found

@@ -15,7 +15,7 @@ from typing import Final
 
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.refusal import NotShownError
-from firable.decompose.verification.solvers import GIVEN_UP, Answers, SolverError
+from firable.decompose.verification.solvers import Answers, SolverError, gave_up
 from firable.nets.verdict import Status, Verdict
 
 FILE: Final = "protocol.smt2"
@@ -46,7 +46,7 @@ def check_protocol(examination: Examination, solver: str, answers: Answers, time
     if said[::2] != tuple(name for name, _ in blocks()) or len(said) % 2:
         raise NotShownError(f"the solver does not answer one obligation of '{FILE}' after the other", "evidence", FILE)
     for (name, sentence), answer in zip(blocks(), said[1::2], strict=True):
-        if answer != "unsat" and answer not in GIVEN_UP:
+        if answer != "unsat" and not gave_up(answer):
             raise NotShownError(f"'{name}' is refuted: the solver says {answer}", "verdicts", name)
         shown = answer == "unsat"
         demanded = Verdict(name, Status.PROVED, sentence, _METHOD, evidence=(FILE,))

@@ -14,12 +14,17 @@ Answers = Callable[[str, int], tuple[str, ...]]
 """The lines that a solver prints for a text, without quotes, in so many milliseconds for each question."""
 
 
-GIVEN_UP: Final = frozenset(("unknown", "timeout", "interrupted by timeout."))
-"""What a solver says that did not come to an end."""
-
-
 class SolverError(Exception):
     """The solver could not read a text."""
+
+
+def gave_up(answer: str) -> bool:
+    """Whether an answer is that of a solver that did not come to an end, for whatever reason it adds.
+
+    >>> gave_up("unknown (TIMEOUT)"), gave_up("sat")
+    (True, False)
+    """
+    return answer == "timeout" or answer.startswith(("unknown", "interrupted by "))
 
 
 def by_cvc5(text: str, timeout_ms: int) -> tuple[str, ...]:

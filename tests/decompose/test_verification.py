@@ -25,7 +25,7 @@ from firable.decompose.verification.protocol import TITLE, blocks, published
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS
-from firable.decompose.verification.solvers import SOLVERS, SolverError, by_cvc5
+from firable.decompose.verification.solvers import SOLVERS, SolverError, by_cvc5, gave_up
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.diagnostics import InputError
@@ -321,7 +321,10 @@ def test_weaker_assertions_and_sly_commands_are_refused() -> None:
         assert family_refused(bundle, "eq7.smt2", changed)
 
 
-def test_an_answer_that_refutes_is_refused_and_one_that_is_missing_only_claims(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("given_up", ["unknown", "unknown (TIMEOUT)", "unknown (INCOMPLETE)", "timeout"])
+def test_an_answer_that_refutes_is_refused_and_one_that_is_missing_only_claims(
+    given_up: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     bundle = bundled("conceptual_one_robot")
 
     def saying(answer: str) -> dict[str, Callable[[str, int], tuple[str, ...]]]:
@@ -330,10 +333,23 @@ def test_an_answer_that_refutes_is_refused_and_one_that_is_missing_only_claims(m
     monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", saying("sat"))
     with pytest.raises(InputError, match="is refuted: the solver says sat"):
         check_bundle(bundle)
-    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", saying("unknown"))
+    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", saying(given_up))
     checked = check_bundle(bundle)
     assert {one.shown for one in checked if one.verdict.name.startswith("eq7.")} == {False}
     assert {one.only_claimed for one in checked if not one.shown} == {"cvc5 gave up"}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_solver_that_runs_out_of_time_has_given_up_and_goes_on_with_the_next(solver: str) -> None:
+    pigeons, holes = range(13), range(12)
+    lines = [f"(declare-const |{p} in {h}| Bool)" for p in pigeons for h in holes]
+    lines += [f"(assert (or {' '.join(f'|{p} in {h}|' for h in holes)}))" for p in pigeons]
+    lines += [f"(assert (not (and |{p} in {h}| |{q} in {h}|)))" for h in holes for p in pigeons for q in range(p)]
+    told = SOLVERS[solver](
+        "(set-logic QF_UF)(push 1)" + "".join(lines) + "(check-sat)(pop 1)(push 1)(assert false)(check-sat)(pop 1)", 1
+    )
+    assert [gave_up(one) for one in told] == [True, False]
+    assert told[1] == "unsat"
 
 
 def test_a_solver_that_cannot_read_a_file_says_so() -> None:
