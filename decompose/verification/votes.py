@@ -40,8 +40,9 @@ def votes(decomposition: Decomposition, formulas: Formulas) -> dict[str, Vote]:
             full, empty = _needs(subnet[part.controller].transition(part.name))
             touching = {name for place in full for name in takers.get(place, ())}
             touching |= {name for place in empty for name in givers.get(place, ())}
-            accused = [name for name in touching - {row.name} if _can_take_back(net.transition(name), full, empty)]
-            stands = [formulas.literal(place, place in full) for place in (*full, *empty)]
+            others = sorted(touching - {row.name}, key=net.transition_index.__getitem__)
+            accused = [name for name in others if _can_take_back(net.transition(name), full, empty)]
+            stands = [formulas.literal(place, place in full) for place in (*sorted(full), *sorted(empty))]
             goal = formulas.all_of([*stands, formulas.any_of(formulas.variable(f"firable({u})") for u in accused)])
             sentence = f"once '{part.name}' votes yes, no transition but '{row.name}' takes the yes back"
             found[f"{PREFIX}{part.name}"] = Vote(sentence, goal if accused and full.isdisjoint(empty) else None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import pytest
 from hypothesis import given
@@ -22,10 +23,14 @@ from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import WALK_VOTES, Persistence, persistence
 from firable.decompose.splitting.votes import FALSIFIERS_MAX, votes
 from firable.decompose.splitting.walking import RUN_MAX, fallen
+from firable.decompose.verification.formulas import Formulas
+from firable.decompose.verification.votes import question_of
+from firable.decompose.verification.votes import votes as restated
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
+from firable.nets.formula import Formula
 from firable.nets.knowledge import undisturbing
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 from firable.nets.verdict import Status
@@ -104,12 +109,43 @@ def test_a_race_of_techniques_finds_the_same_where_no_space_is_held(net: Net) ->
     assert all(one.shown for one in check_document(found.evidence()))
 
 
+def asked_anew(decomposition: Decomposition) -> None:
+    """The questions that the checker makes of the votes are those of the claims, whatever order a set goes in."""
+    formulas = Formulas()
+    anew = restated(decomposition, formulas)
+    asked = votes(decomposition)
+    assert [f"persistent.{vote.part}" for vote in asked] == list(anew)
+    for vote in asked:
+        goal = cast(Formula, module.claim_of(vote, persistent=True).goal)
+        expected = question_of(goal, formulas) if vote.accused else None
+        assert anew[f"persistent.{vote.part}"].question == expected
+
+
+@given(owned_nets())
+@examples(60)
+def test_the_checker_asks_of_each_vote_what_the_producer_answers(net: Net) -> None:
+    try:
+        decomposition = split(net)
+    except InputError:
+        return
+    asked_anew(decomposition)
+
+
+def test_the_checker_asks_in_the_order_of_the_net_of_a_vote_on_many_places() -> None:
+    names = [f"p{i}" for i in range(12)]
+    full, empty = [f"a.{name}" for name in names], [f"a.not_{name}" for name in names]
+    places = (*(Place(p, "a", marked=True) for p in full), *(Place(p, "a") for p in empty), Place("b.q", "b"))
+    local = [Transition(f"u{i}", (p,), (q,)) for i, (p, q) in enumerate(zip(full, empty, strict=True))]
+    crossing = Transition("G", tuple(full), ("b.q",), (), tuple(empty))
+    asked_anew(split(Net("n", places, (crossing, *local), controllers=(A, B))))
+
+
 def test_arcs_and_units_of_the_cell_leave_two_parts_to_its_markings() -> None:
-    cast = votes(split(load_net("cell1")))
+    ballots = votes(split(load_net("cell1")))
     # What fills an input place of the part, or needs an output place of it full, is not even accused.
     accused = {"t1-21": ("G6",), "t1-31": ("G8",), "t1-41": ("G2",), "t1-51": ("G5",)}
-    assert {vote.part: vote.accused for vote in cast if vote.accused} == accused
-    left = {vote.part: vote.falsifiers for vote in cast if vote.falsifiers}
+    assert {vote.part: vote.accused for vote in ballots if vote.accused} == accused
+    left = {vote.part: vote.falsifiers for vote in ballots if vote.falsifiers}
     assert left == {"t1-21": ("G6",), "t1-41": ("G2",)}
 
 
@@ -131,8 +167,8 @@ def test_firing_sequence_of_a_part_that_is_not_persistent_ends_with_the_firing_t
 
 
 def test_parts_of_a_large_line_are_decided_by_its_arcs_and_units_alone() -> None:
-    cast = votes(split(family_net("manufacturing_cells-200")))
-    left = [vote for vote in cast if vote.falsifiers]
+    ballots = votes(split(family_net("manufacturing_cells-200")))
+    left = [vote for vote in ballots if vote.falsifiers]
     # A robot is free for two stations: the start of one task takes the yes of the other back, and nothing else does.
     assert len(left) == 200
     assert {len(vote.falsifiers) for vote in left} == {1}
@@ -235,11 +271,11 @@ def test_what_a_walk_meets_is_what_takes_a_yes_back_and_its_run_leads_there(net:
     except InputError:
         return
     expected, player = falsified(decomposition), Player(net)
-    cast = votes(decomposition)
+    ballots = votes(decomposition)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(walking, "WITHOUT_NEWS_MAX", 2000)
-        met = fallen(net, cast, Deadline())
-    for vote in cast:
+        met = fallen(net, ballots, Deadline())
+    for vote in ballots:
         assert met.get(vote.part, {}).keys() <= set(expected[vote.part])
         for name, run in met.get(vote.part, {}).items():
             marking = net.initial_marking
@@ -253,13 +289,13 @@ def test_what_a_walk_meets_is_what_takes_a_yes_back_and_its_run_leads_there(net:
 
 def test_a_walk_through_a_large_plant_finds_each_vote_that_falls_with_a_short_run() -> None:
     net = family_net("workshop-40")
-    cast = votes(split(net))
-    met = fallen(net, cast, Deadline())
-    open_ = [vote for vote in cast if vote.falsifiers]
+    ballots = votes(split(net))
+    met = fallen(net, ballots, Deadline())
+    open_ = [vote for vote in ballots if vote.falsifiers]
     assert len(open_) > WALK_VOTES
     assert met.keys() == {vote.part for vote in open_}
     assert max(len(run) for by in met.values() for run in by.values()) <= RUN_MAX
-    assert fallen(net, cast, Deadline()) == met
+    assert fallen(net, ballots, Deadline()) == met
 
 
 def test_a_walk_begins_anew_where_nothing_can_fire() -> None:
@@ -267,8 +303,8 @@ def test_a_walk_begins_anew_where_nothing_can_fire() -> None:
     places = (Place("a.p", "a", marked=True), Place("a.r", "a"), Place("b.q", "b"))
     transitions = (Transition("G", ("a.p",), ("b.q",)), Transition("l", ("a.p",), ("a.r",)))
     net = Net("n", places, transitions, controllers=(A, B))
-    cast = votes(split(net))
-    assert fallen(net, cast, Deadline()) == {"t1-11": {"l": ()}, "l": {"G": ()}}
+    ballots = votes(split(net))
+    assert fallen(net, ballots, Deadline()) == {"t1-11": {"l": ()}, "l": {"G": ()}}
 
 
 def test_many_open_votes_are_looked_out_for_by_one_walk() -> None:
