@@ -76,21 +76,21 @@ def held_gates(decomposition: Decomposition, model: PlantModel, budget: Budget |
     Raises `InputError` as `close` does.
     """
     loop = close(decomposition.net, model, sending=Sending.LATE)
-    rows = {row.name: row for row in decomposition.table}
+    rows = {row.name: row for row in decomposition.coordinated}
     families = []
     for one in assumptions(decomposition):
         asked = never(name_of(one), _closed_after_vote(loop, decomposition, rows[one.transition], one))
         families.append(Family(name_of(one), str(one), {one.signal: asked}, hint=_HINT))
     completions = [
         Assumption(row.name, gate.signal, gate.wanted)
-        for row in decomposition.table
+        for row in decomposition.coordinated
         for gate in decomposition.net.transition(row.name).external
         if gate.wanted and decomposition.net.signal(gate.signal).kind is SignalKind.COMPLETION
     ]
     families.append(
         Family(
             COMPLETIONS,
-            "a completion that a global transition waits for stays from the vote until it fires",
+            "a completion that a coordinated transition waits for stays from the vote until it fires",
             {
                 f"{one.signal} for {one.transition}": never(
                     f"o4.completion.{i}", _closed_after_vote(loop, decomposition, rows[one.transition], one)
@@ -149,7 +149,7 @@ def _shown(loop: ClosedLoop, decomposition: Decomposition, verdict: Verdict, one
         return replace(verdict, subjects=())
     if not ones:
         return verdict
-    rows = {row.name: row for row in decomposition.table}
+    rows = {row.name: row for row in decomposition.coordinated}
     player, marking = Player(loop.net), loop.net.marking(verdict.witness.marking)
     may_fire = {loop.net.transitions[t].name: t for t in player.firable(marking)}
     for one in ones:

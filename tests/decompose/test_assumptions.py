@@ -13,7 +13,9 @@ def test_the_sensors_of_the_cell_that_gate_global_transitions_are_assumed_to_hol
     )
 
 
-def test_a_local_gate_and_a_permissive_completion_assume_nothing_and_an_inhibitive_one_does() -> None:
+def test_a_gate_of_a_controller_by_itself_and_a_permissive_completion_assume_nothing_and_an_inhibitive_one_does() -> (
+    None
+):
     drill = Place("a.drill", "a", command=Command("D", "RUN"), completion="a.done")
     places = (Place("a.idle", "a", marked=True), drill, Place("b.p", "b", marked=True))
     done = ExternalGate("a.done")
@@ -25,3 +27,16 @@ def test_a_local_gate_and_a_permissive_completion_assume_nothing_and_an_inhibiti
     signals = (Signal("a.door", "a"), Signal("a.done", "a", SignalKind.COMPLETION))
     net = Net("n", places, transitions, signals, (Controller("a"), Controller("b")))
     assert assumptions(split(net)) == (Assumption("early", "a.done", wanted=False),)
+
+
+def test_a_local_transition_that_competes_with_a_global_one_is_decided_later_and_assumes_its_gates() -> None:
+    places = (*(Place(f"a.{name}", "a", name == "p") for name in "pqr"), Place("b.s", "b", marked=True))
+    transitions = (
+        Transition("local", ("a.p",), ("a.r",), external=(ExternalGate("a.door"),)),
+        Transition("global", ("a.p", "b.s"), ("a.q",)),
+        Transition("alone", ("a.r",), (), external=(ExternalGate("a.door"),)),
+    )
+    net = Net("n", places, transitions, (Signal("a.door", "a"),), (Controller("a"), Controller("b")))
+    decomposition = split(net)
+    assert [row.name for row in decomposition.coordinated if not row.is_global] == ["local"]
+    assert assumptions(decomposition) == (Assumption("local", "a.door", wanted=True),)

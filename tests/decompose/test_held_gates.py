@@ -91,6 +91,53 @@ def test_a_gate_that_another_machine_closes_is_found() -> None:
     assert taken.witness.note == "'t2-42' had voted yes, and the last firing makes 'mc.entry_taken' 1"
 
 
+LOCAL_BESIDE_GLOBAL = """\
+firable: 1
+cell: beside
+controllers:
+  sys:
+    coordinator: true
+    start: [s]
+    places: {s: , s2: }
+  a:
+    start: [p]
+    inputs: door
+    places: {p: , q: , run: {send: {machine: B, command: RUN}, until: out}}
+transitions:
+  g: {from: [a.p, sys.s], to: [a.q, sys.s2]}
+  h: {from: [a.q, sys.s2], to: [a.p, sys.s]}
+  l: {from: a.p, to: a.run, if: a.door}
+  m: {from: a.run, to: a.p}
+arbiters:
+  ar: {among: [l, g], by: rotation}
+"""
+ITS_MACHINE = """\
+firable_plant: 1
+plant: beside
+stations: [entry, exit]
+arrivals:   {station: entry, every_s: 8}
+departures: {station: exit, after_s: 1}
+machines:
+  B:
+    commands:
+      RUN:   {does: carry, from: entry, to: exit, takes_s: 4.0, when_full: wait}
+sensors:
+  a.door: {occupied: entry}
+"""
+
+
+def test_the_gate_of_a_local_transition_that_the_coordinator_decides_is_asked_of_the_machines() -> None:
+    decomposition = split(parse_net(LOCAL_BESIDE_GLOBAL))
+    exact = held_gates(decomposition, parse_plant(ITS_MACHINE)).verdicts
+    assert [verdict.name for verdict in exact] == ["o4.l.a.door", COMPLETIONS, COMMANDS]
+    assert all(verdict.holds for verdict in exact)
+    flickering = parse_plant(ITS_MACHINE.replace("{occupied: entry}", "{occupied: entry, may_flicker: true}"))
+    broken = held_gates(decomposition, flickering).verdicts[0]
+    assert broken.status is Status.VIOLATED
+    assert broken.witness is not None
+    assert broken.witness.firings[-1] == ("a.door/drops",)
+
+
 TWO_COMMAND_ONE_BELT = """\
 firable: 1
 cell: late
