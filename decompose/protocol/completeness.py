@@ -57,6 +57,15 @@ def central_markings(net: Net, limits: Limits) -> Mapping[Marking, tuple[int, ..
     }
 
 
+def carrying(space: StateSpace[Any], net: Net, marking: Marking) -> Any:
+    """The configurations in a protocol's space that carry a marking of the central net."""
+    literals = (
+        (Holds(central(place.name)) if marking >> p & 1 else Not(Holds(central(place.name))))
+        for p, place in enumerate(net.places)
+    )
+    return space.satisfying(And(tuple(literals)))
+
+
 def first_lost(protocol: ProtocolNet, space: StateSpace[Any], limits: Limits) -> Lost | None:
     """What is lost, if anything.
 
@@ -86,7 +95,7 @@ class _Completeness:
     def lost_in(self, marking: Marking, may_fire: tuple[int, ...]) -> Iterator[Lost]:
         """What is lost in the configurations of one central marking."""
         algebra = self.space.algebra
-        inside = algebra.conjunction([self._carrying(marking), algebra.negation(self.outside)])
+        inside = algebra.conjunction([carrying(self.space, self.central, marking), algebra.negation(self.outside)])
         if not may_fire or not self.space.count(inside):
             return
         home = algebra.conjunction([inside, self.quiet])
@@ -100,13 +109,6 @@ class _Completeness:
             witness = self.space.witness(rest, f"from here {name} cannot be the next to fire")
             if witness is not None:
                 yield Lost(name, witness)
-
-    def _carrying(self, marking: Marking) -> Any:
-        literals = (
-            (Holds(central(place.name)) if marking >> p & 1 else Not(Holds(central(place.name))))
-            for p, place in enumerate(self.central.places)
-        )
-        return self.space.satisfying(And(tuple(literals)))
 
     def _all_lead_to(self, targets: Any, inside: Any) -> bool:
         if not self.space.count(targets):
@@ -162,4 +164,4 @@ def way(protocol: ProtocolNet, t: str) -> tuple[str, ...] | None:
     return (*steps, f"decide/{t}")
 
 
-__all__ = ["CENTRAL_MARKINGS_MAX", "IncompleteGraph", "Lost", "central_markings", "first_lost", "way"]
+__all__ = ["CENTRAL_MARKINGS_MAX", "IncompleteGraph", "Lost", "carrying", "central_markings", "first_lost", "way"]

@@ -7,31 +7,42 @@ of that.
 
 Whoever is *dead* never restarts. That is safe too, by the same exploration, since nobody has to restart in it. What the
 others can still do is asked of a net in which one of them may crash, of its configurations after the crash, which
-nothing leads out of. A transition
+nothing leads out of. Each carries a marking of the central net, and the dead keep back only what the central net could
+still fire from there: a transition that fires once, at start-up, and has fired would not fire again anyway, nor what
+another choice has ruled out. A transition
 
-- stands still *at once*, if none of them fires it: it is local to who is dead, or nobody is left to decide it;
-- stands still *at last*, if from some of them it never fires again: as soon as it waits for something that nobody does
-  any more. It may still finish what was begun, such as a firing that was decided before the crash;
-- *goes on*, if from all of them it can fire again.
+- stands still *at once*, if none of these configurations fires it: it is local to who is dead, or nobody is left to
+  decide it;
+- stands still *at last*, if from some of them it never fires again, though from the central marking that this one
+  carries the central net could: as soon as it waits for something that nobody does any more. It may still finish what
+  was begun, such as a firing that was decided before the crash;
+- *goes on*, if it can fire again from each of them from where the central net could.
 
-A machine stands still if no transition goes on that sends it a command.
+The same is asked of the transitions that send commands to a machine, taken together, which is not the division of each:
+a machine that is switched on once and then used stands still if its use does, though nothing keeps back the switching
+on. It stands still if from some configuration none of them ever fires again, though the central net could fire one.
+
+What is looked at first is M0. Whoever crashes may do so at once, and whatever can fire at all can fire from there; so
+what is stuck from there is kept back, and the central net is explored only for what is stuck from other markings alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.goal import Limits
 from firable.analysis.question import listed
+from firable.analysis.spaces.reachability import Budget, explore
+from firable.decompose.protocol.completeness import CENTRAL_MARKINGS_MAX, carrying
 from firable.decompose.protocol.draft import COORDINATOR_DOWN, down
 from firable.decompose.protocol.exploring import Exploration, explore_protocol
 from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL, Faults, Often
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import Holds
-from firable.nets.net import Net
+from firable.nets.net import Marking, Net
 from firable.nets.verdict import Status, Verdict, Weight
 
 COORDINATOR = "coordinator"
@@ -41,8 +52,9 @@ COORDINATOR = "coordinator"
 class Outage:
     """What goes on while somebody is dead: `who` is a controller, or nobody (empty) for the coordinator.
 
-    `at_once`, `at_last` and `goes_on` divide the transitions of the central net that can fire at all; `still` and
-    `running` its machines that are sent commands. `bound` says why this is not known, where it is not.
+    `at_once`, `at_last` and `goes_on` divide the transitions of the central net that can fire at all, `still` and
+    `running` the machines that these send commands. What goes on is what is not kept back: it may have fired for the
+    last time for other reasons. `bound` says why this is not known, where it is not.
     """
 
     who: str
@@ -94,42 +106,77 @@ def _outage(decomposition: Decomposition, who: str, limits: Limits) -> Outage:
     found = explore_protocol(decomposition, PROTOCOL, faults, limits=limits)
     try:
         found.space.require_complete()
-        kinds = _divided(found, Holds(down(who) if who else COORDINATOR_DOWN))
+        return _divided(found, who)
     except (IncompleteGraph, BudgetExceeded) as error:
         return Outage(who, bound=found.space.bound or str(error))
-    still, running = _machines(decomposition.net, kinds["goes on"])
-    return Outage(who, kinds["at once"], kinds["at last"], kinds["goes on"], still, running)
 
 
-def _divided(found: Exploration, dead: Holds) -> dict[str, tuple[str, ...]]:
+def _divided(found: Exploration, who: str) -> Outage:
     space, algebra = found.space, found.space.algebra
-    after = space.satisfying(dead)
-    n_after = space.count(after)
-    kinds: dict[str, list[str]] = {"at once": [], "at last": [], "goes on": []}
+    after = space.satisfying(Holds(down(who) if who else COORDINATOR_DOWN))
+    at_once, stuck = list[str](), dict[str, Any]()
     for t, by in found.protocol.firing.items():
-        if not by:
-            continue
         where = algebra.disjunction(space.may_fire(i) for i in by)
         if not space.count(where):
             continue  # the central net does not fire it either
-        firing: Any = algebra.conjunction([after, where])
+        firing = algebra.conjunction([after, where])
         if not space.count(firing):
-            kinds["at once"].append(t)
-        else:
-            goes_on = space.count(space.backward(firing, after)) == n_after
-            kinds["goes on" if goes_on else "at last"].append(t)
-    return {kind: tuple(some) for kind, some in kinds.items()}
+            at_once.append(t)
+        stuck[t] = algebra.conjunction([after, algebra.negation(space.backward(firing, after))])
+    commanding = _commanding(found.protocol.parts.net, stuck)
+    kept_back = _kept_back(found, stuck, [*((t,) for t in stuck), *commanding.values()])
+    at_last = tuple(t for t in stuck if (t,) in kept_back and t not in at_once)
+    goes_on = tuple(t for t in stuck if (t,) not in kept_back)
+    still = tuple(machine for machine, some in commanding.items() if some in kept_back)
+    return Outage(who, tuple(at_once), at_last, goes_on, still, tuple(m for m in commanding if m not in still))
 
 
-def _machines(net: Net, goes_on: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The machines that are sent commands, by whether some transition that goes on sends one."""
-    entered = {place for t in goes_on for place in net.transition(t).outputs}
-    machines = {place.command.machine: False for place in net.places if place.command is not None}
-    for place in net.places:
-        if place.command is not None and place.name in entered:
-            machines[place.command.machine] = True
-    still = tuple(machine for machine, runs in machines.items() if not runs)
-    return still, tuple(machine for machine, runs in machines.items() if runs)
+def _commanding(net: Net, firing: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """For each machine that is sent commands, the transitions that can fire and send it one."""
+    found: dict[str, tuple[str, ...]] = {}
+    for machine in dict.fromkeys(place.command.machine for place in net.places if place.command is not None):
+        entered = {place.name for place in net.places if place.command and place.command.machine == machine}
+        some = tuple(t for t in firing if not entered.isdisjoint(net.transition(t).outputs))
+        if some:
+            found[machine] = some
+    return found
+
+
+def _kept_back(found: Exploration, stuck: Mapping[str, Any], groups: Sequence[tuple[str, ...]]) -> set[tuple[str, ...]]:
+    """The groups of transitions that the dead keep back: stuck, all of a group, where the central net could fire one.
+
+    `stuck` gives for each transition the configurations after the crash from which it never fires again. Raises
+    `IncompleteGraph` where the central net has to be explored and is too large.
+    """
+    net, space, algebra = found.protocol.parts.net, found.space, found.space.algebra
+    open_: dict[tuple[str, ...], Any] = {}
+    for some in groups:
+        together = algebra.conjunction(stuck[t] for t in some)  # EF of one of them is the union of the EF of each
+        if space.count(together):
+            open_[some] = together
+    kept_back = set[tuple[str, ...]]()
+
+    def look(marking: Marking, among: Sequence[tuple[str, ...]]) -> None:
+        inside = carrying(space, net, marking)
+        for some in among:
+            if space.count(algebra.conjunction([open_[some], inside])):
+                kept_back.add(some)
+                del open_[some]
+
+    look(net.initial_marking, tuple(open_))
+    if not open_:
+        return kept_back
+    central = explore(
+        net, budget=Budget(CENTRAL_MARKINGS_MAX, found.limits.memory_bytes), deadline=found.limits.deadline
+    )
+    central.require_complete()
+    fires = {t: central.may_fire(net.transition_index[t]) for some in open_ for t in some}
+    could = {some: central.backward(central.algebra.disjunction(fires[t] for t in some)) for some in open_}
+    for i in range(central.n_markings):
+        among = tuple(some for some in open_ if could[some][i])
+        if among:
+            look(central.marking(i), among)
+    return kept_back
 
 
 def outage_verdict(outage: Outage) -> Verdict:
@@ -138,7 +185,8 @@ def outage_verdict(outage: Outage) -> Verdict:
     return Verdict(
         f"faults.dead.{outage.who or COORDINATOR}",
         Status.UNKNOWN if outage.bound else Status.PROVED,
-        f"while {outage.name} is dead, these transitions stand still, at once or at last, and no others",
+        f"while {outage.name} is dead, these transitions stand still, at once or at last, where the central net could "
+        "fire them again, and no others",
         "protocol net, configurations after the crash",
         Weight.INFORMATION,
         hint="" if outage.bound else told,

@@ -66,6 +66,90 @@ def test_transition_that_never_fires_is_not_blamed_on_the_fault() -> None:
     assert all((*o.at_once, *o.at_last, *o.goes_on) == () for o in outages(split(net)))
 
 
+def start_up() -> Net:
+    """`b` switches a heater on and a lamp, once each, turns a fan on and off, and uses the heater together with `a`."""
+    places = (
+        Place("a.p", "a", marked=True),
+        Place("a.q", "a"),
+        Place("b.cold", "b", marked=True),
+        Place("b.warm", "b", command=Command("heater", "HEAT")),
+        Place("b.free", "b", marked=True),
+        Place("b.used", "b", command=Command("heater", "HOLD")),
+        Place("b.dark", "b", marked=True),
+        Place("b.lit", "b", command=Command("lamp", "LIGHT")),
+        Place("b.fan", "b", marked=True),
+        Place("b.wind", "b", command=Command("fan", "TURN")),
+    )
+    transitions = (
+        Transition("warm", ("b.cold",), ("b.warm",)),
+        Transition("use", ("a.p", "b.free"), ("a.q", "b.used")),
+        Transition("put", ("a.q", "b.used"), ("a.p", "b.free")),
+        Transition("light", ("b.dark",), ("b.lit",)),
+        Transition("on", ("b.fan",), ("b.wind",)),
+        Transition("off", ("b.wind",), ("b.fan",)),
+    )
+    return Net("start-up", places, transitions, (), (A, B))
+
+
+@pytest.mark.parametrize("name", ["warm", "light", "on"])
+@pytest.mark.parametrize("who", ["a", ""])
+def test_what_fires_once_at_start_up_is_not_kept_back_by_who_has_no_part_in_it(who: str, name: str) -> None:
+    outage = by_name(start_up())[who]
+    assert name in outage.goes_on
+    assert "use" in (*outage.at_once, *outage.at_last)
+    assert by_name(start_up())["b"].goes_on == ()
+
+
+def test_machine_that_is_commanded_at_start_up_alone_does_not_stand_still() -> None:
+    found = by_name(start_up())
+    assert "lamp" in found["a"].running
+    assert "lamp" in found["b"].still
+
+
+def test_machine_stands_still_if_its_use_does_though_it_is_switched_on_freely() -> None:
+    outage = by_name(start_up())["a"]
+    assert outage.goes_on == ("warm", "light", "on", "off")
+    assert (outage.still, outage.running) == (("heater",), ("lamp", "fan"))
+
+
+def test_what_another_choice_has_ruled_out_is_not_kept_back() -> None:
+    """`c` goes left or right for good, and round there; that it never goes right again is no fault of `a`."""
+    left_or_right = ("left", "right")
+    places = [Place(f"c.{name}", "c", marked=name == "start") for name in ("start", *left_or_right)]
+    transitions = [Transition(name, ("c.start",), (f"c.{name}",)) for name in left_or_right]
+    net = cell()
+    net = Net("n", (*net.places, *places), (*net.transitions, *transitions), (), (A, B, C))
+    outage = by_name(net)["a"]
+    assert outage.goes_on == ("on", "off", "left", "right")
+
+
+def waiting_later() -> Net:
+    """`b` may fire `t` by itself from M0, and then again after `a` has helped it back."""
+    places = (
+        Place("a.p", "a", marked=True),
+        Place("a.q", "a"),
+        Place("b.x", "b", marked=True),
+        Place("b.y", "b"),
+    )
+    transitions = (
+        Transition("t", ("b.x",), ("b.y",)),
+        Transition("G", ("a.p", "b.y"), ("a.q", "b.x")),
+        Transition("l", ("a.q",), ("a.p",)),
+    )
+    return Net("n", places, transitions, (), (A, B))
+
+
+def test_transition_that_still_fires_from_the_start_and_then_never_again_stands_still() -> None:
+    assert by_name(waiting_later())["a"].at_last == ("t", "G")
+
+
+def test_central_net_that_is_too_large_leaves_open_what_only_its_markings_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = by_name(cell())
+    monkeypatch.setattr("firable.decompose.protocol.outages.CENTRAL_MARKINGS_MAX", 1)
+    assert by_name(cell()) == known
+    assert by_name(waiting_later())["a"].bound
+
+
 def test_net_without_coordinated_transitions_has_no_coordinator_to_lose() -> None:
     net = Net("n", (Place("a.p", "a", marked=True),), (Transition("l", ("a.p",)),), (), (A,))
     assert [outage.who for outage in outages(split(net))] == ["a"]
