@@ -16,10 +16,10 @@ import click
 from firable.cli import text
 
 if TYPE_CHECKING:
+    from firable.decompose.protocol.building import ProtocolNet
     from firable.decompose.protocol.outages import Outage
     from firable.decompose.protocol.refuting import Refutation
     from firable.nets.decomposition import Decomposition
-    from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
 EVENTS_SHOWN: Final = 40
@@ -43,10 +43,10 @@ class Asked:
 
 @dataclass(frozen=True)
 class Answered:
-    """What was found: verdicts, the nets that their runs are of, and what is told beside them."""
+    """What was found: verdicts, the protocols that their runs are of, and what is told beside them."""
 
     verdicts: tuple[Verdict, ...] = ()
-    nets: Mapping[str, Net] = field(default_factory=dict)
+    protocols: Mapping[str, ProtocolNet] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
     outages: tuple[Outage, ...] = ()
     refutations: tuple[Refutation, ...] = ()
@@ -77,17 +77,17 @@ def ask(decomposition: Decomposition, asked: Asked, seconds: float, *, evidence:
         return Limits(Deadline.after(seconds))
 
     verdicts: tuple[Verdict, ...] = ()
-    nets: dict[str, Net] = {}
+    protocols: dict[str, ProtocolNet] = {}
     files: dict[str, bytes] = {}
     if asked.protocol or asked.faults:
         found = protocol_verdicts(decomposition, limits, faults=asked.faults)
-        verdicts, nets = found.verdicts, found.nets
+        verdicts, protocols = found.verdicts, found.protocols
         files = found.evidence() if evidence else {}
     dead = tuple(outages(decomposition, limits)) if asked.faults else ()
     refutations = tuple(refute(wrong, decomposition, limits()) for wrong in WRONG) if asked.wrong else ()
     verdicts += tuple(map(outage_verdict, dead)) + tuple(one.verdict for one in refutations)
-    nets |= {refutation.verdict.name: refutation.protocol.net for refutation in refutations}
-    return Answered(verdicts, nets, files, dead, refutations)
+    protocols |= {refutation.verdict.name: refutation.protocol for refutation in refutations}
+    return Answered(verdicts, protocols, files, dead, refutations)
 
 
 def show(answered: Answered) -> None:
@@ -116,10 +116,9 @@ def show(answered: Answered) -> None:
 
 def _show_refutation(refutation: Refutation) -> None:
     wrong = refutation.wrong
-    words = {"violated": "goes wrong here", "proved": "cannot go wrong here", "unknown": "not decided here"}
     status = refutation.status.value
     click.echo(f"  {wrong.name}: {wrong.says} ({wrong.obligation})")
-    click.echo(f"      {words[status]}{f', after {len(refutation.events)} events' if refutation.events else ''}")
+    click.echo(f"      {refutation.outcome}")
     left_out = max(0, len(refutation.events) - EVENTS_SHOWN)
     if left_out:
         click.echo(f"      ... {left_out} events, then")

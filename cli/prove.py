@@ -15,9 +15,8 @@ from firable.cli.protocol import show as show_protocol
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
-    from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
 
@@ -98,11 +97,12 @@ def _report(
         verdicts += held.verdicts
         if smt_dir is not None:
             evidence |= held.evidence()
-    nets: Mapping[str, Net] = {}
+    told = Answered()
     if asked:
-        answered[:] = [ask(decomposition, asked, timeout, evidence=smt_dir is not None)]
-        verdicts, nets = verdicts + answered[0].verdicts, answered[0].nets
-        evidence |= answered[0].files
+        told = ask(decomposition, asked, timeout, evidence=smt_dir is not None)
+        answered[:] = [told]
+        verdicts += told.verdicts
+        evidence |= told.files
     files = write_folder(smt_dir, evidence) if smt_dir is not None else ()
     return Report(
         "prove",
@@ -115,7 +115,9 @@ def _report(
         standing=tuple(standing(decomposition, verdicts)),
         decomposition=decomposition,
         loop_net=None if loop is None else loop.net,
-        nets_of=nets,
+        protocols=told.protocols,
+        outages=told.outages,
+        refutations=told.refutations,
         files=files,
     )
 
@@ -142,7 +144,8 @@ def _show(report: Report, answered: Sequence[Answered]) -> None:
         show_protocol(one)
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
     refuted = [verdict for verdict in refuted if not verdict.name.startswith("wrong.")]  # told above, by their events
-    for net in (report.net, report.loop_net, *{id(net): net for net in report.nets_of.values()}.values()):
+    nets = {id(of.net): of.net for of in report.protocols.values()}
+    for net in (report.net, report.loop_net, *nets.values()):
         if net is not None and (some := [verdict for verdict in refuted if report.net_of(verdict) is net]):
             text.show_verdicts(net, some)
     text.show_summary(report)

@@ -14,6 +14,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from firable.decompose.proofs.standing import Standing
+    from firable.decompose.protocol.building import ProtocolNet
+    from firable.decompose.protocol.outages import Outage
+    from firable.decompose.protocol.refuting import Refutation
     from firable.nets.decomposition import Coordinated, Decomposition
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
@@ -37,9 +40,9 @@ class ExitCode(IntEnum):
 class Report:
     """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON.
 
-    `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`), and `nets_of` are others, by
-    the names of the verdicts on them. `page` is the report as a page for a person, where one was
-    written. `again` says that the same was decided before, which a program need not know.
+    `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`), and `protocols` are others, by
+    the names of the verdicts on them; `outages` and `refutations` are told beside those. `page` is the report as a page
+    for a person, where one was written. `again` says that the same was decided before, which a program need not know.
     """
 
     command: str
@@ -59,7 +62,9 @@ class Report:
     loop: Mapping[str, Any] = field(default_factory=dict)
     decomposition: Decomposition | None = None
     loop_net: Net | None = None
-    nets_of: Mapping[str, Net] = field(default_factory=dict)
+    protocols: Mapping[str, ProtocolNet] = field(default_factory=dict)
+    outages: Sequence[Outage] = ()
+    refutations: Sequence[Refutation] = ()
     split: Mapping[str, Any] = field(default_factory=dict)
     page: str = ""
     again: bool = False
@@ -67,8 +72,8 @@ class Report:
     def net_of(self, verdict: Verdict) -> Net:
         """The net that the runs of a verdict are of."""
         family = verdict.name.partition(".")[0]
-        if verdict.name in self.nets_of:
-            return self.nets_of[verdict.name]
+        if verdict.name in self.protocols:
+            return self.protocols[verdict.name].net
         of_loop = family in _OF_THE_LOOP
         return self.loop_net if of_loop and self.loop_net is not None else self.net
 
@@ -104,6 +109,8 @@ class Report:
             data["files"] = [*self.files, self.page]
         if self.standing:
             data["standing"] = [asdict(line) for line in self.standing]
+        if self.outages:
+            data["outages"] = [_outage_to_json(outage) for outage in self.outages]
         if self.notes:
             data["notes"] = [diagnostic_to_json(note) for note in self.notes]
         data["verdicts"] = [verdict.to_json() for verdict in self.verdicts]
@@ -116,6 +123,19 @@ def _row_to_json(row: Coordinated) -> dict[str, Any]:
         "parts": [{"controller": part.controller, "name": part.name} for part in row.parts],
         "description": row.description,
         **({} if row.at is None else {"at": row.at}),
+    }
+
+
+def _outage_to_json(outage: Outage) -> dict[str, Any]:
+    if outage.bound:
+        return {"dead": outage.name, "bound": outage.bound}
+    return {
+        "dead": outage.name,
+        "at_once": list(outage.at_once),
+        "at_last": list(outage.at_last),
+        "goes_on": list(outage.goes_on),
+        "still": list(outage.still),
+        "running": list(outage.running),
     }
 
 

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from firable.cli.page.markup import Markup, raw, tag, together
-from firable.cli.page.sections import SECTIONS, TONES, classes, refuted
+from firable.cli.page.pieces import TONES, classes
+from firable.cli.page.sections import SECTIONS, refuted
 from firable.cli.page.style import STYLE
 from firable.cli.report import Report
 from firable.cli.text import counted

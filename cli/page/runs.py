@@ -3,7 +3,7 @@
 What an engineer asks of a run is who does what when, and what changed by it. So each step says in the lane of each
 controller which tokens left and which came, and which command was sent; what does not change is not shown. The marking
 at the end stands in the same lanes. The reference player fires the run once more for this; where it cannot, because
-the run is of another kind (messages of a protocol, say), the steps are told without lanes. What machines and workpieces
+the run is of another kind (of a protocol: `swimlanes`), the steps are told without lanes. What machines and workpieces
 do stands in words, in a lane of its own.
 
 Rejected: the net drawn once for each step. The picture of a cell fills a screen; thirty of them are no strip, and the
@@ -30,7 +30,7 @@ _UNOWNED: Final = "without a controller"
 
 
 @dataclass(frozen=True)
-class _Step:
+class Step:
     """What one step did: the transitions that fired, and the marking before and after it."""
 
     number: int
@@ -64,7 +64,7 @@ def strip(net: Net, witness: Witness, cell: Net, decomposition: Decomposition | 
     """
     if witness.assignment:
         return _values(witness)
-    steps = _played(net, witness)
+    steps = played(net, witness)
     if steps is None:
         return together(_told(witness), _note(witness))
     lanes = _lanes(net, steps)
@@ -72,7 +72,7 @@ def strip(net: Net, witness: Witness, cell: Net, decomposition: Decomposition | 
     drawn = _Drawn(net, cell, lanes, decomposition)
     rows = [*_rows(drawn, steps[:n])]
     if witness.cycle:
-        rows.append(_across("and then for ever again", lanes))
+        rows.append(across("and then for ever again", lanes))
         rows += _rows(drawn, steps[n:])
     end = steps[-1].after if steps else net.initial_marking
     head = tag("tr", tag("th", "step", scope="col"), *(tag("th", lane, scope="col") for lane in lanes))
@@ -80,7 +80,7 @@ def strip(net: Net, witness: Witness, cell: Net, decomposition: Decomposition | 
         "table",
         tag("caption", "Each step with the tokens that leave (○) and come (●), by controller", cls="unseen"),
         tag("thead", head),
-        tag("tbody", rows or [_across("already in the initial marking", lanes)]),
+        tag("tbody", rows or [across("already in the initial marking", lanes)]),
         tag("tfoot", _end(net, end, lanes)),
         cls="strip stack",
     )
@@ -113,14 +113,15 @@ def _told(witness: Witness) -> Markup:
     return together(tag("ol", items, cls="told"), rest, cycle)
 
 
-def _played(net: Net, witness: Witness) -> list[_Step] | None:
+def played(net: Net, witness: Witness) -> list[Step] | None:
+    """The steps of a run as the reference player fires it; None where it cannot."""
     player, marking, steps = Player(net), net.initial_marking, []
     for number, fired in enumerate((*witness.firings, *witness.cycle), start=1):
         try:
             after = player.fire(marking, [net.transition_index[name] for name in fired])
         except (KeyError, NotFirableError):
             return None
-        steps.append(_Step(number, tuple(fired), marking, after))
+        steps.append(Step(number, tuple(fired), marking, after))
         marking = after
     return steps
 
@@ -129,7 +130,7 @@ def _lane_of(place: Place) -> str:
     return place.owner or _UNOWNED
 
 
-def _lanes(net: Net, steps: Sequence[_Step]) -> tuple[str, ...]:
+def _lanes(net: Net, steps: Sequence[Step]) -> tuple[str, ...]:
     """All controllers, or of many those that the run touches."""
     names = [controller.name for controller in net.controllers]
     if any(place.owner is None for place in net.places):
@@ -143,17 +144,17 @@ def _lanes(net: Net, steps: Sequence[_Step]) -> tuple[str, ...]:
     return tuple(name for name in names if name in touched)
 
 
-def _rows(drawn: _Drawn, steps: Sequence[_Step]) -> Iterator[Markup]:
+def _rows(drawn: _Drawn, steps: Sequence[Step]) -> Iterator[Markup]:
     left_out = len(steps) - STEPS_SHOWN_MAX
     if left_out <= 0:
         yield from (_row(drawn, step) for step in steps)
         return
     yield from (_row(drawn, step) for step in steps[: STEPS_SHOWN_MAX // 2])
-    yield _across(f"{left_out:,} steps are left out here", drawn.lanes)
+    yield across(f"{left_out:,} steps are left out here", drawn.lanes)
     yield from (_row(drawn, step) for step in steps[-(STEPS_SHOWN_MAX // 2) :])
 
 
-def _row(drawn: _Drawn, step: _Step) -> Markup:
+def _row(drawn: _Drawn, step: Step) -> Markup:
     names = tag("div", *map(drawn.title, step.fired))
     head = tag("th", tag("span", f"{step.number}", cls="number"), names, scope="row")
     parts = _parts(step.fired, drawn.decomposition)
@@ -172,7 +173,7 @@ def _parts(fired: Iterable[str], decomposition: Decomposition | None) -> dict[st
     return found
 
 
-def _changes(net: Net, step: _Step, lane: str, parts: tuple[str, ...]) -> list[Markup]:
+def _changes(net: Net, step: Step, lane: str, parts: tuple[str, ...]) -> list[Markup]:
     written = [tag("span", part, cls="part") for part in parts]
     for p, place in enumerate(net.places):
         before, after = step.before >> p & 1, step.after >> p & 1
@@ -182,7 +183,7 @@ def _changes(net: Net, step: _Step, lane: str, parts: tuple[str, ...]) -> list[M
             # Of what has one of several values only the new one is told, in words.
             written += [_word(place)] if after else []
             continue
-        written.append(_token(place, comes=bool(after)))
+        written.append(token(place, comes=bool(after)))
         # In a loop where commands are sent late, sending is a step of its own.
         if after and place.command is not None and f"{UNSENT}.{place.name}" not in net.place_index:
             written.append(tag("span", tag("span", "sends ", cls="unseen"), str(place.command), cls="sends"))
@@ -193,7 +194,8 @@ def _word(place: Place) -> Markup:
     return tag("span", tag("span", "● ", aria_hidden="true"), place.description or place.name, cls="fact")
 
 
-def _token(place: Place, *, comes: bool) -> Markup:
+def token(place: Place, *, comes: bool) -> Markup:
+    """A token that comes to a place or leaves it."""
     word = "comes to " if comes else "leaves "
     sign = "●" if comes else "○"
     name = local_name(place.name, place.owner)
@@ -221,5 +223,6 @@ def _end(net: Net, marking: Marking, lanes: tuple[str, ...]) -> Markup:
     return tag("tr", tag("th", tag("span", "●", cls="number", aria_hidden="true"), "at the end", scope="row"), *cells)
 
 
-def _across(words: str, lanes: tuple[str, ...]) -> Markup:
+def across(words: str, lanes: Sequence[str]) -> Markup:
+    """A row of words across all lanes."""
     return tag("tr", tag("td", words, colspan=str(len(lanes) + 1), cls="across"))

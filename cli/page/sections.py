@@ -9,16 +9,19 @@ To add a section: its function, and a row in `SECTIONS`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from firable.cli.page.markup import Content, Markup, raw, tag, together
+from firable.cli.page.pieces import ROWS_MAX, badge, classes, names, status_badge, table
+from firable.cli.page.protocol import is_of_protocol, lives_on, while_dead
 from firable.cli.page.runs import strip
+from firable.cli.page.swimlanes import swimlanes
 from firable.cli.report import Report
-from firable.cli.text import WORDS, counted, mark
+from firable.cli.text import counted
 from firable.nets.decomposition import Decomposition
-from firable.nets.verdict import Status, Verdict, Weight
+from firable.nets.verdict import Status, Verdict, Weight, Witness
 
 if TYPE_CHECKING:
     from firable.decompose.proofs.family import Family
@@ -27,10 +30,7 @@ LISTED_MAX: Final = 300
 """How many verdicts of one family are listed; of more, those that are not proved come first."""
 COUNTEREXAMPLES_MAX: Final = 24
 _DRAWN_TRANSITIONS_MAX: Final = 80
-_ROWS_MAX: Final = 400
 _COLUMNS_MAX: Final = 9
-_NAMES_MAX: Final = 200
-TONES: Final = {"✓": "good", "✗": "bad", "?": "open", "!": "open", "·": None}
 _HEADINGS: Final = {
     Weight.REQUIRED: "must hold",
     Weight.WARNING: "warnings",
@@ -47,50 +47,6 @@ class Section:
     make: Callable[[Report], Markup | None]
 
 
-def badge(verdict: Verdict) -> Markup:
-    """How a verdict ended, as a sign and a word."""
-    sign, word, _ = mark(verdict, WORDS)
-    return tag("span", f"{sign} {word}", cls=classes(TONES[sign]))
-
-
-def status_badge(status: Status) -> Markup:
-    """A status by itself."""
-    sign = {Status.PROVED: "✓", Status.VIOLATED: "✗", Status.UNKNOWN: "?"}[status]
-    return tag("span", f"{sign} {status}", cls=classes(TONES[sign]))
-
-
-def classes(tone: str | None) -> str:
-    """The classes of a badge."""
-    return f"badge {tone}" if tone else "badge"
-
-
-def _table(
-    heads: Sequence[str], rows: Iterable[Sequence[Content]], *, caption: str, count: int | None = None
-) -> Markup:
-    """A table that becomes a stack of cards on a phone; the first cell of a row is its head.
-
-    Of many rows the first are shown; `count` says how many there are where not all are given.
-    """
-    body = []
-    for row in rows:
-        cells = [tag("th", row[0], scope="row")]
-        cells += [tag("td", cell, data_of=head) for head, cell in zip(heads[1:], row[1:], strict=True)]
-        body.append(tag("tr", *cells))
-    more = (len(body) if count is None else count) - _ROWS_MAX
-    rest = tag("p", f"and {more:,} more", cls="soft") if more > 0 else None
-    head = tag("thead", tag("tr", *(tag("th", one, scope="col") for one in heads)))
-    hidden = tag("caption", caption, cls="unseen")
-    return together(
-        tag("div", tag("table", hidden, head, tag("tbody", body[:_ROWS_MAX]), cls="stack"), cls="wide"), rest
-    )
-
-
-def _names(names: Iterable[str]) -> Markup:
-    names = tuple(names)
-    more = len(names) - _NAMES_MAX
-    return tag("span", ", ".join(names[:_NAMES_MAX]), f" and {more:,} more" if more > 0 else None, cls="code")
-
-
 # --- Obligations and assumptions
 
 
@@ -105,7 +61,7 @@ def _standing(report: Report) -> Markup | None:
     lead = "What the running, distributed cell needs so that it does what the central net does."
     return together(
         tag("p", lead, cls="lead"),
-        _table(("", "obligation", "status", "shown by, or assumed of"), rows, caption="The obligations O1 to O9"),
+        table(("", "obligation", "status", "shown by, or assumed of"), rows, caption="The obligations O1 to O9"),
     )
 
 
@@ -170,7 +126,7 @@ def _assumptions(report: Report) -> Markup | None:
         "Where one does not hold, the interlock belongs to the machine's own controller."
     )
     heads = ("assumption", "status", "how it is known")
-    return together(tag("p", lead, cls="lead"), _table(heads, rows, caption="Assumptions"))
+    return together(tag("p", lead, cls="lead"), table(heads, rows, caption="Assumptions"))
 
 
 # --- Verdicts
@@ -201,7 +157,7 @@ def _verdict(verdict: Verdict) -> Markup:
 def _others(report: Report) -> Markup | None:
     """The verdicts that no section above shows."""
     shown = _shown_above(report)
-    rest = [verdict for verdict in report.verdicts if id(verdict) not in shown]
+    rest = [verdict for verdict in report.verdicts if id(verdict) not in shown and not is_of_protocol(verdict)]
     parts: list[Markup] = []
     for weight, title in _HEADINGS.items():
         some = [verdict for verdict in rest if verdict.weight is weight]
@@ -238,12 +194,13 @@ def _loop(report: Report) -> Markup | None:
         "gate that never opens."
     )
     heads = ("question", "gates free", "with its machines", "")
-    return together(tag("p", lead, cls="lead"), _table(heads, rows, caption="Verdicts side by side"))
+    return together(tag("p", lead, cls="lead"), table(heads, rows, caption="Verdicts side by side"))
 
 
 def refuted(report: Report) -> list[tuple[str, Verdict]]:
     """The verdicts whose counterexamples are drawn, each with its anchor; those that must hold come first."""
     some = [v for v in report.verdicts if v.status is Status.VIOLATED and v.witness is not None]
+    some = [v for v in some if not is_of_protocol(v)]
     some.sort(key=lambda verdict: list(_HEADINGS).index(verdict.weight))
     return [(f"run-{n}", verdict) for n, verdict in enumerate(some, start=1)]
 
@@ -276,13 +233,19 @@ def _counterexamples(report: Report) -> Markup | None:
             continue
         told[key] = (verdict.name, anchor)
         hint = tag("p", verdict.hint, cls="hint") if verdict.hint else None
-        drawn = strip(report.net_of(verdict), witness, report.net, report.decomposition)
+        drawn = _drawn(report, verdict, witness)
         parts.append(tag("div", head, drawn, hint, cls="counter", id=anchor))
     if not parts:
         return None
     if len(some) > COUNTEREXAMPLES_MAX:
         parts.append(tag("p", f"{len(some) - COUNTEREXAMPLES_MAX:,} more are in the report as JSON", cls="soft"))
     return together(*parts)
+
+
+def _drawn(report: Report, verdict: Verdict, witness: Witness) -> Markup:
+    protocol = report.protocols.get(verdict.name)
+    told = None if protocol is None else swimlanes(protocol, witness)
+    return told or strip(report.net_of(verdict), witness, report.net, report.decomposition)
 
 
 # --- The cell and its decomposition
@@ -305,16 +268,16 @@ def _coordinator_table(report: Report) -> Markup | None:
     apart = len(controllers) <= _COLUMNS_MAX
     reasons = dict(_reasons(report.decomposition))
     rows: list[Sequence[Content]] = []
-    for row in report.table[:_ROWS_MAX]:
+    for row in report.table[:ROWS_MAX]:
         parts = {part.controller: part.name for part in row.parts}
         cells = [tag("span", parts[name], cls="code") if name in parts else "" for name in controllers] if apart else []
         if not apart:
-            cells = [_names(f"{name} at {controller}" for controller, name in parts.items())]
+            cells = [names(f"{name} at {controller}" for controller, name in parts.items())]
         rows.append((row.name, row.description, *cells, reasons.get(row.name, "")))
     lead = f"{_globals(report)}: each fires when every controller that has a part in it has voted yes."
     heads = ("", "transition", *(controllers if apart else ["parts"]), "global because of")
     return together(
-        tag("p", lead, cls="lead"), _table(heads, rows, caption="Coordinator table", count=len(report.table))
+        tag("p", lead, cls="lead"), table(heads, rows, caption="Coordinator table", count=len(report.table))
     )
 
 
@@ -340,7 +303,7 @@ def _groups(report: Report) -> Markup | None:
         return None
     rows = []
     groups = report.decomposition.groups
-    for group in groups[:_ROWS_MAX]:
+    for group in groups[:ROWS_MAX]:
         order = "; then ".join(", ".join(some) for some in (group.sequence, group.rest) if some)
         rows.append((group.name, tag("span", order, cls="code"), str(group.by), group.controller or "the coordinator"))
     lead = (
@@ -348,7 +311,7 @@ def _groups(report: Report) -> Markup | None:
         "decided together by one arbiter."
     )
     heads = ("group", "in this order", "by", "decided by")
-    return together(tag("p", lead, cls="lead"), _table(heads, rows, caption="Arbitration groups", count=len(groups)))
+    return together(tag("p", lead, cls="lead"), table(heads, rows, caption="Arbitration groups", count=len(groups)))
 
 
 def _knowledge(report: Report) -> Markup | None:
@@ -358,7 +321,7 @@ def _knowledge(report: Report) -> Markup | None:
         return None
     parts = []
     known = knowledge(report.decomposition)
-    for one in known[:_ROWS_MAX]:
+    for one in known[:ROWS_MAX]:
         facts: tuple[tuple[str, Sequence[str]], ...] = (
             ("owns the places", one.places),
             ("owns the signals", one.signals),
@@ -368,10 +331,10 @@ def _knowledge(report: Report) -> Markup | None:
             ("reads from its machines", tuple(f"{name} for {row}" for name, row in one.answers)),
             ("talks to", one.talks_to),
         )
-        listed = [together(tag("dt", word), tag("dd", _names(names))) for word, names in facts if names]
+        listed = [together(tag("dt", word), tag("dd", names(some))) for word, some in facts if some]
         parts.append(tag("details", tag("summary", tag("b", one.controller)), tag("dl", *listed, cls="facts inside")))
-    if len(known) > _ROWS_MAX:
-        parts.append(tag("p", f"and {len(known) - _ROWS_MAX:,} more controllers", cls="soft"))
+    if len(known) > ROWS_MAX:
+        parts.append(tag("p", f"and {len(known) - ROWS_MAX:,} more controllers", cls="soft"))
     return together(*parts)
 
 
@@ -381,6 +344,8 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section("assumptions", "Assumptions", _assumptions),
     Section("machines", "With its machines", _loop),
     Section("counterexamples", "Counterexamples", _counterexamples),
+    Section("dead", "What stands still while somebody is dead", while_dead),
+    Section("lives-on", "What this cell lives on", lives_on),
     Section("verdicts", "Verdicts", _others),
     Section("course", "How it was found", _course),
     Section("table", "Coordinator table", _coordinator_table),

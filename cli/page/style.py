@@ -89,6 +89,9 @@ border-bottom:1px solid var(--line)}
 .strip th b,.strip th .says{display:block;overflow-wrap:anywhere}
 .strip thead th:first-child{position:sticky;left:0;background:var(--paper)}
 .strip td:last-child{min-width:11rem}
+.lanes th[scope=row]{min-width:2.6rem;width:2.6rem}.lanes{table-layout:fixed}
+.lanes td>span{margin-bottom:.15rem}
+details.head{margin:.6rem 0}details.head>summary{color:var(--soft)}
 .strip td{min-width:8.2rem;border-left:1px solid var(--line)}
 .strip td>span{display:block}
 .strip .across{text-align:center;color:var(--soft);border-left:0}

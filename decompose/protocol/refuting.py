@@ -133,6 +133,15 @@ class Refutation:
         return () if self.witness is None else tuple(str(self.protocol.steps[t]) for (t,) in self.witness.firings)
 
     @property
+    def outcome(self) -> str:
+        """What came of it, in words; that a protocol cannot go wrong here does not make it right."""
+        if self.status is Status.VIOLATED:
+            return f"goes wrong here, after {len(self.events)} events"
+        needed = self.wrong.obligation
+        cannot = f"cannot go wrong here: wrong all the same, but this net does not need {needed} yet, and an edit may"
+        return cannot if self.status is Status.PROVED else "not decided here"
+
+    @property
     def sentence(self) -> str:
         """What does not hold at the end of the run; empty without one."""
         if self.witness is None:

@@ -19,10 +19,11 @@ from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.meaning import tidy
 from firable.analysis.evidence.producing.claims import Certifier, LackingError
 from firable.analysis.goal import Limits
+from firable.decompose.protocol.building import ProtocolNet
 from firable.decompose.protocol.exploring import Exploration, explore_protocol
 from firable.decompose.protocol.outages import fault_exploration, fault_verdicts
 from firable.nets.decomposition import Decomposition
-from firable.nets.net import Net, Property
+from firable.nets.net import Property
 from firable.nets.verdict import Status, Verdict
 
 EVIDENCE: Final = "protocol.evidence.json"
@@ -38,9 +39,9 @@ class ProtocolVerdicts:
     explorations: Mapping[str, Exploration]
 
     @property
-    def nets(self) -> dict[str, Net]:
-        """For each verdict the net that its runs are of."""
-        of = {family: exploration.protocol.net for family, exploration in self.explorations.items()}
+    def protocols(self) -> dict[str, ProtocolNet]:
+        """For each verdict the protocol that its runs are of."""
+        of = {family: exploration.protocol for family, exploration in self.explorations.items()}
         return {verdict.name: of[verdict.name.partition(".")[0]] for verdict in self.verdicts}
 
     def evidence(self, limits: Limits | None = None) -> dict[str, bytes]:

@@ -1,6 +1,7 @@
 """`firable prove --protocol`, `--faults` and `--wrong`."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -85,4 +86,51 @@ def test_evidence_is_written_beside_the_obligations_and_verified(
 def test_page_tells_what_was_found(net: str, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     assert main(["prove", net, "--wrong", "--report", str(page)]) == 0
-    assert "wrong.missing-vote" in page.read_text("utf-8")
+    assert "missing-vote" in page.read_text("utf-8")
+
+
+def page_of(net: str, tmp_path: Path, *options: str) -> str:
+    page = tmp_path / "report.html"
+    assert main(["prove", net, *options, "--report", str(page)]) == 0
+    return page.read_text("utf-8")
+
+
+def section(page: str, anchor: str) -> str:
+    start = page.index(f'<section id="{anchor}"')
+    return page[start : page.index("</section>", start)]
+
+
+def test_page_tells_what_stands_still(net: str, tmp_path: Path) -> None:
+    page = page_of(net, tmp_path, "--faults")
+    dead = section(page, "dead")
+    assert '<tr><th scope="row"><b>robot</b></th><td data-of="stands still at once"><span class="code">fetch<' in dead
+    assert '<td data-of="stands still at last"><span class="code">hand_over, unload<' in dead
+    assert '<td data-of="goes on">–</td>' in dead
+    assert "faults.dead." not in page, "told by the table, not once more among the verdicts"
+
+
+def test_json_says_what_stands_still_and_goes_on(capsys: pytest.CaptureFixture[str], net: str) -> None:
+    assert main(["prove", net, "--faults", "--format", "json"]) == 0
+    report = json.loads(capsys.readouterr().out)["reports"][0]
+    robot = {"at_once": ["fetch"], "at_last": ["hand_over", "unload"], "goes_on": [], "still": [], "running": []}
+    assert report["outages"][0] == {"dead": "robot", **robot}
+
+
+def test_wrong_protocols_are_no_counterexamples_of_the_page(net: str, tmp_path: Path) -> None:
+    page = page_of(net, tmp_path, "--wrong")
+    assert "Counterexamples" not in page
+    lives_on = section(page, "lives-on")
+    assert "missing-vote: a transition is decided though one vote is missing (Eq. (7))" in lives_on
+    assert "this net does not need O3 yet" in lives_on
+    assert "good" not in lives_on[: lives_on.index("missing-vote")], "what cannot go wrong here is not approved of"
+
+
+def test_events_of_a_protocol_stand_in_the_lane_of_who_acts(net: str, tmp_path: Path) -> None:
+    lives_on = section(page_of(net, tmp_path, "--wrong"), "lives-on")
+    run = lives_on[lives_on.index("missing-vote") :]
+    assert '<td data-of="the coordinator"><span>hand_over is decided without the vote of robot</span></td>' in run
+    assert '<td data-of="lathe"><span>lathe votes yes on hand_over</span></td>' in run
+    assert "central/" not in lives_on
+    assert "without a controller" not in lives_on
+    lost = lives_on[lives_on.index("sent-once") :]
+    assert re.search(r'<td data-of="on the way"><span>the order for hand_over to \w+ is lost</span></td>', lost)

@@ -1,0 +1,74 @@
+"""What the page says of the protocol: what stands still while somebody is dead, and what the cell lives on.
+
+The protocols that are known to be wrong are refuted on the cell, and a refutation is no counterexample of the cell: the
+protocol that runs is another. So they have a section of their own, in the words of the terminal. A wrong protocol that
+does no harm here gets no sign of approval either, since the next edit of the net may need what this one does not.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from firable.cli.page.markup import Content, Markup, tag, together
+from firable.cli.page.pieces import classes, names, table
+from firable.cli.page.swimlanes import swimlanes
+from firable.cli.report import Report
+from firable.nets.verdict import Verdict
+
+if TYPE_CHECKING:
+    from firable.decompose.protocol.refuting import Refutation
+
+
+def is_of_protocol(verdict: Verdict) -> bool:
+    """Whether the sections here tell what this verdict says."""
+    return verdict.name.startswith(("wrong.", "faults.dead."))
+
+
+def while_dead(report: Report) -> Markup | None:
+    """Who is dead, and what that keeps back."""
+    if not report.outages:
+        return None
+    rows: list[tuple[Content, ...]] = []
+    for outage in report.outages:
+        who = tag("b", outage.name)
+        if outage.bound:
+            rows.append((who, f"not known: {outage.bound}", *("" for _ in range(4))))
+            continue
+        told = (outage.at_once, outage.at_last, outage.goes_on, outage.still, outage.running)
+        rows.append((who, *(names(some) if some else "–" for some in told)))
+    lead = (
+        "Who is dead never restarts. The others do nothing wrong, but some transitions wait for the dead: at once, or "
+        "at last, when they have finished what was begun. A machine stands still that gets no command any more."
+    )
+    heads = ("dead", "stands still at once", "stands still at last", "goes on", "machines still", "machines running")
+    return together(tag("p", lead, cls="lead"), table(heads, rows, caption="What stands still while somebody is dead"))
+
+
+def lives_on(report: Report) -> Markup | None:
+    """The protocols known to be wrong, and what comes of each on this net."""
+    if not report.refutations:
+        return None
+    lead = (
+        "Each of these protocols leaves one thing out, and none of them is the one that runs. Where one goes wrong "
+        "here, the cell lives on the obligation that it leaves out."
+    )
+    return together(tag("p", lead, cls="lead"), *map(_refutation, report.refutations))
+
+
+def _refutation(refutation: Refutation) -> Markup:
+    wrong = refutation.wrong
+    tone = {"violated": "bad", "unknown": "open"}.get(refutation.status.value)
+    return tag(
+        "div",
+        tag("h3", f"{wrong.name}: {wrong.says} ({wrong.obligation})"),
+        tag("p", tag("span", refutation.outcome, cls=classes(tone))),
+        tag("p", f"reached: {refutation.bound}") if refutation.status.value == "unknown" else None,
+        _run(refutation),
+        cls="counter",
+    )
+
+
+def _run(refutation: Refutation) -> Markup | None:
+    if refutation.witness is None:
+        return None
+    return together(swimlanes(refutation.protocol, refutation.witness), tag("p", refutation.sentence, cls="outcome"))
