@@ -203,12 +203,13 @@ def explore_protocol(
     """
     protocol = protocol_net(split(net) if isinstance(net, Net) else net, variant, faults)
     limits = limits or Limits()
-    return Exploration(protocol, _space(protocol, budget or Budget(FIRST_MARKINGS), limits, budget is None), limits)
+    return Exploration(protocol, space_of(protocol, limits, budget), limits)
 
 
-def _space(protocol: ProtocolNet, budget: Budget, limits: Limits, diagram: bool) -> StateSpace[Any]:
-    graph = explore(protocol.net, budget=budget, deadline=limits.deadline)
-    if graph.complete or not diagram:
+def space_of(protocol: ProtocolNet, limits: Limits, budget: Budget | None = None) -> StateSpace[Any]:
+    """The configurations of a protocol, in a table or in a diagram as for `explore_protocol`."""
+    graph = explore(protocol.net, budget=budget or Budget(FIRST_MARKINGS), deadline=limits.deadline)
+    if graph.complete or budget is not None:
         return graph
     try:
         return explore_symbolically(protocol.net, limits, order=protocol.order)

@@ -23,13 +23,16 @@ a machine that is switched on once and then used stands still if its use does, t
 on. It stands still if from some configuration none of them ever fires again, though the central net could fire one.
 
 What is looked at first is M0. Whoever crashes may do so at once, and whatever can fire at all can fire from there; so
-what is stuck from there is kept back, and the central net is explored only for what is stuck from other markings alone.
+what does not fire where they are dead from the start is kept back, which a small exploration finds. Only for the others
+are configurations sought from which they never fire again, and the central net is explored only for those that are
+stuck from other markings than M0 alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
@@ -38,12 +41,13 @@ from firable.analysis.question import listed
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.decompose.protocol.completeness import CENTRAL_MARKINGS_MAX, carrying
 from firable.decompose.protocol.draft import COORDINATOR_DOWN, down
-from firable.decompose.protocol.exploring import Exploration, explore_protocol
+from firable.decompose.protocol.exploring import Exploration, explore_protocol, space_of
 from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL, Faults, Often
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import Holds
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Status, Verdict, Weight
+from firable.semantics.player import Player
 
 COORDINATOR = "coordinator"
 
@@ -114,21 +118,40 @@ def _outage(decomposition: Decomposition, who: str, limits: Limits) -> Outage:
 def _divided(found: Exploration, who: str) -> Outage:
     space, algebra = found.space, found.space.algebra
     after = space.satisfying(Holds(down(who) if who else COORDINATOR_DOWN))
-    at_once, stuck = list[str](), dict[str, Any]()
+    at_once, firable = list[str](), dict[str, Any]()
     for t, by in found.protocol.firing.items():
         where = algebra.disjunction(space.may_fire(i) for i in by)
         if not space.count(where):
             continue  # the central net does not fire it either
-        firing = algebra.conjunction([after, where])
-        if not space.count(firing):
+        firable[t] = algebra.conjunction([after, where])
+        if not space.count(firable[t]):
             at_once.append(t)
-        stuck[t] = algebra.conjunction([after, algebra.negation(space.backward(firing, after))])
-    commanding = _commanding(found.protocol.parts.net, stuck)
-    kept_back = _kept_back(found, stuck, [*((t,) for t in stuck), *commanding.values()])
-    at_last = tuple(t for t in stuck if (t,) in kept_back and t not in at_once)
-    goes_on = tuple(t for t in stuck if (t,) not in kept_back)
+    commanding = _commanding(found.protocol.parts.net, firable)
+    from_start = _firing_from_start(found, who)
+    kept_back, groups = set[tuple[str, ...]](), dict[tuple[str, ...], Any]()
+    stuck = cache(lambda t: algebra.conjunction([after, algebra.negation(space.backward(firable[t], after))]))
+    for some in dict.fromkeys([*((t,) for t in firable), *commanding.values()]):
+        if from_start.isdisjoint(some):
+            kept_back.add(some)
+        else:  # EF of one of them is the union of the EF of each
+            groups[some] = algebra.conjunction(stuck(t) for t in some)
+    kept_back |= _kept_back(found, groups)
+    at_last = tuple(t for t in firable if (t,) in kept_back and t not in at_once)
+    goes_on = tuple(t for t in firable if (t,) not in kept_back)
     still = tuple(machine for machine, some in commanding.items() if some in kept_back)
     return Outage(who, tuple(at_once), at_last, goes_on, still, tuple(m for m in commanding if m not in still))
+
+
+def _firing_from_start(found: Exploration, who: str) -> set[str]:
+    """The transitions that can fire where somebody crashes before anything else happens."""
+    net = found.protocol.net
+    crash = net.transition_index[f"crash/{who}" if who else "crash"]
+    start = Player(net).fire(net.initial_marking, (crash,))
+    places = tuple(replace(place, marked=bool(start >> i & 1)) for i, place in enumerate(net.places))
+    space = space_of(replace(found.protocol, net=replace(net, places=places)), found.limits)
+    space.require_complete()
+    fired = space.fired()
+    return {t for t, by in found.protocol.firing.items() if any(fired[i] for i in by)}
 
 
 def _commanding(net: Net, firing: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
@@ -142,18 +165,14 @@ def _commanding(net: Net, firing: Mapping[str, Any]) -> dict[str, tuple[str, ...
     return found
 
 
-def _kept_back(found: Exploration, stuck: Mapping[str, Any], groups: Sequence[tuple[str, ...]]) -> set[tuple[str, ...]]:
+def _kept_back(found: Exploration, stuck: Mapping[tuple[str, ...], Any]) -> set[tuple[str, ...]]:
     """The groups of transitions that the dead keep back: stuck, all of a group, where the central net could fire one.
 
-    `stuck` gives for each transition the configurations after the crash from which it never fires again. Raises
+    `stuck` gives for each group the configurations after the crash from which none of it ever fires again. Raises
     `IncompleteGraph` where the central net has to be explored and is too large.
     """
     net, space, algebra = found.protocol.parts.net, found.space, found.space.algebra
-    open_: dict[tuple[str, ...], Any] = {}
-    for some in groups:
-        together = algebra.conjunction(stuck[t] for t in some)  # EF of one of them is the union of the EF of each
-        if space.count(together):
-            open_[some] = together
+    open_ = {some: configurations for some, configurations in stuck.items() if space.count(configurations)}
     kept_back = set[tuple[str, ...]]()
 
     def look(marking: Marking, among: Sequence[tuple[str, ...]]) -> None:
