@@ -61,10 +61,11 @@ class Knowledge:
     `fires` are the transitions that it decides alone, `decides` its own arbitration groups; `votes` are its parts, each
     with the transition. `locks` are its places that a gate of a global transition reads, each with the transition:
     while it has promised, they stay as they are. `answers` are its signals in the same way, which it cannot lock (O4).
-    `undisturbing` are the parts that by the arcs take no other yes back and whose gates nothing here closes: one that
-    is persistent needs no promise (`firable.decompose.splitting.persistence`). It `coordinates` these transitions for
-    those under it, and `relays` those that are decided above it and in which one under it takes part: it asks them,
-    votes for them, and passes the order on. It `talks_to` the one above it and those under it, as far as it must.
+    `undisturbing` are the parts that take no other yes back, by the arcs and by the completions that they clear, and
+    whose gates nothing here closes: one that is persistent needs no promise
+    (`firable.decompose.splitting.persistence`). It `coordinates` these transitions for those under it, and `relays`
+    those that are decided above it and in which one under it takes part: it asks them, votes for them, and passes the
+    order on. It `talks_to` the one above it and those under it, as far as it must.
     """
 
     controller: str
@@ -146,7 +147,7 @@ def knowledge(decomposition: Decomposition) -> tuple[Knowledge, ...]:
 
 
 def undisturbing(decomposition: Decomposition) -> tuple[str, ...]:
-    """The parts that, by the arcs alone, take no other yes back, and whose gates nothing at their controller closes."""
+    """The parts that by the net alone take no other yes back, and whose gates nothing at their controller closes."""
     return tuple(part for one in knowledge(decomposition) for part in one.undisturbing)
 
 
@@ -231,12 +232,31 @@ def _keeping(subnet: Net) -> Callable[[Transition], bool]:
     for place in subnet.places:
         if place.completion is not None:
             senders.setdefault(place.completion, set()).add(place.name)
+    readers: dict[str, list[Transition]] = {signal: [] for signal in senders}
+    for t in subnet.transitions:
+        for signal in {gate.signal for gate in t.external} & readers.keys():
+            readers[signal].append(t)
+
+    def shows_what_it_clears(part: Transition) -> bool:
+        """Whether someone may read a completion that the part clears while its order is still on its way.
+
+        Not who needs an output place of it full, which is empty until then.
+        """
+        outputs = set(part.outputs)
+        cleared = {completion for place in part.outputs if (completion := subnet.place(place).completion) is not None}
+        return any(
+            t is not part and outputs.isdisjoint((*t.inputs, *t.permissive))
+            for signal in cleared
+            for t in readers[signal]
+        )
 
     def keeps(part: Transition) -> bool:
         alone = all(takers[p] == 1 for p in part.inputs) and all(putters[p] == 1 for p in part.outputs)
         inputs = set(part.inputs)
-        return alone and all(
-            gate.wanted and gate.signal in senders and senders[gate.signal] <= inputs for gate in part.external
+        return (
+            alone
+            and not shows_what_it_clears(part)
+            and all(gate.wanted and gate.signal in senders and senders[gate.signal] <= inputs for gate in part.external)
         )
 
     return keeps

@@ -1,7 +1,8 @@
 """Persistent parts: yes votes that no other transition can take back.
 
 The vote of a part is *persistent* if, once true, it stays true until its own transition fires: in no reachable marking
-of the central net, external gates free, does the yes stand while another transition that would falsify it is firable.
+of the central net, external gates free, does the yes stand while another transition that would falsify it is firable,
+be it by a place or by clearing a completion that the part waits for. What machines and sensors do to gates is O4.
 A stale yes of any other part is how the paper's own cell gives its robot a second task while it carries a part.
 
 The arcs and the units of the net decide most parts (`firable.decompose.splitting.votes`). What is left is a goal for
@@ -20,7 +21,9 @@ from the others, and the others from the order that comes late. `Persistence.fre
    reads them by a permissive gate, none puts on its outputs or reads them by an inhibitive gate. While the order is on
    its way the controller still shows the marking before it; then what votes there votes no more often than it may.
    Reachability is not enough here: the marking that the controller shows meanwhile, behind in one order and ahead in
-   another that overtook it, need not be the part of any reachable marking.
+   another that overtook it, need not be the part of any reachable marking. Nor does anyone read a completion signal
+   that it clears by sending a command, unless that one needs an output place of it full: until the order comes, the
+   signal still shows the completion of a command before, and the output place is empty.
 3. It asks no external gate but completions of commands on its own input places, which nothing at its controller can
    send anew while the yes stands: a promise would hold these back (O4).
 4. It belongs to a transition of its own: an order names its round, a round is asked anew only when the one before it
@@ -61,7 +64,7 @@ from firable.analysis.settling import Settling
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.spaces.space import StateSpace, WitnessError, Witnesses
 from firable.analysis.spaces.symbolic import explore_symbolically
-from firable.decompose.splitting.votes import Vote, votes
+from firable.decompose.splitting.votes import Vote, clears, votes
 from firable.decompose.splitting.walking import fallen
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import Formula, Not
@@ -302,6 +305,7 @@ class _Deciding:
         after = self.witnesses.play(before, [(last,)])
         full, empty = self.net.marking(vote.full), self.net.marking(vote.empty)
         stands, falls = before & full == full and not before & empty, after & full != full or after & empty
+        falls = falls or not vote.awaited.isdisjoint(clears(self.net, self.net.transitions[last]))
         if not stands or not falls:
             raise WitnessError(f"'{self.net.transitions[last].name}' does not take back the yes of '{vote.part}'")
         note = f"before the last firing '{vote.part}' votes yes, after it no"

@@ -1,10 +1,12 @@
 """Votes: what the yes of a part rests on, and which transitions could take it back, by the arcs alone.
 
-The yes of a part is Eq. (1) of it: some places of its controller are full (inputs, permissive gates), some are empty
-(outputs, inhibitive gates). Another transition *falsifies* it by taking a token from one of the full places or putting
-one on one of the empty places; whatever else it does, the yes stands. Gates of the other transition take no token, so
-reading never falsifies. So the transitions that could falsify a yes are found at its places, in time linear in their
-arcs, and most of them are cleared at once:
+The yes of a part is Eq. (1) and (2) of it: some places of its controller are full (inputs, permissive gates), some are
+empty (outputs, inhibitive gates), and its external gates are open. Another transition *falsifies* it by taking a token
+from one of the full places, by putting one on one of the empty places, or by sending a command anew whose completion
+the part waits for: entering a place clears its completion signal. Whatever else it does, the yes stands; that machines
+and sensors close a gate is no firing, but O4. Gates of the other transition take no token, so reading never falsifies.
+So the transitions that could falsify a yes are found at its places and at those of its completions, in time linear in
+their arcs, and most of them are cleared at once:
 
 - one that needs a place empty which the yes needs full, or the other way about, is never firable while the yes stands;
 - one that needs two places full, with the yes, of a *unit* (`firable.analysis.structure.cover`) that holds one token
@@ -38,6 +40,8 @@ FALSIFIERS_MAX: Final = 500
 class Vote:
     """The yes of a part: the places it needs `full` and `empty`, and the transitions that could falsify it.
 
+    `awaited` are the signals that it needs to be 1; those that are completions are cleared by sending their commands.
+
     `others` counts those that were not looked at because there are too many. `units` are the invariants, each with
     one token at most, that clear transitions which the arcs accuse: with them, and the rest of `accused`, nothing else
     can falsify the yes. `accused` are all that are not cleared by the yes itself.
@@ -52,6 +56,7 @@ class Vote:
     falsifiers: tuple[str, ...]
     others: int = 0
     units: tuple[Equation, ...] = ()
+    awaited: frozenset[str] = frozenset()
 
     @property
     def yes(self) -> tuple[Formula, ...]:
@@ -78,16 +83,29 @@ def needs(transition: Transition) -> tuple[frozenset[str], frozenset[str]]:
     return full, frozenset((*transition.outputs, *transition.inhibitive))
 
 
+def clears(net: Net, transition: Transition) -> frozenset[str]:
+    """The completion signals that a firing clears, as it sends their commands, and finds at 1 or may find so."""
+    sent = {net.place(place).completion for place in transition.outputs}
+    bare = {gate.signal for gate in transition.external if not gate.wanted}
+    return frozenset(signal for signal in sent if signal is not None and signal not in bare)
+
+
 def _accused(decomposition: Decomposition) -> Iterator[Vote]:
     net = decomposition.net
     subnets = {subnet.name: subnet for subnet in decomposition.subnets}
+    senders: dict[str, list[int]] = {}
+    for i, place in enumerate(net.places):
+        if place.completion is not None:
+            senders.setdefault(place.completion, []).append(i)
     required = [needs(transition) for transition in net.transitions]
     fires = [not full & empty and t.openable for t, (full, empty) in zip(net.transitions, required, strict=True)]
     for row in decomposition.coordinated:
         own = net.transition_index[row.name]
         for part in row.parts:
-            full, empty = needs(subnets[part.controller].transition(part.name))
-            vote = Vote(row.name, part.controller, part.name, full, empty, (), ())
+            own_part = subnets[part.controller].transition(part.name)
+            full, empty = needs(own_part)
+            awaited = frozenset(gate.signal for gate in own_part.external if gate.wanted)
+            vote = Vote(row.name, part.controller, part.name, full, empty, (), (), awaited=awaited)
             if full & empty:  # a self-loop: there is no yes
                 yield vote
                 continue
@@ -95,10 +113,13 @@ def _accused(decomposition: Decomposition) -> Iterator[Vote]:
                 *(net.consumers[net.place_index[p]] for p in full),
                 *(net.producers[net.place_index[p]] for p in empty),
             ]
-            if (n := sum(map(len, at))) > FALSIFIERS_MAX + len(at):
+            again = [net.producers[p] for signal in awaited for p in senders.get(signal, ())]
+            if (n := sum(map(len, (*at, *again)))) > FALSIFIERS_MAX + len(at):
                 yield replace(vote, others=n)
                 continue
-            touching = sorted({u for some in at for u in some if u != own and fires[u]})
+            found = {u for some in at for u in some}
+            found |= {u for some in again for u in some if not awaited.isdisjoint(clears(net, net.transitions[u]))}
+            touching = sorted(u for u in found if u != own and fires[u])
             accused = tuple(
                 net.transitions[u].name
                 for u in touching

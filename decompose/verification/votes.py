@@ -1,7 +1,9 @@
 """Which votes are persistent, judged anew: by the arcs, or by what a document shows of the accused.
 
-The yes of a part needs some places full and some empty (Eq. 1). Another transition can take it back only by taking a
-token from one of the former or putting one on one of the latter, and only if it can be firable while the yes stands.
+The yes of a part needs some places full and some empty (Eq. 1), and some signals at 1 (Eq. 2). Another transition can
+take it back only by taking a token from one of the first, by putting one on one of the second, or by entering a place
+whose completion is one of the third, which it does not itself need to be 0; and only if it can be firable while the yes
+stands. What machines do to a gate is no transition.
 Where there is no such transition the verdict is shown by the arcs. Otherwise the question is whether a marking can be
 reached in which the yes stands and one of the accused is firable; the claim of a document must be exactly that.
 """
@@ -34,12 +36,17 @@ def votes(decomposition: Decomposition, formulas: Formulas) -> dict[str, Vote]:
     net = decomposition.net
     subnet = {subnet.name: subnet for subnet in decomposition.subnets}
     takers, givers = _at_places(net, "inputs"), _at_places(net, "outputs")
+    clearers = _clearers(net)
     found = {}
     for row in decomposition.coordinated:
         for part in row.parts:
-            full, empty = _needs(subnet[part.controller].transition(part.name))
+            voted = subnet[part.controller].transition(part.name)
+            full, empty = _needs(voted)
             touching = {name for place in full for name in takers.get(place, ())}
             touching |= {name for place in empty for name in givers.get(place, ())}
+            for gate in voted.external:
+                if gate.wanted:
+                    touching |= clearers.get(gate.signal, set())
             others = sorted(touching - {row.name}, key=net.transition_index.__getitem__)
             accused = [name for name in others if _can_take_back(net.transition(name), full, empty)]
             stands = [formulas.literal(place, place in full) for place in (*sorted(full), *sorted(empty))]
@@ -55,6 +62,17 @@ def _at_places(net: Net, kind: str) -> dict[str, list[str]]:
     for t in net.transitions:
         for place in getattr(t, kind):
             found.setdefault(place, []).append(t.name)
+    return found
+
+
+def _clearers(net: Net) -> dict[str, set[str]]:
+    """The transitions that clear each completion signal, and do not need it cleared."""
+    completion = {place.name: place.completion for place in net.places if place.completion is not None}
+    found: dict[str, set[str]] = {}
+    for t in net.transitions:
+        for signal in {completion[place] for place in t.outputs if place in completion}:
+            if not any(gate.signal == signal and not gate.wanted for gate in t.external):
+                found.setdefault(signal, set()).add(t.name)
     return found
 
 
