@@ -29,8 +29,8 @@ from firable.cli.report import Report
 def bundle(net: str, output: str, page: str | None, format_: str, **limits: Any) -> int:
     """Check NET, split it, prove the split, and write subnets, table, verdicts and evidence as one sealed file.
 
-    Nothing is written unless everything that the net must prove is proved. `firable run` refuses a bundle of which any
-    byte was changed.
+    Nothing is written unless everything that the net must prove is proved, and evidence on it was found. `firable run`
+    refuses a bundle of which any byte was changed.
     """
     if output == "-":
         raise click.UsageError("a bundle cannot go to standard output, where the report goes: name a file")
@@ -39,18 +39,21 @@ def bundle(net: str, output: str, page: str | None, format_: str, **limits: Any)
 
 def _report(argument: str, output: str, limits: dict[str, Any]) -> Report:
     from firable.analysis.check import check
-    from firable.decompose.bundling import make_bundle
+    from firable.analysis.deadline import Deadline
+    from firable.analysis.goal import Limits
+    from firable.decompose.bundling import SECONDS, make_bundle
     from firable.nets.bundle import write_bundle
     from firable.nets.verdict import Status, overall
 
     loaded = load_net(argument)
-    net = loaded.net
+    net, allowed = loaded.net, budget(**limits)
     with loaded.placing():
-        found = check(net, budget=budget(**limits))
+        found = check(net, budget=allowed)
     if overall(found.verdicts) is not Status.PROVED:
         return Report("bundle", argument, net, found.verdicts, figures=found.figures.to_json(), notes=loaded.notes)
+    seconds = SECONDS if allowed.seconds is None else allowed.seconds
     with loaded.placing():
-        made = make_bundle(found)
+        made = make_bundle(found, Limits(Deadline.after(seconds), allowed.memory_bytes))
     write_bundle(output, made)
     return Report(
         "bundle",

@@ -10,6 +10,7 @@ the bundle can be checked again without anything that made it (`firable.decompos
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -34,10 +35,12 @@ SECONDS: Final = 30.0
 def make_bundle(report: CheckReport, limits: Limits | None = None, *, timeout_ms: int = TIMEOUT_MS) -> Bundle:
     """Split the net of a report, prove the decomposition and bundle both with all verdicts and their evidence.
 
-    `limits` are for the evidence on the verdicts of the report: what it cannot show in that time is only claimed, and
-    `firable verify` will say so. Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the
-    report is not that of exploring this net by interleaving, which is how it will be executed, and for everything that
-    must be proved and is not.
+    `limits` are for the evidence on the verdicts of the report: what it cannot show in that time is only claimed.
+    `firable verify` will say so of a warning; a verdict that is required is no reason to run without evidence.
+
+    Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the report is not that of exploring
+    this net by interleaving, which is how it will be executed, and for everything that must be proved and is not, or
+    is not shown.
     """
     if report.net != report.space.net:
         message = f"the verdicts are on another net than '{report.net.name}'"
@@ -55,5 +58,15 @@ def make_bundle(report: CheckReport, limits: Limits | None = None, *, timeout_ms
     files = {EVIDENCE: document.to_text(), **proof.files, **shown}
     bundle = Bundle(decomposition, verdicts, files)
     if problems := unproved(bundle):
-        raise InputError(replace(problem, code="F4003") for problem in problems)
+        lacking = {record.name: record.lacking for record in document.records if record.proved and record.lacking}
+        raise InputError(_unbundled(problem, lacking) for problem in problems)
     return bundle
+
+
+def _unbundled(problem: Diagnostic, lacking: Mapping[str, str]) -> Diagnostic:
+    """What keeps a bundle from running, said to who makes it."""
+    name = problem.subject[-1]
+    if name not in lacking:
+        return replace(problem, code="F4003")
+    message = f"'{name}' is proved, and there is no evidence that shows it again: {lacking[name]}"
+    return replace(problem, code="F4003", message=message, hint="allow more time to look for it, with --max-seconds")

@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.evidence_names import named_as_proved
 from firable.nets.joining import join
 from firable.nets.layers import Layers
 from firable.nets.net import Net, Transition
@@ -85,15 +86,15 @@ def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
     """What keeps a bundle from running (F5002): nothing where every required verdict is PROVED, with its evidence.
 
     Required is what the net requires, and whatever else a verdict of the bundle says that it does. Verdicts on the net
-    must be on interleaving, by which it is executed; obligations must bring what another solver can check; and the
-    subnets must join into the very net.
+    must be on interleaving, by which it is executed, and a document of evidence must have a record on each; obligations
+    must bring what another solver can check; and the subnets must join into the very net.
     """
     problems = []
     on_the_net = set(_required_of_the_net(bundle.net))
-    obligations = set(required_verdicts(bundle.decomposition)) - on_the_net
     by_name: dict[str, list[Verdict]] = {}
     for verdict in bundle.verdicts:
         by_name.setdefault(verdict.name, []).append(verdict)
+    shown = _documents(bundle, {file for verdict in bundle.verdicts if verdict.holds for file in verdict.evidence})
     stated = (verdict.name for verdict in bundle.verdicts if verdict.weight is Weight.REQUIRED)
     for name in dict.fromkeys((*required_verdicts(bundle.decomposition), *stated)):
         if name not in by_name:
@@ -109,8 +110,11 @@ def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
                 proved_of = f"'{name}' is proved of the discipline '{verdict.discipline}'"
                 message = f"{proved_of}, and the net is executed by {EXECUTED_BY}"
                 problems.append(Diagnostic("F5002", message, _REMEDY, subject))
-            elif name in obligations and not verdict.evidence:
+            elif not verdict.evidence:
                 message = f"'{name}' is said to be proved, without evidence"
+                problems.append(Diagnostic("F5002", message, _REMEDY, subject))
+            elif name in on_the_net and not any(name in shown.get(file, (name,)) for file in verdict.evidence):
+                message = f"the evidence that '{name}' names has no record of its being proved of this net"
                 problems.append(Diagnostic("F5002", message, _REMEDY, subject))
             for file in verdict.evidence:
                 if file not in bundle.evidence:
@@ -120,6 +124,14 @@ def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
         message = "the subnets do not make the net together, of which the verdicts are"
         problems.append(Diagnostic("F5002", message, _REMEDY, ("subnets",)))
     return (*problems, *_undecided_conflicts(bundle.decomposition))
+
+
+def _documents(bundle: Bundle, files: set[str]) -> dict[str, frozenset[str]]:
+    """The verdicts that each document of evidence speaks of as proved; obligations are no such document."""
+    return {
+        file: frozenset() if file.endswith(".smt2") else named_as_proved(bundle.evidence[file], bundle.net, EXECUTED_BY)
+        for file in sorted(files & set(bundle.evidence))
+    }
 
 
 def _joins(decomposition: Decomposition) -> bool:

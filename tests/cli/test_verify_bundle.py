@@ -10,6 +10,7 @@ from typing import Any
 import jsonschema
 import pytest
 
+from firable.analysis.evidence.document import document_from_text
 from firable.cli.main import main
 from firable.nets.bundle import read_bundle, write_bundle
 
@@ -74,15 +75,29 @@ def test_a_bundle_that_was_edited_and_sealed_anew_is_refused(
     assert "hint: make the bundle anew" in told
 
 
-def test_a_bundle_without_evidence_on_its_net_is_only_claimed(
+def test_a_bundle_without_evidence_on_its_net_is_refused_and_not_run(
     bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     whole = read_bundle(bundle)
     kept = {file: text for file, text in whole.evidence.items() if file.endswith(".smt2")}
     bare = tuple(replace(v, evidence=tuple(f for f in v.evidence if f in kept)) for v in whole.verdicts)
     write_bundle(tmp_path / "bare", replace(whole, verdicts=bare, evidence=kept))
+    for command in ("verify", "run"):
+        assert main([command, str(tmp_path / "bare")]) == 2
+        assert "'deadlock-free' is said to be proved, without evidence" in capsys.readouterr().err
+
+
+def test_a_warning_that_nothing_shows_is_only_claimed(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole, file = read_bundle(bundle), "check.evidence.json"
+    document = document_from_text(whole.evidence[file], file)
+    records = tuple(replace(r, shown=(), lacking="no time") if r.name == "live" else r for r in document.records)
+    bare = tuple(replace(v, evidence=()) if v.name == "live" else v for v in whole.verdicts)
+    text = replace(document, records=records).to_text()
+    write_bundle(tmp_path / "bare", replace(whole, verdicts=bare, evidence={**whole.evidence, file: text}))
     assert main(["verify", str(tmp_path / "bare")]) == 3
-    assert "? claimed   deadlock-free" in capsys.readouterr().out
+    assert "? claimed   live" in capsys.readouterr().out
 
 
 def test_no_time_at_all_refutes_nothing(bundle: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,6 @@
 """The obligations hold for every split, are refuted for every edited one, and other solvers agree."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, product
 from typing import Any
@@ -13,6 +13,9 @@ from support.reference import load_net
 from support.second_solver import by_cvc5
 
 from firable.analysis.check import check
+from firable.analysis.evidence.document import Document
+from firable.analysis.evidence.producing.producer import evidence_of_report
+from firable.analysis.goal import Limits
 from firable.analysis.induction.smt import Answer, Decision, Terms, value
 from firable.analysis.report import CheckReport
 from firable.decompose.bundling import make_bundle
@@ -36,6 +39,7 @@ from firable.nets.net import (
     SignalKind,
     Transition,
 )
+from firable.nets.queries import Query
 from firable.nets.right_to_run import CHECKED, required_verdicts, unproved
 from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.arbitration import Arbitration
@@ -422,6 +426,22 @@ def test_net_with_anything_unproved_is_not_bundled() -> None:
         not_bundled(replace(report, verdicts=verdicts))
     lost = tuple(replace(verdict, evidence=("lost.smt2",)) for verdict in report.verdicts)
     assert "evidence" in not_bundled(replace(report, verdicts=lost))
+
+
+def test_net_is_not_bundled_where_no_evidence_on_it_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def without(report: CheckReport, queries: Sequence[Query], limits: Limits) -> Document:
+        document = evidence_of_report(report, queries, limits)
+        lacking = {"deadlock-free", "live"}  # of which the one is required
+        records = (replace(r, shown=(), lacking="no time") if r.name in lacking else r for r in document.records)
+        return replace(document, records=tuple(records))
+
+    monkeypatch.setattr("firable.decompose.bundling.evidence_of_report", without)
+    with pytest.raises(InputError) as refusal:
+        make_bundle(check(catalogue_net("one_robot")))
+    (one,) = refusal.value.diagnostics
+    assert (one.code, one.subject) == ("F4003", ("verdicts", "deadlock-free"))
+    assert one.message == "'deadlock-free' is proved, and there is no evidence that shows it again: no time"
+    assert "--max-seconds" in one.hint
 
 
 def test_deadlocking_net_is_not_bundled_with_the_verdicts_on_a_good_one() -> None:

@@ -11,7 +11,7 @@ from support.bundle_mutants import decomposition_mutants, evidence_mutants, line
 
 from firable.analysis.check import check
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
-from firable.analysis.evidence.document import Document
+from firable.analysis.evidence.document import Document, document_from_text
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.families import FAMILIES
 from firable.decompose.proofs.proving import prove
@@ -358,14 +358,33 @@ def test_a_solver_that_cannot_read_a_file_says_so() -> None:
             answers("(assert nothing)", 1000)
 
 
-def test_a_bundle_without_documents_is_only_claimed() -> None:
+def test_a_bundle_without_documents_is_refused() -> None:
     bundle = bundled("conceptual_one_robot")
     kept = {file: text for file, text in bundle.evidence.items() if file.endswith(".smt2")}
     bare = tuple(replace(v, evidence=tuple(f for f in v.evidence if f in kept)) for v in bundle.verdicts)
-    checked = check_bundle(replace(bundle, verdicts=bare, evidence=kept))
-    claimed = {one.verdict.name for one in checked if not one.shown}
-    assert {"deadlock-free", "live", "contact-free"} <= claimed
-    assert not [name for name in claimed if name.startswith(("eq7.", "o3."))]
+    with pytest.raises(InputError, match="'deadlock-free' is said to be proved, without evidence"):
+        check_bundle(replace(bundle, verdicts=bare, evidence=kept))
+
+
+def without_evidence_on(bundle: Bundle, *names: str) -> Bundle:
+    """The bundle with nothing to show what these verdicts on its net say."""
+    file = "check.evidence.json"
+    document = document_from_text(bundle.evidence[file], file)
+    records = tuple(replace(r, shown=(), lacking="no time") if r.name in names else r for r in document.records)
+    text = replace(document, records=records).to_text()
+    verdicts = tuple(replace(v, evidence=()) if v.name in names else v for v in bundle.verdicts)
+    return replace(bundle, verdicts=verdicts, evidence={**bundle.evidence, file: text})
+
+
+def test_a_warning_without_evidence_is_only_claimed_and_a_demand_refused() -> None:
+    bundle = bundled("conceptual_one_robot")
+    checked = check_bundle(without_evidence_on(bundle, "live", "reversible"))
+    assert {one.verdict.name: one.only_claimed for one in checked if not one.shown} == {
+        "live": "only claimed: no time",
+        "reversible": "only claimed: no time",
+    }
+    with pytest.raises(InputError, match="F5002"):
+        check_bundle(without_evidence_on(bundle, "quasi-live"))
 
 
 def test_an_unproved_bundle_is_refused_for_that() -> None:

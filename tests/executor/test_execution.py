@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from support.evidence_names import document_naming
 from support.owned_nets import owned_net
 
 from firable.decompose.splitting.cut import split
@@ -469,12 +470,12 @@ def test_command_order_of_a_wrong_net_crashes_in_the_cell() -> None:
 
 def proved_bundle(cell: str = "one_robot") -> Bundle:
     decomposition = decomposition_of(cell)
-    names = dict.fromkeys(required_verdicts(decomposition))
+    names = tuple(dict.fromkeys(required_verdicts(decomposition)))
     verdicts = (
         Verdict(name, Status.PROVED, "holds", "by hand", evidence=("file",), discipline="interleaving")
         for name in names
     )
-    return Bundle(decomposition, tuple(verdicts), {"file": "unsat"})
+    return Bundle(decomposition, tuple(verdicts), {"file": document_naming(decomposition.net, names)})
 
 
 def test_proved_bundle_is_loaded_and_run(tmp_path: Path) -> None:
@@ -505,6 +506,18 @@ def test_bundle_without_a_verdict_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError) as refusal:
         load(tmp_path / "cell.bundle")
     assert {problem.code for problem in refusal.value.diagnostics} == {"F5002"}
+
+
+def test_bundle_with_no_evidence_that_its_net_has_no_deadlock_is_not_run(tmp_path: Path) -> None:
+    """The deadlocking cell, with every verdict called proved, all but one with evidence."""
+    bundle = proved_bundle("one_robot_mc_late")
+    others = tuple(v.name for v in bundle.verdicts if v.name != "deadlock-free")
+    bare = tuple(replace(v, evidence=()) if v.name == "deadlock-free" else v for v in bundle.verdicts)
+    for verdicts, text in ((bare, bundle.evidence["file"]), (bundle.verdicts, document_naming(bundle.net, others))):
+        write_bundle(tmp_path / "cell.bundle", replace(bundle, verdicts=verdicts, evidence={"file": text}))
+        with pytest.raises(InputError) as refusal:
+            load(tmp_path / "cell.bundle")
+        assert [(d.code, d.subject) for d in refusal.value.diagnostics] == [("F5002", ("verdicts", "deadlock-free"))]
 
 
 def test_changed_bundle_is_refused(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from io import BytesIO
 from pathlib import Path
 
 import pytest
+from support.evidence_names import document_naming
 
 from firable.nets.archive import ArchiveError, pack, unpack
 from firable.nets.bundle import Bundle, file_stem, read_bundle, write_bundle
@@ -44,13 +45,14 @@ DECOMPOSITION = Decomposition(
     (ArbitrationGroup("next", ("l", "G"), (), ArbitrationRule.PRIORITY),),
 )
 ON_THE_NET = (*CHECKED, "property.apart")
+DOCUMENT = document_naming(NET, ON_THE_NET)
 VERDICTS = tuple(
-    Verdict(name, Status.PROVED, "it holds", "by hand", discipline="interleaving")
+    Verdict(name, Status.PROVED, "it holds", "by hand", evidence=("check.evidence.json",), discipline="interleaving")
     if name in ON_THE_NET
     else Verdict(name, Status.PROVED, "it holds", "by hand", evidence=("eq7-G.smt2",))
     for name in required_verdicts(DECOMPOSITION)
 )
-BUNDLE = Bundle(DECOMPOSITION, VERDICTS, {"eq7-G.smt2": "(check-sat)\n"})
+BUNDLE = Bundle(DECOMPOSITION, VERDICTS, {"eq7-G.smt2": "(check-sat)\n", "check.evidence.json": DOCUMENT})
 
 
 def refused(archive: bytes) -> bool:
@@ -82,7 +84,15 @@ def test_any_zip_tool_opens_a_bundle() -> None:
     with zipfile.ZipFile(BytesIO(BUNDLE.to_bytes())) as archive:
         assert archive.testzip() is None
         assert archive.namelist() == [
-            *("evidence/eq7-G.smt2", "manifest.json", "net.json", "split.json", "subnets/a.json", "subnets/b.json"),
+            *(
+                "evidence/check.evidence.json",
+                "evidence/eq7-G.smt2",
+                "manifest.json",
+                "net.json",
+                "split.json",
+                "subnets/a.json",
+                "subnets/b.json",
+            ),
             *("table.json", "verdicts.json"),
         ]
         assert archive.read("evidence/eq7-G.smt2") == b"(check-sat)\n"
@@ -331,7 +341,35 @@ def test_proof_without_its_evidence_is_none() -> None:
     assert {d.code for d in missing} == {"F5002"}
     assert {d.subject[1] for d in missing} == {v.name for v in VERDICTS if v.evidence}
     bare = unproved(replace(BUNDLE, verdicts=tuple(replace(v, evidence=()) for v in VERDICTS)))
-    assert {d.subject[1] for d in bare} == {v.name for v in VERDICTS if v.evidence}
+    assert {d.subject[1] for d in bare} == {v.name for v in VERDICTS}
+
+
+@pytest.mark.parametrize("name", ON_THE_NET)
+@pytest.mark.parametrize(
+    "text",
+    [
+        document_naming(NET, ()),
+        document_naming(NET, ON_THE_NET, status="violated"),
+        document_naming(NET, ON_THE_NET, lacking="the time was over"),
+        document_naming(NET, ON_THE_NET, discipline="step"),
+        document_naming(NET, ON_THE_NET, version=1),
+        document_naming(replace(NET, places=(replace(P, marked=False), Q, R)), ON_THE_NET),
+        *("", "[]", "(check-sat)", '{"verdicts": 7}'),
+    ],
+)
+def test_a_verdict_on_the_net_of_which_its_evidence_has_no_record_gives_no_right_to_run(name: str, text: str) -> None:
+    evidence = {**BUNDLE.evidence, "other.evidence.json": text}
+    verdicts = tuple(replace(v, evidence=("other.evidence.json",)) if v.name == name else v for v in VERDICTS)
+    found = unproved(replace(BUNDLE, verdicts=verdicts, evidence=evidence))
+    assert [(d.code, d.subject) for d in found] == [("F5002", ("verdicts", name))]
+    assert "has no record" in found[0].message
+
+
+def test_an_obligation_is_no_evidence_on_the_net() -> None:
+    evidence = {"eq7-G.smt2": DOCUMENT, "check.evidence.json": DOCUMENT}
+    verdicts = tuple(replace(v, evidence=("eq7-G.smt2",)) if v.name == "deadlock-free" else v for v in VERDICTS)
+    found = unproved(replace(BUNDLE, verdicts=verdicts, evidence=evidence))
+    assert [d.subject for d in found] == [("verdicts", "deadlock-free")]
 
 
 @pytest.mark.parametrize("name", ON_THE_NET)
