@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -15,7 +16,7 @@ from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import persistence
 from firable.nets.diagnostics import InputError
 from firable.nets.knowledge import undisturbing
-from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
 
 SMALL = ["local_conflict", "local_gate", "local_output_conflict", "no_trouble", "read_before_order", "remote_gate"]
 
@@ -86,3 +87,28 @@ def test_an_order_that_overtakes_needs_the_promise_though_no_reachable_marking_d
     assert "t1-11" not in found.free_of_promise
     assert goes_wrong(net, ("t1-11",))
     assert not goes_wrong(net, found.free_of_promise)
+
+
+def test_a_part_that_clears_a_completion_which_another_reads_must_promise() -> None:
+    """`v` waits for the completion of `a.x`: before the order of the second `G` comes, it sees that of the first."""
+    done = (ExternalGate("a.at"),)
+    bare = of(
+        (
+            Transition("G", ("a.p", "b.p"), ("a.x", "b.q")),
+            Transition("H", ("a.x", "b.q"), ("a.p", "b.p")),
+            Transition("v", ("a.y",), ("a.z",)),
+        ),
+        "a.p b.p a.y",
+    )
+    sends = {"a.x": Place("a.x", "a", command=Command("A", "GO"), completion="a.at")}
+    places = tuple(sends.get(place.name, place) for place in bare.places)
+    start, end, reader = bare.transitions
+    crossing = (start, replace(end, external=done))
+    for reads in ((), ("a.x",)):
+        v = replace(reader, permissive=reads, external=done)
+        signals = (Signal("a.at", "a", SignalKind.COMPLETION),)
+        net = replace(bare, places=places, transitions=(*crossing, v), signals=signals)
+        free = persistence(split(net)).free_of_promise
+        assert ("t1-11" in free) == bool(reads)
+        assert goes_wrong(net, ("t1-11",)) == (not reads)
+        assert not goes_wrong(net, free)

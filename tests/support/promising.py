@@ -2,7 +2,11 @@
 
 A controller votes on what its own places show; the coordinator decides by the votes of one round; orders come late, and
 overtake each other. Parts in `free` vote without a promise. The central net fires with each decision and each local
-firing: where it cannot follow, or an order cannot be applied, the run is wrong. External gates are free.
+firing: where it cannot follow, or an order cannot be applied, the run is wrong.
+
+A completion is a bit beside the places: a firing that sends a command clears it, at its controller when it is applied
+and in the central net at once, and a machine sets it while a place that waits for it is full, which tells the central
+net nothing of a command still to be sent. Sensors are free.
 """
 
 from __future__ import annotations
@@ -12,7 +16,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from firable.nets.decomposition import Decomposition
-from firable.nets.net import Marking, Transition
+from firable.nets.net import Marking, SignalKind, Transition
 
 Part = tuple[int, int]
 """A coordinated transition, and one of its parts, by their numbers."""
@@ -32,24 +36,31 @@ class Situation:
 
 @dataclass(frozen=True, slots=True)
 class Sets:
-    """The places of a part, or of a local transition, as masks; `reads` holds all of them."""
+    """The places and completions of a part, or of a local transition, as masks; `reads` holds all of them."""
 
     controller: str
     full: Marking
     empty: Marking
     inputs: Marking
     outputs: Marking
+    clears: Marking
 
     @property
     def reads(self) -> Marking:
-        return self.full | self.empty
+        return self.full | self.empty | self.clears
+
+    @property
+    def writes(self) -> Marking:
+        return self.inputs | self.outputs | self.clears
 
     def firable(self, marking: Marking) -> bool:
         return marking & self.full == self.full and not marking & self.empty
 
     def disturbs(self, other: Sets) -> bool:
-        writes, others = self.inputs | self.outputs, other.inputs | other.outputs
-        return bool(writes & other.reads or others & self.reads)
+        return bool(self.writes & other.reads or other.writes & self.reads)
+
+    def fire(self, marking: Marking) -> Marking:
+        return marking & ~(self.inputs | self.clears) | self.outputs
 
 
 class Promising:
@@ -59,6 +70,16 @@ class Promising:
         self.net = decomposition.net
         self.rows = decomposition.coordinated
         self.free = free
+        self.completion = {
+            signal.name: 1 << len(self.net.places) + i
+            for i, signal in enumerate(self.net.signals)
+            if signal.kind is SignalKind.COMPLETION
+        }
+        waiting = dict[str, set[str]]()
+        for place in self.net.places:
+            if place.completion is not None:
+                waiting.setdefault(place.completion, set()).add(place.name)
+        self.waiting = [(self.completion[signal], self.net.marking(names)) for signal, names in waiting.items()]
         group_of = {name: i for i, g in enumerate(decomposition.groups) for name in (*g.sequence, *g.rest)}
         self.group = [group_of.get(row.name, -1 - i) for i, row in enumerate(self.rows)]
         self.whole = [self.sets("", self.net.transition(row.name)) for row in self.rows]
@@ -78,13 +99,16 @@ class Promising:
         ]
 
     def sets(self, controller: str, t: Transition) -> Sets:
-        mark = self.net.marking
+        mark, bit = self.net.marking, self.completion
+        gates = [gate for gate in t.external if gate.signal in bit]
+        sent = {self.net.place(name).completion for name in t.outputs}
         return Sets(
             controller,
-            mark({*t.inputs, *t.permissive}),
-            mark({*t.outputs, *t.inhibitive}),
+            mark({*t.inputs, *t.permissive}) | sum({bit[gate.signal] for gate in gates if gate.wanted}),
+            mark({*t.outputs, *t.inhibitive}) | sum({bit[gate.signal] for gate in gates if not gate.wanted}),
             mark(t.inputs),
             mark(t.outputs),
+            sum(bit[signal] for signal in sent if signal is not None),
         )
 
     def of(self, part: Part) -> Sets:
@@ -119,16 +143,21 @@ class Promising:
         for part in now.ordered:
             sets = self.of(part)
             fits = now.local & sets.inputs == sets.inputs and not now.local & sets.outputs
-            after = now.local & ~sets.inputs | sets.outputs
-            left = replace(now, local=after, ordered=now.ordered - {part}, promised=now.promised - {part})
+            left = replace(
+                now, local=sets.fire(now.local), ordered=now.ordered - {part}, promised=now.promised - {part}
+            )
             yield left if fits else None
         for part in now.stopped:
             yield replace(now, stopped=now.stopped - {part}, promised=now.promised - {part})
         for sets in self.local:
             if sets.firable(now.local) and not self.held(now, sets, None):
-                after = now.local & ~sets.inputs | sets.outputs
-                central = now.central & ~sets.inputs | sets.outputs
-                yield replace(now, local=after, central=central) if sets.firable(now.central) else None
+                local, central = sets.fire(now.local), sets.fire(now.central)
+                yield replace(now, local=local, central=central) if sets.firable(now.central) else None
+        for bit, places in self.waiting:
+            latched = any(self.of(part).reads & bit for part in now.promised)
+            if now.local & places and not now.local & bit and not latched:
+                stale = any(self.of(part).clears & bit for part in now.ordered)
+                yield replace(now, local=now.local | bit, central=now.central if stale else now.central | bit)
 
     def decided(self, now: Situation, t: int, every: frozenset[Part]) -> Situation | None:
         whole = self.whole[t]
@@ -137,7 +166,7 @@ class Promising:
         others = frozenset(part for part in now.promised if self.group[part[0]] == self.group[t] and part not in every)
         return replace(
             now,
-            central=now.central & ~whole.inputs | whole.outputs,
+            central=whole.fire(now.central),
             heard=frozenset(part for part in now.heard if self.group[part[0]] != self.group[t]),
             ordered=now.ordered | every,
             stopped=now.stopped | others,
