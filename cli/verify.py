@@ -152,7 +152,7 @@ def _told(verdict: Verdict, method: str, only_claimed: str, *, shown: bool) -> V
     """What is said of a verdict of a bundle."""
     from firable.nets.verdict import Status, Verdict
 
-    violated = "" if verdict.holds else "it is violated: "
+    violated = "it is violated: " if verdict.status is Status.VIOLATED else ""
     return Verdict(
         verdict.name,
         Status.PROVED if shown else Status.UNKNOWN,

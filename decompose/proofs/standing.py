@@ -13,8 +13,9 @@ from typing import Final
 
 from firable.decompose.proofs.assumptions import assumptions
 from firable.decompose.proofs.families import FAMILIES
-from firable.decompose.proofs.family import proved_of
+from firable.decompose.proofs.family import Kind, proved_of
 from firable.nets.decomposition import Decomposition
+from firable.nets.right_to_run import required_verdicts
 from firable.nets.verdict import Status, Verdict, overall
 
 SAYS: Final = {
@@ -40,6 +41,12 @@ OTHERWISE: Final = {
     "O9": ("not claimed", "what is proved is the equivalence of interleaving"),
 }
 """The status of an obligation that no family proves, and of whom it is assumed."""
+
+
+ASSUMED_BY_THE_PROTOCOL: Final = frozenset(
+    ("ownership", "o3", "eq7", "eq8", "eq9-10", "initial-marking", "commands"),
+)
+"""The families that prove of a split what the protocol proof assumes of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,9 +79,25 @@ def standing(decomposition: Decomposition, verdicts: Iterable[Verdict]) -> Itera
         found = overall(verdict for family in families for verdict in proved_of(family, given))
         kinds = list(dict.fromkeys(family.kind.value for family in families))
         by = ", ".join(family.title for family in families)
+        if any(family.kind is Kind.PROTOCOL for family in families) and (
+            doubted := list(_doubted(decomposition, given))
+        ):
+            found = found if found is Status.VIOLATED else Status.UNKNOWN
+            by += f", which assumes of the split what is not proved here: {', '.join(doubted)}"
         if name == "O8":  # what is proved is the table
             by += "; a run is in one layer, so that no coordinator keeps locks for others"
         yield Standing(name, says, " and ".join(kinds) if found is Status.PROVED else found.value, by)
+
+
+def _doubted(decomposition: Decomposition, given: Iterable[Verdict]) -> Iterator[str]:
+    """The titles of the families that stand in for what the protocol proof assumes, as far as they are not proved."""
+    verdicts = list(given)
+    held = {verdict.name for verdict in verdicts if verdict.holds}
+    held -= {verdict.name for verdict in verdicts if not verdict.holds}
+    demanded = [name for name in required_verdicts(decomposition) if name not in held]
+    for family in FAMILIES:
+        if family.name in ASSUMED_BY_THE_PROTOCOL and any(name.partition(".")[0] == family.name for name in demanded):
+            yield family.title
 
 
 def _listed(name: str, decomposition: Decomposition) -> str:

@@ -8,10 +8,11 @@ them anew. So everything is derived a second time, by code that shares nothing w
    after every name (`restating`, `reading`, `obligations`);
 3. the theorem on the protocol must be the one that is published, and the second solver confirm it (`protocol`);
 4. the verdicts on the central net must be those that its documents of evidence show (`documents`);
-5. nothing is left over: no file that nobody needs, no verdict that nobody knows.
+5. nothing is left over: no file that nobody needs, no verdict that nobody knows; and nothing is left out: each verdict
+   that every net has is there, warnings too.
 
-There are three endings. Everything is shown; something is only claimed, since no evidence is on it or a solver gave up;
-or something says what is not so, and then the bundle is refused.
+There are three endings. Everything is shown; something is only claimed, since no evidence is on it, a solver gave up or
+it was left undecided; or something says what is not so, and then the bundle is refused.
 """
 
 from __future__ import annotations
@@ -28,13 +29,12 @@ from firable.decompose.verification.solvers import SOLVERS
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import InputError
 from firable.nets.right_to_run import unproved
-from firable.nets.verdict import Status
 
 TIMEOUT_MS: Final = 60_000
 
 
 def check_bundle(bundle: Bundle, *, solver: str = "cvc5", timeout_ms: int = TIMEOUT_MS) -> tuple[CheckedVerdict, ...]:
-    """Judge every verdict of a bundle that claims something, in their order; `timeout_ms` is for each question.
+    """Judge every verdict of a bundle, in their order; `timeout_ms` is for each question.
 
     Raises `InputError`: F5002 where a verdict that the net requires is not proved, F6002 where the bundle does not show
     what it claims, and `ModuleNotFoundError` where the solver is not installed. Takes time linear in the bundle, but
@@ -57,8 +57,7 @@ def _checked(bundle: Bundle, solver: str, timeout_ms: int) -> tuple[CheckedVerdi
     check_protocol(examination, solver, answers, timeout_ms)
     check_verdicts_on_the_net(examination, answers, timeout_ms)
     for verdict in list(examination.unjudged()):
-        if verdict.status is not Status.UNKNOWN:
-            raise NotShownError(f"nobody knows what '{verdict.name}' is on", "verdicts", verdict.name)
+        raise NotShownError(f"nobody knows what '{verdict.name}' is on", "verdicts", verdict.name)
     if unused := sorted(set(bundle.evidence) - examination.used):
         raise NotShownError(f"no verdict rests on '{unused[0]}'", "evidence", unused[0])
-    return tuple(examination.checked[v.name] for v in bundle.verdicts if v.name in examination.checked)
+    return tuple(examination.checked[verdict.name] for verdict in bundle.verdicts)

@@ -4,7 +4,8 @@ A document is checked as `firable verify` checks any: sequences played, markings
 Besides it must be about this very net, under interleaving, and the only spelling of itself; its obligations are
 answered by the solver that was asked for, too. Then verdicts and records are held against each other both ways: a
 verdict that a record shows otherwise is refused, and a record that no verdict speaks of as well. A verdict that no
-record shows is only claimed.
+record shows is only claimed, and so is one that was left undecided; one that is not there, though `check` gives it of
+every net, is missed.
 
 How a verdict was found, what that cost and the hint that it gives are told, not shown; nothing rests on them. Its
 witness is played.
@@ -26,7 +27,7 @@ from firable.decompose.verification.formulas import Formula, Formulas
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import Answers
 from firable.decompose.verification.votes import PREFIX, question_of, votes
-from firable.decompose.verification.words import sentence_of
+from firable.decompose.verification.words import SENTENCES, sentence_of
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula as StateFormula
 from firable.nets.interchange import net_digest
@@ -54,6 +55,8 @@ def check_verdicts_on_the_net(examination: Examination, answers: Answers, timeou
     for verdict in list(examination.unjudged()):
         if (words := sentence_of(examination.bundle.net, verdict.name)) is not None:
             _judge(examination, verdict, words, shown)
+    for name in (*SENTENCES, *(f"property.{prop.name}" for prop in examination.bundle.net.properties)):
+        examination.verdict(name)  # nobody takes a warning out unnoticed
     for name in shown.records:
         raise NotShownError(f"the evidence on '{name}' belongs to no verdict of the bundle", "evidence", name)
     for _, file in shown.questions.values():
@@ -152,8 +155,9 @@ def _by_record(
     if found is None:
         if verdict.evidence:
             raise NotShownError(f"the evidence that '{verdict.name}' names does not speak of it", *subject)
-        if verdict.status is not Status.UNKNOWN:
-            examination.judge(verdict, shown=False, method="nothing", only_claimed="only claimed: no evidence is on it")
+        undecided = verdict.status is Status.UNKNOWN
+        said = "undecided: the bundle itself does not say" if undecided else "only claimed: no evidence is on it"
+        examination.judge(verdict, shown=False, method="nothing", only_claimed=said)
         return
     one, file = found
     if verdict.status is not (Status.PROVED if proved else Status.VIOLATED):

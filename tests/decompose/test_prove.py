@@ -20,8 +20,10 @@ from firable.analysis.induction.smt import Answer, Decision, Terms, value
 from firable.analysis.report import CheckReport
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.arbitration import Competition, choice
+from firable.decompose.proofs.families import FAMILIES
 from firable.decompose.proofs.proving import ProofReport, prove
 from firable.decompose.proofs.script import Reader, ScriptError
+from firable.decompose.proofs.standing import ASSUMED_BY_THE_PROTOCOL, standing
 from firable.decompose.splitting.cut import split
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_names, catalogue_net
@@ -426,6 +428,27 @@ def test_net_with_anything_unproved_is_not_bundled() -> None:
         not_bundled(replace(report, verdicts=verdicts))
     lost = tuple(replace(verdict, evidence=("lost.smt2",)) for verdict in report.verdicts)
     assert "evidence" in not_bundled(replace(report, verdicts=lost))
+
+
+def protocol_lines(decomposition: Decomposition, verdicts: Iterable[Verdict]) -> list[tuple[str, str]]:
+    return [(one.status, one.by) for one in standing(decomposition, verdicts) if one.name in {"O1", "O5"}]
+
+
+def test_protocol_proof_says_of_a_split_what_it_says_where_all_that_it_assumes_is_proved() -> None:
+    decomposition = split(catalogue_net("conceptual_one_robot"))
+    verdicts = prove(decomposition).verdicts
+    assert protocol_lines(decomposition, verdicts) == [("by the protocol proof", "protocol")] * 2
+    for family in ASSUMED_BY_THE_PROTOCOL:
+        (title,) = (one.title for one in FAMILIES if one.name == family)
+        one = next(v for v in verdicts if v.name.partition(".")[0] == family)
+        others = tuple(v for v in verdicts if v != one)
+        for some in (others, *((*others, replace(one, status=s)) for s in (Status.UNKNOWN, Status.VIOLATED))):
+            assert (
+                protocol_lines(decomposition, some)
+                == [("unknown", f"protocol, which assumes of the split what is not proved here: {title}")] * 2
+            )
+    o2 = tuple(v for v in verdicts if not v.name.startswith("o2."))
+    assert protocol_lines(decomposition, o2) == [("by the protocol proof", "protocol")] * 2
 
 
 def test_net_is_not_bundled_where_no_evidence_on_it_was_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,6 +12,7 @@ from support.bundle_mutants import decomposition_mutants, evidence_mutants, line
 from firable.analysis.check import check
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
 from firable.analysis.evidence.document import Document, document_from_text
+from firable.analysis.spaces.reachability import Budget
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.families import FAMILIES
 from firable.decompose.proofs.proving import prove
@@ -26,12 +27,13 @@ from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS
 from firable.decompose.verification.solvers import SOLVERS, SolverError, by_cvc5, gave_up
+from firable.decompose.verification.words import SENTENCES
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Controller, Net, Place, Transition
-from firable.nets.right_to_run import unproved
-from firable.nets.verdict import Cost, Status, Verdict
+from firable.nets.right_to_run import CHECKED, unproved
+from firable.nets.verdict import Cost, Status, Verdict, Weight
 
 CELLS = ("conceptual_one_robot", "one_robot", "two_robots_shared")
 
@@ -385,6 +387,50 @@ def test_a_warning_without_evidence_is_only_claimed_and_a_demand_refused() -> No
     }
     with pytest.raises(InputError, match="F5002"):
         check_bundle(without_evidence_on(bundle, "quasi-live"))
+
+
+def without_verdict(bundle: Bundle, name: str) -> Bundle:
+    """The bundle without a verdict on its net, and without the record on it."""
+    file = "check.evidence.json"
+    document = document_from_text(bundle.evidence[file], file)
+    text = replace(document, records=tuple(r for r in document.records if r.name != name)).to_text()
+    verdicts = tuple(v for v in bundle.verdicts if v.name != name)
+    return replace(bundle, verdicts=verdicts, evidence={**bundle.evidence, file: text})
+
+
+@pytest.mark.usefixtures("remembering")
+@pytest.mark.parametrize("name", [name for name in SENTENCES if name not in CHECKED])
+def test_a_warning_that_was_taken_out_with_its_evidence_is_missed(name: str) -> None:
+    with pytest.raises(InputError, match=f"F6002.*there is no verdict on '{name}'"):
+        check_bundle(without_verdict(bundled("conceptual_one_robot"), name))
+
+
+@pytest.mark.usefixtures("remembering")
+def test_a_warning_that_was_made_undecided_is_told() -> None:
+    bundle = bundled("conceptual_one_robot")
+    (starvation,) = (v for v in bundle.verdicts if v.name == "starvation")
+    doubted = replace(starvation, status=Status.UNKNOWN, evidence=(), witness=None)
+    bare = without_verdict(bundle, "starvation")
+    checked = check_bundle(replace(bare, verdicts=(*bare.verdicts, doubted)))
+    assert [(one.verdict, one.shown) for one in checked if not one.shown] == [(doubted, False)]
+    assert checked[-1].only_claimed.startswith("undecided")
+    with pytest.raises(InputError, match="says something else"):
+        check_bundle(replace(bare, verdicts=(*bare.verdicts, replace(doubted, statement="all is well"))))
+
+
+@pytest.mark.parametrize("status", Status)
+def test_a_verdict_that_nobody_knows_is_refused(status: Status) -> None:
+    bundle = bundled("conceptual_one_robot")
+    safe = Verdict("safe", status, "certified SIL 3", "", Weight.INFORMATION)
+    with pytest.raises(InputError, match="nobody knows what 'safe' is on"):
+        check_bundle(replace(bundle, verdicts=(*bundle.verdicts, safe)))
+
+
+@pytest.mark.parametrize("name", ["workshop-6", "philosophers-4"])
+def test_check_gives_every_verdict_that_is_missed_even_where_it_decides_none(name: str) -> None:
+    for method in ("auto", "explicit"):
+        report = check(family_net(name), budget=Budget(markings=2, seconds=0.5), method=method)
+        assert set(SENTENCES) <= {verdict.name for verdict in report.verdicts}
 
 
 def test_an_unproved_bundle_is_refused_for_that() -> None:
