@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from firable.nets.decomposition import Decomposition
     from firable.nets.verdict import Verdict
 
-EVENTS_SHOWN: Final = 40
-"""How many of the last events of a run are told; a cell may need many to come to where it goes wrong."""
+EVENTS_SHOWN: Final = 12
+"""How many of the last events are told of a run that nobody reads whole."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -70,8 +70,9 @@ def ask(decomposition: Decomposition, asked: Asked, seconds: float, *, evidence:
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
     from firable.decompose.protocol.outages import outage_verdict, outages
-    from firable.decompose.protocol.refuting import WRONG, refute
+    from firable.decompose.protocol.refuting import readable, refute
     from firable.decompose.protocol.verdicts import protocol_verdicts
+    from firable.decompose.protocol.wrong import WRONG
 
     def limits() -> Limits:
         return Limits(Deadline.after(seconds))
@@ -84,7 +85,7 @@ def ask(decomposition: Decomposition, asked: Asked, seconds: float, *, evidence:
         verdicts, protocols = found.verdicts, found.protocols
         files = found.evidence() if evidence else {}
     dead = tuple(outages(decomposition, limits)) if asked.faults else ()
-    refutations = tuple(refute(wrong, decomposition, limits()) for wrong in WRONG) if asked.wrong else ()
+    refutations = tuple(readable(refute(wrong, decomposition, limits())) for wrong in WRONG) if asked.wrong else ()
     verdicts += tuple(map(outage_verdict, dead)) + tuple(one.verdict for one in refutations)
     protocols |= {refutation.verdict.name: refutation.protocol for refutation in refutations}
     return Answered(verdicts, protocols, files, dead, refutations)
@@ -119,12 +120,19 @@ def _show_refutation(refutation: Refutation) -> None:
     status = refutation.status.value
     click.echo(f"  {wrong.name}: {wrong.says} ({wrong.obligation})")
     click.echo(f"      {refutation.outcome}")
-    left_out = max(0, len(refutation.events) - EVENTS_SHOWN)
+    _show_run(refutation)
+    if status == "unknown":
+        click.echo(f"      reached: {refutation.bound}")
+    if (small := refutation.small) is not None:
+        click.echo(f"      {small.of_example}:")
+        _show_run(small)
+
+
+def _show_run(refutation: Refutation) -> None:
+    left_out = 0 if refutation.small is None else max(0, len(refutation.events) - EVENTS_SHOWN)
     if left_out:
         click.echo(f"      ... {left_out} events, then")
     for k, event in enumerate(refutation.events[left_out:], start=left_out + 1):
         click.echo(f"      {k:>3}. {event}")
     if refutation.sentence:
         click.echo(f"      {refutation.sentence}")
-    if status == "unknown":
-        click.echo(f"      reached: {refutation.bound}")

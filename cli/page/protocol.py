@@ -64,6 +64,7 @@ def _refutation(refutation: Refutation) -> Markup:
         tag("p", tag("span", refutation.outcome, cls=classes(tone))),
         tag("p", f"reached: {refutation.bound}") if refutation.status.value == "unknown" else None,
         _run(refutation),
+        _example(refutation.small),
         cls="counter",
     )
 
@@ -72,3 +73,9 @@ def _run(refutation: Refutation) -> Markup | None:
     if refutation.witness is None:
         return None
     return together(swimlanes(refutation.protocol, refutation.witness), tag("p", refutation.sentence, cls="outcome"))
+
+
+def _example(small: Refutation | None) -> Markup | None:
+    if small is None:
+        return None
+    return together(tag("p", tag("b", f"{small.of_example}:")), _run(small))

@@ -1,10 +1,8 @@
-"""The protocols that are known to be wrong, and how they go wrong.
+"""How a protocol that is known to be wrong goes wrong: a run, told in the net's own names.
 
-Each leaves out one thing that an obligation of SEMANTICS demands, and is refuted by a run, told in the net's own names.
-Who changes the protocol will find his idea here, or should add it: a check that refutes none of these would have shown
-nothing by proving the true one. Each comes with the smallest net on which it fails; asked of the net of a cell, the
-answer says which obligations this cell lives on. That one "cannot go wrong here" is no licence: the next edit of the
-net may need what this one does not.
+Asked of the net of a cell, the answer says which obligations this cell lives on. That one "cannot go wrong here" is no
+licence: the next edit of the net may need what this one does not. Where the run of a cell is too long to be read, or
+there is none, the run on the small net of the same wrong protocol (`wrong.py`) stands for it.
 
 A run is looked for where it is cheapest and told best: breadth first, as far as the first markings go, then among the
 runs where one transition is asked for at a time, of which there are fewer; else on random walks, which meet what is
@@ -25,91 +23,18 @@ from firable.analysis.walk import decide_by_walk
 from firable.decompose.protocol.building import ProtocolNet, protocol_net
 from firable.decompose.protocol.draft import ASTRAY, central
 from firable.decompose.protocol.exploring import FIRST_MARKINGS
-from firable.decompose.protocol.variant import BARE, NO_FAULTS, Faults, Lock, Often, Variant
+from firable.decompose.protocol.wrong import WrongProtocol, example
 from firable.decompose.splitting.cut import split
-from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import And, Formula, Holds, Or
-from firable.nets.net import Controller, Net, Place, Property, PropertyKind, Transition
+from firable.nets.net import Net, Property, PropertyKind
 from firable.nets.verdict import Status, Verdict, Weight, Witness
 
 WALK_SECONDS_MAX: Final = 3.0
+EVENTS_READ: Final = 40
+"""How many events of a run a person reads; of a longer one the end is told."""
 APART_MARKINGS: Final = 1_000_000
 """How many markings are looked at where one transition is asked for at a time."""
-
-
-@dataclass(frozen=True, slots=True)
-class WrongProtocol:
-    """A protocol known to be wrong: what it leaves out, against which obligation, and a net on which it fails."""
-
-    name: str
-    obligation: str
-    says: str
-    variant: Variant
-    example: str
-    faults: Faults = NO_FAULTS
-
-
-WRONG: Final = (
-    WrongProtocol(
-        "cached-votes", "O1", "a yes is kept until it is used, and promises nothing", BARE["stale_serial"], "one_robot"
-    ),
-    WrongProtocol(
-        "old-votes",
-        "O5",
-        "a yes from before the decision counts in the next round",
-        Variant(vote_rounds=False),
-        "scrap",
-    ),
-    WrongProtocol(
-        "unlocked-conflicts",
-        "O2",
-        "conflicting transitions have deciders of their own",
-        Variant(arbitrated=False),
-        "scrap",
-    ),
-    WrongProtocol(
-        "cached-gates",
-        "O3",
-        "a gate elsewhere is read from a copy, its owner takes no part",
-        Variant(gate_copies=True),
-        "doors",
-    ),
-    WrongProtocol(
-        "orders-twice", "O5", "an order that is repeated is applied again", Variant(order_rounds=False), "shuttle"
-    ),
-    WrongProtocol(
-        "missing-vote",
-        "Eq. (7)",
-        "a transition is decided though one vote is missing",
-        Variant(unanimous=False),
-        "shuttle",
-    ),
-    WrongProtocol(
-        "unlocked-reads",
-        "O1",
-        "a promise does not cover the places that a part only reads",
-        Variant(lock=Lock.WRITES),
-        "hood",
-    ),
-    WrongProtocol(
-        "forgotten-promises",
-        "O6",
-        "a promise is not in stable storage",
-        Variant(stable=False),
-        "shuttle",
-        Faults(crash=Often.ONCE),
-    ),
-    WrongProtocol(
-        "sent-once",
-        "O5",
-        "an order is sent once, and nobody acknowledges it",
-        BARE["locked"],
-        "shuttle",
-        Faults(loss=Often.ONCE),
-    ),
-)
-"""Every protocol that must be refuted."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +42,8 @@ class Refutation:
     """What came of trying to refute a wrong protocol on one net.
 
     `status` is VIOLATED with a `witness` where it goes wrong, PROVED where it cannot on this net. `events` tells the
-    run; `sentence` says what does not hold at its end.
+    run; `sentence` says what does not hold at its end. `small` is the same on the small net
+    of the wrong protocol, where this one has no run that a person reads.
     """
 
     wrong: WrongProtocol
@@ -126,6 +52,7 @@ class Refutation:
     method: str
     witness: Witness | None = None
     bound: str = ""
+    small: Refutation | None = None
 
     @property
     def events(self) -> tuple[str, ...]:
@@ -140,6 +67,13 @@ class Refutation:
         needed = self.wrong.obligation
         cannot = f"cannot go wrong here: wrong all the same, but this net does not need {needed} yet, and an edit may"
         return cannot if self.status is Status.PROVED else "not decided here"
+
+    @property
+    def of_example(self) -> str:
+        """What the run is of, where it is that of an example."""
+        net = self.protocol.parts.net
+        of = f" ({net.description})" if net.description else ""
+        return f"on a small example, {net.name}, in its own names{of}, after {len(self.events)} events"
 
     @property
     def sentence(self) -> str:
@@ -175,6 +109,7 @@ def refute(wrong: WrongProtocol, net: Net | Decomposition | None = None, limits:
 
     Raises the errors of `split`. Cost: that of 200,000 markings, a walk of some seconds, and a diagram.
 
+    >>> from firable.decompose.protocol.wrong import WRONG
     >>> found = refute(next(wrong for wrong in WRONG if wrong.name == "cached-gates"))
     >>> print(*found.events, sep="; ")
     guard fires open; press fires close, though in the central net guard.opened is full
@@ -219,59 +154,8 @@ def _in_diagram(wrong: WrongProtocol, protocol: ProtocolNet, goal: Formula, limi
     return Refutation(wrong, protocol, verdict.status, verdict.method, verdict.witness, verdict.bound)
 
 
-def example(name: str) -> Net:
-    """The net of an example: one of those here, or of the catalogue."""
-    return _EXAMPLES[name] if name in _EXAMPLES else catalogue_net(name)
-
-
-_ROBOT, _LATHE, _PRESS, _GUARD = Controller("robot"), Controller("lathe"), Controller("press"), Controller("guard")
-_HANDED = ("robot.free", "lathe.full")
-
-
-def _places(marked: tuple[str, ...], empty: tuple[str, ...]) -> tuple[Place, ...]:
-    return tuple(Place(name, name.partition(".")[0], name in marked) for name in (*marked, *empty))
-
-
-_EXAMPLES: Final = {
-    "shuttle": Net(
-        "shuttle",
-        _places(("robot.part", "lathe.empty"), _HANDED),
-        (
-            Transition("hand_over", ("robot.part", "lathe.empty"), _HANDED),
-            Transition("fetch", ("robot.free",), ("robot.part",)),
-            Transition("unload", ("lathe.full",), ("lathe.empty",)),
-        ),
-        controllers=(_ROBOT, _LATHE),
-        description="the robot hands a part to the lathe, and either goes on by itself",
-    ),
-    "scrap": Net(
-        "scrap",
-        _places(("robot.part", "lathe.empty"), (*_HANDED, "robot.scrapped")),
-        (
-            Transition("hand_over", ("robot.part", "lathe.empty"), _HANDED),
-            Transition("scrap", ("robot.part",), ("robot.scrapped",)),
-        ),
-        controllers=(_ROBOT, _LATHE),
-        description="the robot hands its part to the lathe, or scraps it",
-    ),
-    "hood": Net(
-        "hood",
-        _places(("robot.part", "lathe.empty", "lathe.shut"), (*_HANDED, "lathe.open")),
-        (
-            Transition("hand_over", ("robot.part", "lathe.empty"), _HANDED, inhibitive=("lathe.open",)),
-            Transition("open", ("lathe.shut",), ("lathe.open",)),
-        ),
-        controllers=(_ROBOT, _LATHE),
-        description="the robot hands its part to the lathe unless the hood is open",
-    ),
-    "doors": Net(
-        "doors",
-        _places(("press.ready", "guard.shut"), ("press.closed", "guard.opened")),
-        (
-            Transition("close", ("press.ready",), ("press.closed",), inhibitive=("guard.opened",)),
-            Transition("open", ("guard.shut",), ("guard.opened",), inhibitive=("press.closed",)),
-        ),
-        controllers=(_PRESS, _GUARD),
-        description="the press closes unless the door is open, the door opens unless the press is closed",
-    ),
-}
+def readable(refutation: Refutation) -> Refutation:
+    """The refutation, with that on the small net of the wrong protocol beside it where no run of its own can be read."""
+    if refutation.witness is not None and len(refutation.events) <= EVENTS_READ:
+        return refutation
+    return replace(refutation, small=refute(refutation.wrong))

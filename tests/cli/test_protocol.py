@@ -61,6 +61,8 @@ def test_wrong_protocols_are_told_by_their_events_and_fail_nothing(
     assert "hand_over is decided without the vote of robot" in told
     assert "  cached-gates: a gate elsewhere is read from a copy, its owner takes no part (O3)\n" in told
     assert "cannot go wrong here" in told
+    assert "on a small example, doors, in its own names (the press closes unless" in told
+    assert "guard fires open" in told
 
 
 def test_json_holds_the_verdicts_and_the_runs(capsys: pytest.CaptureFixture[str], net: str) -> None:
@@ -122,6 +124,8 @@ def test_wrong_protocols_are_no_counterexamples_of_the_page(net: str, tmp_path: 
     lives_on = section(page, "lives-on")
     assert "missing-vote: a transition is decided though one vote is missing (Eq. (7))" in lives_on
     assert "this net does not need O3 yet" in lives_on
+    assert "on a small example, doors, in its own names" in lives_on
+    assert '<td data-of="guard"><span>guard fires open</span>' in lives_on
     assert "good" not in lives_on[: lives_on.index("missing-vote")], "what cannot go wrong here is not approved of"
 
 

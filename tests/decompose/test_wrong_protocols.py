@@ -6,8 +6,9 @@ from support.reference import load_net
 from firable.analysis.goal import Limits
 from firable.decompose.protocol.draft import ASTRAY
 from firable.decompose.protocol.exploring import explore_protocol
-from firable.decompose.protocol.refuting import WRONG, Refutation, WrongProtocol, example, refute
+from firable.decompose.protocol.refuting import EVENTS_READ, Refutation, readable, refute
 from firable.decompose.protocol.variant import Variant
+from firable.decompose.protocol.wrong import WRONG, WrongProtocol, example
 from firable.nets.verdict import Status, Weight
 from firable.semantics.player import Player
 
@@ -100,3 +101,11 @@ def test_two_robots_cannot_go_wrong_by_cached_votes() -> None:
 def test_true_protocol_is_not_among_the_wrong_ones() -> None:
     assert Variant() not in {wrong.variant for wrong in WRONG}
     assert len({wrong.name for wrong in WRONG}) == len(WRONG)
+
+
+def test_where_the_cell_has_no_run_that_can_be_read_the_small_example_has_one() -> None:
+    found = readable(refute(BY_NAME["cached-gates"], load_net("local_conflict")))
+    assert found.small is not None
+    assert (len(found.small.events), found.small.protocol.parts.net.name) == (2, "doors")
+    assert readable(found.small) is found.small
+    assert all(len(refute(wrong).events) <= EVENTS_READ for wrong in WRONG)
