@@ -233,10 +233,8 @@ def _because(reasons: Sequence[dict[str, Any]]) -> Iterator[str]:
 def _groups(report: Report) -> Iterator[str]:
     for group in report.split["groups"]:
         members = list(dict.fromkeys((*group["sequence"], *group["rest"])))
-        by = {"priority": "by priority", "order": "in a given order", "rotation": "in rotation"}[group["by"]]
-        rule = by if group["sequence"] else "by the order of the file"
         decider = group["controller"] or group["at"] or _top(report)
-        yield f"{group['name']}: {_listed(members)}; decided by {decider} {rule}"
+        yield f"{group['name']}: {_listed(members)}; decided by {decider} {text.rule(group['sequence'], group['by'])}"
 
 
 def _top(report: Report) -> str:
@@ -251,7 +249,9 @@ def _votes(report: Report) -> Iterator[str]:
     promising = sum(len(one["promises"]) for one in report.split["controllers"])
     if report.verdicts:
         yield f"{persistent} of {len(report.verdicts)} are persistent: no other transition takes the yes back"
-        yield f"{len(report.verdicts) - promising} of these may leave out the promise, as nothing there waits for them"
+        free = len(report.verdicts) - promising
+        yield f"{free} of these need no promise, which locks places from the yes to the order: their firing takes"
+        yield "back no other yes at their controller, and no command sent meanwhile clears a gate that they read"
     others = [verdict for verdict in report.verdicts if not verdict.holds]
     for verdict in others[:_CONTROLLERS_MAX]:
         part, names = verdict.name.removeprefix("persistent."), _listed(verdict.subjects)
@@ -269,7 +269,8 @@ def _controllers(report: Report) -> Iterator[str]:
     known = report.split["controllers"]
     for one in known[:_CONTROLLERS_MAX]:
         counts = ((len(one[key]), word) for key, word in (("places", "place"), ("signals", "signal")))
-        yield f"{click.style(one['controller'], bold=True)}  {', '.join(text.counted(n, w) for n, w in counts if n)}"
+        owned = ", ".join(text.counted(n, w) for n, w in counts if n)
+        yield click.style(one["controller"], bold=True) + (f"  {owned}" if owned else "")
         told = (
             ("fires alone", one["fires"]),
             ("decides", one["decides"]),

@@ -54,6 +54,12 @@ def counted(n: int, word: str) -> str:
     return f"{spelled(n)} {word}{'' if n == 1 else 's'}"
 
 
+def rule(sequence: Sequence[str], by: str) -> str:
+    """How the arbiter of a group chooses, in words; without a `sequence` given it is the order of the file."""
+    words = {"priority": "by priority", "order": "in a given order", "rotation": "in rotation"}
+    return words[by] if sequence else "by the order of the file"
+
+
 def show_verdicts(
     net: Net, verdicts: Sequence[Verdict], *, verbose: bool = False, words: Mapping[str, str] = WORDS
 ) -> None:

@@ -11,7 +11,7 @@ from typing import Final
 
 from firable.cli.page.markup import Markup, raw, tag, together
 from firable.cli.page.pieces import TONES, classes
-from firable.cli.page.sections import SECTIONS, refuted
+from firable.cli.page.sections import refuted, sections
 from firable.cli.page.style import STYLE
 from firable.cli.report import Report
 from firable.cli.text import counted
@@ -31,7 +31,7 @@ _POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'"
 def page_of(report: Report) -> str:
     """The report as an HTML page, whole and by itself."""
     title = f"{report.net.name or 'the net'}: {_ASKED.get(report.command, report.command)}"
-    made = [(section, markup) for section in SECTIONS if (markup := section.make(report)) is not None]
+    made = [(section, markup) for section in sections(report.command) if (markup := section.make(report)) is not None]
     links = [tag("li", tag("a", section.title, href=f"#{section.anchor}")) for section, _ in made]
     head = tag(
         "head",
@@ -41,7 +41,7 @@ def page_of(report: Report) -> str:
         tag("title", title),
         tag("style", raw(STYLE)),
     )
-    sections = [
+    written = [
         tag("section", tag("h2", section.title), markup, id=section.anchor, aria_label=section.title)
         for section, markup in made
     ]
@@ -49,7 +49,7 @@ def page_of(report: Report) -> str:
         "body",
         _masthead(report),
         tag("nav", tag("div", tag("ul", links)), aria_label="sections") if links else None,
-        tag("main", sections),
+        tag("main", written),
         _foot(report),
     )
     return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"

@@ -19,7 +19,7 @@ from firable.cli.page.protocol import is_of_protocol, lives_on, while_dead
 from firable.cli.page.runs import strip
 from firable.cli.page.swimlanes import swimlanes
 from firable.cli.report import Report
-from firable.cli.text import counted
+from firable.cli.text import counted, rule
 from firable.nets.decomposition import Decomposition
 from firable.nets.verdict import Status, Verdict, Weight, Witness
 
@@ -299,18 +299,27 @@ def _reasons(decomposition: Decomposition | None) -> Iterator[tuple[str, str]]:
 
 
 def _groups(report: Report) -> Markup | None:
+    from firable.nets.layers import Layers
+
     if report.decomposition is None or not report.decomposition.groups:
         return None
     rows = []
-    groups = report.decomposition.groups
+    groups, top = report.decomposition.groups, Layers(report.net).root
     for group in groups[:ROWS_MAX]:
         order = "; then ".join(", ".join(some) for some in (group.sequence, group.rest) if some)
-        rows.append((group.name, tag("span", order, cls="code"), str(group.by), group.controller or "the coordinator"))
+        rows.append(
+            (
+                group.name,
+                tag("span", order, cls="code"),
+                rule(group.sequence, str(group.by)),
+                group.controller or group.at or top,
+            )
+        )
     lead = (
         f"{counted(len(groups), 'group')}: transitions that compete for a place, directly or through others, are "
         "decided together by one arbiter."
     )
-    heads = ("group", "in this order", "by", "decided by")
+    heads = ("group", "transitions", "how", "decided by")
     return together(tag("p", lead, cls="lead"), table(heads, rows, caption="Arbitration groups", count=len(groups)))
 
 
@@ -354,3 +363,11 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section("cell", "The cell", _picture),
 )
 """Every section, in the order of the page."""
+_ABOVE_IN_A_SPLIT: Final = ("table", "groups", "verdicts", "controllers")
+
+
+def sections(command: str) -> tuple[Section, ...]:
+    """Every section, in the order of the page; a split is asked for its table, and a vote taken back is no failure."""
+    first = [section for section in SECTIONS if command == "split" and section.anchor in _ABOVE_IN_A_SPLIT]
+    first.sort(key=lambda section: _ABOVE_IN_A_SPLIT.index(section.anchor))
+    return (*first, *(section for section in SECTIONS if section not in first))

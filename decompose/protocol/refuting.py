@@ -155,7 +155,7 @@ def _in_diagram(wrong: WrongProtocol, protocol: ProtocolNet, goal: Formula, limi
 
 
 def readable(refutation: Refutation) -> Refutation:
-    """The refutation, with that on the small net of the wrong protocol beside it where no run of its own can be read."""
+    """The refutation, with that on the small net of the wrong protocol beside it where its own run cannot be read."""
     if refutation.witness is not None and len(refutation.events) <= EVENTS_READ:
         return refutation
     return replace(refutation, small=refute(refutation.wrong))

@@ -288,3 +288,12 @@ def test_a_net_of_many_controllers_has_a_page_that_a_browser_can_hold(tmp_path: 
     words = Reading(page).words
     assert "transition parts global because of" in words, "no column for each controller"
     assert "are too many for a picture that can be read" in words
+
+
+def test_the_page_of_a_split_tells_first_who_decides_what(tmp_path: Path) -> None:
+    path = tmp_path / "page.html"
+    assert main(["split", "catalogue:one_robot", "--report", str(path)]) == 0
+    page = Reading(path.read_text("utf-8"))
+    ids = [attributes["id"] for name, attributes in page.tags if name == "section"]
+    assert ids == ["table", "groups", "verdicts", "controllers", "counterexamples", "cell"]
+    assert "by the order of the file system" in page.words, "as the terminal says it"

@@ -147,3 +147,13 @@ def test_a_place_of_two_rules_is_refused_where_it_stands(capsys: pytest.CaptureF
     assert main(["split", "catalogue:one_robot", *own]) == 2
     said = capsys.readouterr().err
     assert "one_robot.firable.yaml:20:7: error[F2023]: 'robot.free' is given to each of a, b" in said
+
+
+def test_split_says_what_a_vote_without_promise_is_and_ends_no_line_in_spaces(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["split", "catalogue:one_robot"]) == 0
+    assert "need no promise, which locks places from the yes to the order" in capsys.readouterr().out
+    assert main(["split", "catalogue:two_cells"]) == 0
+    told = capsys.readouterr().out
+    assert not [line for line in told.splitlines() if line != line.rstrip()]
