@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from textwrap import indent
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
     from firable.nets.verdict import Verdict
 
+SIGNS: Final = {"violated": ("✗", "red"), "unknown": ("?", "yellow"), "proved": ("✓", "green")}
+"""The sign and colour of several verdicts of which the first of these statuses is there."""
+
 
 @click.command(short_help="Split a net over its controllers, and prove the parts equal to the whole.")
 @net_argument
@@ -29,7 +32,7 @@ if TYPE_CHECKING:
     default=60.0,
     show_default=True,
     metavar="SECONDS",
-    help="Give up an obligation after so much time.",
+    help="Give up an obligation after so much time, and each exploration of the protocol.",
 )
 @machines_option
 @protocol_options
@@ -71,7 +74,8 @@ def show_obligations(verdicts: Sequence[Verdict]) -> None:
         if not some:
             continue
         proved = sum(verdict.holds for verdict in some)
-        symbol, colour = ("✓", "green") if proved == len(some) else ("✗", "red")
+        statuses = {verdict.status.value for verdict in some}
+        symbol, colour = next(sign for status, sign in SIGNS.items() if status in statuses)
         count = f"{proved:>{width}} of {len(some):<{width}}"
         click.echo(f"  {click.style(symbol, fg=colour)} {count} {family.title:<16} {family.says}")
 

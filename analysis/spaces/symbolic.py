@@ -296,13 +296,13 @@ def _literals(net: Net, operands: Sequence[Formula]) -> tuple[list[int], list[in
 
 
 def explore_symbolically(
-    net: Net, limits: Limits | None = None, *, order: Sequence[int] | None = None
+    net: Net, limits: Limits | None = None, *, orders: Sequence[Sequence[int]] | None = None
 ) -> SymbolicSpace:
     """All reachable markings of a net under interleaving, external gates free.
 
-    Who knows a good order of the places gives their indexes, from the lowest level of the diagram to the highest; else
-    several orders race each other. Raises `BudgetExceeded` where the limits of memory or time end the search before it
-    has found all.
+    Who knows good orders of the places gives the indexes of the places for each, from the lowest level of the diagram
+    to the highest; else the engine makes some. Where there are several, they race each other. Raises `BudgetExceeded`
+    where the limits of memory or time end the search before it has found all.
 
     >>> from firable.nets.catalogue.families import family_net
     >>> space = explore_symbolically(family_net("philosophers_either-100"))
@@ -313,7 +313,7 @@ def explore_symbolically(
     diagram = _engine.explore_symbolically(
         *flat(net),
         max_memory_bytes=limits.memory_bytes,
-        orders=None if order is None else [list(order)],
+        orders=None if orders is None else [list(order) for order in orders],
         **engine_limits(limits.deadline),
     )
     reach = diagram.reach()

@@ -10,12 +10,15 @@ evidence of what it found could leave it.
 **Who is where.** A decision diagram lives on the order of its places. They stand in the net by transitions: what
 belongs to the parts of the first transition, what the coordinator knows of it, then the places that it moves, each
 beside its copy in the central net; then the next. For the whole cell this order needs a second, where one controller
-after the other needs more than a minute. `order` gives it as the engine wants it, from the lowest level.
+after the other needs more than a minute. As the transitions of a group share a round, they may stand together instead:
+some cells that the net's own sequence does not do in a minute are done so in seconds. Neither is the better one of all
+nets, so `orders` gives both, and the engine lets them race. The rejected alternative, the central net above everything,
+is as good on one cell and fails on most.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -29,7 +32,7 @@ from firable.decompose.protocol.variant import NO_FAULTS, PROTOCOL, Faults, Vari
 from firable.decompose.splitting.persistence import nonpersistent
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import And, Formula, Holds, Not, Or
-from firable.nets.net import Net, Property, PropertyKind
+from firable.nets.net import Net, Property, PropertyKind, Transition
 
 _MEMORY = ("noted", "acknowledgement", "abort-order", "commit-order", "heard", "vote", "request", "obeyed", "promised")
 """The places of a part in the skeleton with rounds, in the order that diagrams like."""
@@ -56,9 +59,15 @@ class ProtocolNet:
         return self.parts.variant
 
     @cached_property
-    def order(self) -> list[int]:
-        """The places from the lowest level of a diagram to the highest."""
-        return list(range(len(self.net.places) - 1, -1, -1))
+    def orders(self) -> list[list[int]]:
+        """Orders of the places that a diagram may like, each from its lowest level to the highest.
+
+        The first is that of the net. In the second, where it is another one, conflicting transitions stand together.
+        """
+        parts, index = self.parts, self.net.place_index
+        flow = _flow(parts, self.faults, _gathered(parts))
+        found = [list(range(len(index))), list(dict.fromkeys((*(index[place] for place in flow), *range(len(index)))))]
+        return [order[::-1] for order in (found[:1] if found[0] == found[1] else found)]
 
     @cached_property
     def firing(self) -> dict[str, tuple[int, ...]]:
@@ -135,8 +144,8 @@ def protocol_net(decomposition: Decomposition, variant: Variant = PROTOCOL, faul
     """
     parts = Parts(decomposition, variant)
     draft = Draft(decomposition.net, onward=not variant.is_true)
-    channels = CHANNELS if variant.acknowledged else (ORDER,)
-    _declare(draft, parts, faults, channels)
+    channels = _channels(parts)
+    _declare(draft, parts, faults)
     declare_faults(draft, parts, faults, channels)
     draft.place(ASTRAY)
     if variant.acknowledged:
@@ -150,23 +159,46 @@ def protocol_net(decomposition: Decomposition, variant: Variant = PROTOCOL, faul
     return replace(built, net=replace(built.net, properties=tuple(built.sentences())))
 
 
-def _declare(draft: Draft, parts: Parts, faults: Faults, channels: tuple[str, ...]) -> None:
+def _channels(parts: Parts) -> tuple[str, ...]:
+    """The kinds of messages that there are."""
+    return CHANNELS if parts.variant.acknowledged else (ORDER,)
+
+
+def _gathered(parts: Parts) -> Iterator[Transition]:
+    """The transitions of the central net, those of a group one after the other."""
+    net, found = parts.net, dict[str, None]()
+    for t in net.transitions:
+        group = set(parts.groups[parts.group_of[t.name]]) if t.name in parts.coordinated else {t.name}
+        found |= dict.fromkeys(u.name for u in net.transitions if u.name in group)
+    return map(net.transition, found)
+
+
+def _flow(parts: Parts, faults: Faults, transitions: Iterable[Transition]) -> Iterator[str]:
+    """The places that belong to these transitions, by transitions; some of them more than once."""
+    acknowledged = parts.variant.acknowledged
+    channels = _channels(parts)
+    for t in transitions:
+        for part in parts.coordinated.get(t.name, ()):
+            for kind in _MEMORY if acknowledged else _BARE_MEMORY:
+                yield at(kind, part)
+                if faults.duplication and kind in channels and not is_numbered(parts, kind):
+                    yield late(at(kind, part))
+        if t.name in parts.coordinated and acknowledged:
+            yield asked(t.name)
+            yield committed(t.name)
+            if parts.groups[parts.group_of[t.name]][-1] == t.name:
+                yield decided(parts, t.name)
+        for name in (*t.inputs, *t.outputs):
+            yield name
+            yield central(name)
+
+
+def _declare(draft: Draft, parts: Parts, faults: Faults) -> None:
     """Add the places, in the order that diagrams like."""
     net = parts.net
-    for t in net.transitions:
-        for part in parts.coordinated.get(t.name, ()):
-            for kind in _MEMORY if parts.variant.acknowledged else _BARE_MEMORY:
-                draft.place(at(kind, part))
-                if faults.duplication and kind in channels and not is_numbered(parts, kind):
-                    draft.place(late(at(kind, part)))
-        if t.name in parts.coordinated and parts.variant.acknowledged:
-            draft.place(asked(t.name))
-            draft.place(committed(t.name))
-            if parts.groups[parts.group_of[t.name]][-1] == t.name:
-                draft.place(decided(parts, t.name))
-        for name in (*t.inputs, *t.outputs):
-            draft.place(name, marked=net.place(name).marked)
-            draft.place(central(name), marked=net.place(name).marked)
+    marked = {name for place in net.places if place.marked for name in (place.name, central(place.name))}
+    for name in _flow(parts, faults, net.transitions):
+        draft.place(name, marked=name in marked)
     for place in net.places:
         draft.place(place.name, marked=place.marked)
         draft.place(central(place.name), marked=place.marked)

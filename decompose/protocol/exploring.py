@@ -20,13 +20,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from time import perf_counter
 from typing import Any, Final
 
 import numpy as np
 
 from firable.analysis.goal import Limits
 from firable.analysis.question import Answer, Question, listed, no, yes
-from firable.analysis.spaces.reachability import Budget, BudgetExceeded, ReachabilityGraph, explore
+from firable.analysis.spaces.reachability import REASONS, Budget, BudgetExceeded, ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.verdicts.properties import decide_property
@@ -43,6 +44,8 @@ from firable.nets.verdict import Status, Verdict, Witness
 
 FIRST_MARKINGS: Final = 200_000
 """How many markings are looked for in a table before a diagram is tried."""
+MORE_TIME: Final = "give each exploration more time (--timeout)"
+MORE_MEMORY: Final = "the diagram needs more memory than `prove` gives it; `explore_protocol` takes `Limits` with more"
 
 STATEMENTS: Final = {
     FOLLOWS: "whatever the protocol fires, the central net can fire",
@@ -80,7 +83,7 @@ class Exploration:
     def safety(self) -> tuple[Verdict, ...]:
         """The verdicts of refinement."""
         return tuple(
-            self._told(decide_property(self.space, of))
+            self._hinted(self._told(decide_property(self.space, of)))
             for of in self.protocol.net.properties
             if isinstance(of, Property)
         )
@@ -93,7 +96,7 @@ class Exploration:
             lost = self.lost
             return yes() if lost is None else no((lost.transition,), lost.witness)
 
-        return COMPLETE.ask(self.space, find)
+        return self._hinted(COMPLETE.ask(self.space, find))
 
     @cached_property
     def lost(self) -> Lost | None:
@@ -113,7 +116,7 @@ class Exploration:
                 return yes()
             return no(tuple(net.transitions[t].name for t in added), self.space.witness_of_contact(added))
 
-        return ONE_TOKEN.ask(self.space, find)
+        return self._hinted(ONE_TOKEN.ask(self.space, find))
 
     @cached_property
     def divergence(self) -> Verdict:
@@ -175,6 +178,26 @@ class Exploration:
             witness=None if verdict.witness is None else replace(verdict.witness, note=_note(name)),
         )
 
+    def _hinted(self, verdict: Verdict) -> Verdict:
+        """With what would decide it, where something was too much for the limits."""
+        if verdict.status is not Status.UNKNOWN:
+            return verdict
+        if self.limits.deadline.over:
+            return replace(verdict, hint=MORE_TIME)
+        return replace(verdict, hint=MORE_MEMORY) if isinstance(self.space, Undrawn) else verdict
+
+
+@dataclass(frozen=True)
+class Undrawn(ReachabilityGraph):
+    """A table of some markings of a protocol, of which no diagram was found either: `why`, in words."""
+
+    why: str = ""
+
+    @property
+    def bound(self) -> str:
+        """How far the table went, and what ended the search for a diagram."""
+        return f"no decision diagram: {self.why}; a table held {self.n_markings:,} markings"
+
 
 def _note(name: str) -> str:
     return {
@@ -194,7 +217,8 @@ def explore_protocol(
 ) -> Exploration:
     """All runs of a protocol, exposed to faults: in a table within the budget, else in a diagram within the limits.
 
-    Where neither holds them, the table is as far as it goes. Raises the errors of `split`.
+    Where neither holds them, the table is as far as it goes, and its bound says what ended the diagram. Raises the
+    errors of `split`.
 
     >>> from firable.nets.catalogue import catalogue_net
     >>> found = explore_protocol(catalogue_net("conceptual_one_robot"))
@@ -211,10 +235,13 @@ def space_of(protocol: ProtocolNet, limits: Limits, budget: Budget | None = None
     graph = explore(protocol.net, budget=budget or Budget(FIRST_MARKINGS), deadline=limits.deadline)
     if graph.complete or budget is not None:
         return graph
+    start = perf_counter()
     try:
-        return explore_symbolically(protocol.net, limits, order=protocol.order)
-    except BudgetExceeded:
-        return graph
+        return explore_symbolically(protocol.net, limits, orders=protocol.orders)
+    except BudgetExceeded as error:
+        ended = REASONS["time"] if limits.deadline.over else str(error)
+        why = f"{ended} after {perf_counter() - start:.1f} s of the search for it"
+        return Undrawn(graph.net, graph.discipline, graph.budget, graph.engine, graph.deadline, why)
 
 
 def failing(exploration: Exploration) -> Iterator[str]:

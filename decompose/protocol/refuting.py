@@ -147,7 +147,7 @@ def _explored(protocol: ProtocolNet, limits: Limits, most: int) -> ReachabilityG
 
 def _in_diagram(wrong: WrongProtocol, protocol: ProtocolNet, goal: Formula, limits: Limits, bound: str) -> Refutation:
     try:
-        space = explore_symbolically(protocol.net, limits, order=protocol.order)
+        space = explore_symbolically(protocol.net, limits, orders=protocol.orders)
         verdict = decide_property(space, Property("refines", PropertyKind.NEVER, goal))
     except BudgetExceeded as error:
         return Refutation(wrong, protocol, Status.UNKNOWN, "decision diagram", bound=f"{bound}; {error}")

@@ -2,11 +2,17 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
+from time import sleep
 
 import pytest
 
+from firable.analysis.spaces.symbolic import BudgetExceeded
 from firable.cli.main import main
+from firable.cli.prove import show_obligations
+from firable.decompose.protocol import exploring
+from firable.nets.verdict import Status, Verdict
 
 NET = """\
 firable: 1
@@ -43,6 +49,45 @@ def test_protocol_is_explored_on_demand(capsys: pytest.CaptureFixture[str], net:
 def test_protocol_is_not_explored_unasked(capsys: pytest.CaptureFixture[str], net: str) -> None:
     assert main(["prove", net]) == 0
     assert "explored.complete" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("more", [["--protocol"], ["--faults"]])
+def test_asking_more_never_lowers_where_an_obligation_stands(
+    capsys: pytest.CaptureFixture[str], net: str, more: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def standing(*options: str) -> list[dict[str, str]]:
+        main(["prove", net, *options, "--format", "json"])
+        (report,) = json.loads(capsys.readouterr().out)["reports"]
+        found: list[dict[str, str]] = report["standing"]
+        return found
+
+    without = standing()
+    monkeypatch.setattr(exploring, "FIRST_MARKINGS", 50)
+    monkeypatch.setattr(exploring, "explore_symbolically", _given_up)
+    assert standing(*more) == without
+
+
+def _given_up(*_: object, **__: object) -> None:
+    sleep(0.002)  # longer than the shortest timeout
+    raise BudgetExceeded("max_seconds is over")
+
+
+def test_what_is_not_decided_in_time_is_told_with_the_option_for_more(
+    capsys: pytest.CaptureFixture[str], net: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exploring, "FIRST_MARKINGS", 50)
+    monkeypatch.setattr(exploring, "explore_symbolically", _given_up)
+    assert main(["prove", net, "--protocol", "--timeout", "0.001"]) == 3
+    told = capsys.readouterr().out
+    assert "give each exploration more time (--timeout)" in told
+    assert "no decision diagram: the budget of time is used up after" in told
+
+
+def test_obligations_that_are_unknown_are_no_violations(capsys: pytest.CaptureFixture[str]) -> None:
+    verdict = Verdict("eq7.t", Status.PROVED, "", "z3")
+    for others, sign in ([Status.PROVED], "✓"), ([Status.UNKNOWN], "?"), ([Status.UNKNOWN, Status.VIOLATED], "✗"):
+        show_obligations([verdict, *(replace(verdict, status=status) for status in others)])
+        assert capsys.readouterr().out.startswith(f"  {sign} ")
 
 
 def test_faults_tell_what_stands_still(capsys: pytest.CaptureFixture[str], net: str) -> None:

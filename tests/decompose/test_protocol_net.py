@@ -1,6 +1,7 @@
 """The protocol as a net of its own: what holds of it on small nets and on the whole cell, with and without faults."""
 
 from dataclasses import replace
+from threading import Event
 
 import pytest
 from hypothesis import given
@@ -13,11 +14,14 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.equivalence import branching_bisimilar
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.spaces.symbolic import BudgetExceeded
+from firable.decompose.protocol import exploring
 from firable.decompose.protocol.building import ProtocolNet, protocol_net
 from firable.decompose.protocol.divergence import not_falling, weights
 from firable.decompose.protocol.exploring import Exploration, explore_protocol
 from firable.decompose.protocol.variant import ANY_FAULTS, NO_FAULTS, ONE_OF_EACH, PROTOCOL, Faults, Often, Variant
 from firable.decompose.splitting.cut import split
+from firable.nets.catalogue import catalogue_net
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.verdict import Status
 
@@ -84,7 +88,7 @@ def test_table_and_diagram_agree_on_the_protocol() -> None:
 def _diagram(protocol: ProtocolNet):  # type: ignore[no-untyped-def]
     from firable.analysis.spaces.symbolic import explore_symbolically
 
-    return explore_symbolically(protocol.net, order=protocol.order)
+    return explore_symbolically(protocol.net, orders=protocol.orders)
 
 
 def test_each_transition_is_one_step_and_fires_at_most_one_transition_of_the_central_net() -> None:
@@ -152,6 +156,46 @@ def test_search_that_ends_early_leaves_everything_unknown_but_what_needs_no_sear
     assert found.refines is Status.UNKNOWN
     assert {found.complete.status, found.one_token.status} == {Status.UNKNOWN}
     assert found.divergence.status is Status.PROVED
+
+
+def test_orders_of_places_are_permutations_and_the_second_keeps_groups_together() -> None:
+    protocol = protocol_net(split(catalogue_net("one_robot_mc_late")))
+    orders = protocol.orders
+    assert all(sorted(order) == list(range(len(protocol.net.places))) for order in orders)
+    assert len(orders) == 2
+    names = [[protocol.net.places[p].name for p in reversed(order)] for order in orders]
+    asked = [[name for name in some if name.startswith("asked/")] for some in names]
+    assert asked[0] == [f"asked/G{n}" for n in range(1, 10)]
+    assert asked[1] == [f"asked/G{n}" for n in (1, 2, 6, 3, 4, 5, 8, 7, 9)]
+
+
+def test_cell_without_the_capacity_of_its_machine_is_explored_where_groups_stand_together() -> None:
+    found = explore_protocol(catalogue_net("one_robot_mc_late"))
+    assert statuses(found) == {Status.PROVED}
+    assert found.space.n_markings > 10**32
+
+
+def test_diagram_that_is_not_found_in_time_is_what_the_bound_tells(monkeypatch: pytest.MonkeyPatch) -> None:
+    cancelled = Event()
+
+    def given_up(*_: object, **__: object) -> None:
+        cancelled.set()
+        raise BudgetExceeded("no longer needed")
+
+    monkeypatch.setattr(exploring, "explore_symbolically", given_up)
+    monkeypatch.setattr(exploring, "FIRST_MARKINGS", 50)
+    found = explore_protocol(load_net("ring"), limits=Limits(Deadline(cancelled=cancelled)))
+    for verdict in (*found.safety, found.complete, found.one_token):
+        assert verdict.status is Status.UNKNOWN
+        assert verdict.bound.startswith("no decision diagram: the budget of time is used up after ")
+        assert verdict.bound.endswith("; a table held 50 markings")
+        assert verdict.hint == exploring.MORE_TIME
+
+
+def test_diagram_that_is_too_large_asks_for_memory_and_not_for_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exploring, "FIRST_MARKINGS", 50)
+    found = explore_protocol(load_net("ring"), limits=Limits(memory_bytes=2**16))
+    assert {(verdict.status, verdict.hint) for verdict in found.safety} == {(Status.UNKNOWN, exploring.MORE_MEMORY)}
 
 
 def test_votes_that_are_no_promises_need_the_bare_skeleton() -> None:
