@@ -8,7 +8,7 @@ from time import sleep
 
 import pytest
 
-from firable.analysis.spaces.symbolic import BudgetExceeded
+from firable.analysis._engine import BudgetExceeded
 from firable.cli.main import main
 from firable.cli.prove import show_obligations
 from firable.decompose.protocol import exploring

@@ -10,11 +10,11 @@ from support.examples import examples
 from support.owned_nets import owned_nets
 from support.reference import load_net
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.equivalence import branching_bisimilar
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
-from firable.analysis.spaces.symbolic import BudgetExceeded
 from firable.decompose.protocol import exploring
 from firable.decompose.protocol.building import ProtocolNet, protocol_net
 from firable.decompose.protocol.divergence import not_falling, weights
