@@ -89,6 +89,11 @@ def _witness(obligation: Obligation, decision: Decision) -> Witness:
     claim = obligation.claim
     parts = claim.operands if claim.operator is Operator.AND else (claim,)
     failing = [part for part in parts if not value(part, decision.assignment)]
-    assignment = tuple((name, decision.assignment[name]) for name in variables(failing))
+    steps = {of.operands[0].name: of.operands[1] for of in obligation.definitions}
+    shown = dict.fromkeys(variables(failing))
+    for step in reversed(steps):  # each is defined by those before it
+        if step in shown:
+            shown.update(dict.fromkeys(variables([steps[step]])))
+    assignment = tuple((name, decision.assignment[name]) for name in shown if name not in steps)
     says = [f"{side}: {int(value(term, decision.assignment))}" for side, term in obligation.sides]
     return Witness(assignment=assignment, note=", ".join(says))

@@ -30,6 +30,7 @@ Item = TypeVar("Item")
 class Obligation:
     """A claim, proved iff what is `asserted`, its negation under its assumptions, cannot be true.
 
+    `definitions` are those of the assumptions that say only what a variable stands for, which no message shows.
     `sides` are the two terms that the claim compares, where it compares two, with their descriptions: for the message.
     """
 
@@ -39,6 +40,7 @@ class Obligation:
     claim: Term
     asserted: tuple[Term, ...]
     sides: tuple[tuple[str, Term], ...] = ()
+    definitions: tuple[Term, ...] = ()
 
 
 def claimed(
@@ -50,9 +52,11 @@ def claimed(
     subjects: tuple[str, ...] = (),
     assumptions: Iterable[Term] = (),
     sides: tuple[tuple[str, Term], ...] = (),
+    definitions: tuple[Term, ...] = (),
 ) -> Obligation:
-    """The obligation that a claim follows from its assumptions."""
-    return Obligation(name, statement, subjects, claim, (*assumptions, terms.negation(claim)), sides)
+    """The obligation that a claim follows from its assumptions and definitions."""
+    asserted = (*definitions, *assumptions, terms.negation(claim))
+    return Obligation(name, statement, subjects, claim, asserted, sides, definitions)
 
 
 def equation(

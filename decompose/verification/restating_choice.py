@@ -8,7 +8,7 @@ of the places that it competes for has been taken; what is granted takes them. d
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -22,13 +22,17 @@ if TYPE_CHECKING:
     from firable.decompose.verification.restating import Restated, Stated
 
 
+_Key = tuple[str, str]
+"""A place, and whether it is competed for as an input ("from") or as an output ("to")."""
+
+
 @dataclass(frozen=True)
 class _Contest:
     """The places that each transition competes for, and who competes for each."""
 
-    for_what: Mapping[str, Sequence[Hashable]]
-    inputs: Mapping[str, Sequence[Hashable]]
-    who: Mapping[Hashable, Sequence[str]]
+    for_what: Mapping[str, Sequence[_Key]]
+    inputs: Mapping[str, Sequence[_Key]]
+    who: Mapping[_Key, Sequence[str]]
 
 
 def arbitration(of: Restated) -> Iterator[Stated]:
@@ -56,13 +60,13 @@ def _facts(of: Restated) -> Stated:
 
 
 def _contest(nets: Iterable[tuple[Net, Callable[[str], str]]]) -> _Contest:
-    """The contest in these nets: of each, first the places with several consumers, then those with several producers.
+    """The contest in these nets: the places with several consumers and those with several producers, by name.
 
     Transitions are told by their names in the central net.
     """
-    for_what: dict[str, list[Hashable]] = {}
-    inputs: dict[str, list[Hashable]] = {}
-    who: dict[Hashable, list[str]] = {}
+    for_what: dict[str, list[_Key]] = {}
+    inputs: dict[str, list[_Key]] = {}
+    who: dict[_Key, list[str]] = {}
     for net, whole in nets:
         at: dict[tuple[str, str], list[str]] = {}
         for t in net.transitions:
@@ -78,33 +82,54 @@ def _contest(nets: Iterable[tuple[Net, Callable[[str], str]]]) -> _Contest:
                 for_what.setdefault(name, []).append(key)
                 if key[0] == "from":
                     inputs.setdefault(name, []).append(key)
+    for keys in (*for_what.values(), *inputs.values()):
+        keys.sort()
     return _Contest(for_what, inputs, who)
 
 
-def _granted(of: Formulas, group: ArbitrationGroup, contest: _Contest) -> dict[str, Formula]:
+class _Steps:
+    """A variable `step(i)` for each OR that grows by one operand at a time; the same OR has the same one."""
+
+    def __init__(self, of: Formulas) -> None:
+        self.of = of
+        self.variables: dict[Formula, Formula] = {}
+
+    def either(self, before: Formula, more: Formula) -> Formula:
+        """Its variable; the one operand, where there is but one."""
+        made = self.of.any_of([before, more])
+        if made in (before, more):
+            return made
+        return self.variables.setdefault(made, self.of.variable(f"step({len(self.variables)})"))
+
+    def given(self) -> list[Formula]:
+        """What each of them is."""
+        return [self.of.equal(variable, made) for made, variable in self.variables.items()]
+
+
+def _granted(of: Formulas, group: ArbitrationGroup, contest: _Contest, steps: _Steps) -> dict[str, Formula]:
     """What the group grants, for whatever is enabled and whatever the turn is."""
     considered: list[tuple[str, Formula]] = []
     if group.by is not ArbitrationRule.PRIORITY:
         begun = FALSE
         for i, name in enumerate(group.sequence):
-            begun = of.any_of([begun, of.variable(f"turn({i})")])
+            begun = steps.either(begun, of.variable(f"turn({i})"))
             considered.append((name, begun))
     considered += [(name, TRUE) for name in (*group.sequence, *group.rest)]
     granted: dict[str, Formula] = {}
-    taken: dict[Hashable, Formula] = {}
+    taken: dict[_Key, Formula] = {}
     for name, its_turn in considered:
         places = contest.for_what.get(name, ())
         free = of.negation(of.any_of(taken.get(place, FALSE) for place in places))
         now = of.all_of([of.variable(f"enabled({name})"), its_turn, free])
         granted[name] = of.any_of([granted.get(name, FALSE), now])
         for place in places:
-            taken[place] = of.any_of([taken.get(place, FALSE), now])
+            taken[place] = steps.either(taken.get(place, FALSE), now)
     return granted
 
 
 def _winning(of: Formulas, granted: Mapping[str, Formula], contest: _Contest) -> dict[str, Formula]:
     """Who wins an input conflict: it is granted, and one that is enabled and shares an input with it is not."""
-    losing: dict[Hashable, Formula] = {}
+    losing: dict[_Key, Formula] = {}
     for place in dict.fromkeys(place for name in granted for place in contest.inputs.get(name, ())):
         losing[place] = of.any_of(
             of.all_of([of.variable(f"enabled({name})"), of.negation(granted[name])])
@@ -120,19 +145,21 @@ def _winning(of: Formulas, granted: Mapping[str, Formula], contest: _Contest) ->
 def _choice(
     of: Restated, group: ArbitrationGroup, in_table: ArbitrationGroup, central: _Contest, in_subnets: _Contest
 ) -> Stated:
-    wanted, given = _granted(of.of, group, central), _granted(of.of, in_table, in_subnets)
+    steps = _Steps(of.of)
+    wanted, given = (_granted(of.of, *at, steps) for at in ((group, central), (in_table, in_subnets)))
     winning, won = _winning(of.of, wanted, central), _winning(of.of, given, in_subnets)
     claims = []
     for name in wanted:
         claims += [of.of.equal(given[name], wanted[name]), of.of.equal(won[name], winning[name])]
-    taken: dict[Hashable, Formula] = {}
-    for place in dict.fromkeys(place for name in wanted for place in central.for_what.get(name, ())):
-        at = [given[name] for name in central.who[place]]
-        claims.append(of.at_most_one(at))
-        taken[place] = of.of.any_of(at)
+    taken: dict[_Key, Formula] = {}
+    for name in wanted:
+        for place in central.for_what.get(name, ()):
+            before = taken.get(place, FALSE)
+            claims.append(of.of.negation(of.of.all_of([before, given[name]])))
+            taken[place] = steps.either(before, given[name])
     for name in wanted:
         against = [taken[place] for place in central.for_what.get(name, ())]
         not_enabled = of.of.negation(of.of.variable(f"enabled({name})"))
         claims.append(of.of.any_of([not_enabled, of.of.any_of([given[name], *against])]))
     sentence = f"whatever is enabled, '{group.name}' grants a maximal set without conflict, as the central arbiter does"
-    return of.claim(f"arbitration.{group.name}", sentence, of.of.all_of(claims), tuple(wanted))
+    return of.claim(f"arbitration.{group.name}", sentence, of.of.all_of(claims), tuple(wanted), steps.given())

@@ -16,17 +16,18 @@ from firable.analysis.check import check
 from firable.analysis.evidence.document import Document
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
-from firable.analysis.induction.smt import Answer, Decision, Terms, value
+from firable.analysis.induction.smt import Answer, Decision, Operator, Terms, value
 from firable.analysis.report import CheckReport
 from firable.decompose.bundling import make_bundle
-from firable.decompose.proofs.arbitration import Competition, choice
+from firable.decompose.proofs.arbitration import Competition, Steps, arbitration, choice
 from firable.decompose.proofs.families import FAMILIES
+from firable.decompose.proofs.family import Task
 from firable.decompose.proofs.proving import ProofReport, prove
 from firable.decompose.proofs.script import Reader, ScriptError
 from firable.decompose.proofs.standing import ASSUMED_BY_THE_PROTOCOL, standing
 from firable.decompose.splitting.cut import split
 from firable.nets.bundle import Bundle
-from firable.nets.catalogue import catalogue_names, catalogue_net
+from firable.nets.catalogue import catalogue_names, catalogue_net, family_net
 from firable.nets.decomposition import Decomposition, Part
 from firable.nets.diagnostics import InputError
 from firable.nets.net import (
@@ -353,26 +354,51 @@ def test_choice_is_what_the_arbiter_decides_in_every_turn(data: st.DataObject) -
         among = among if by is ArbitrationRule.ORDER else list(dict.fromkeys(among))
         if len(set(among)) > 1:
             net = replace(net, arbiters=(Arbiter("next", tuple(f"t{t}" for t in among), by),))
-    arbitration = Arbitration.of(net)
+    arbiters = Arbitration.of(net)
     enabled = data.draw(st.frozensets(st.sampled_from(range(4))))
-    rotating = [group.sequence and group.by is not ArbitrationRule.PRIORITY for group in arbitration.groups]
+    rotating = [group.sequence and group.by is not ArbitrationRule.PRIORITY for group in arbiters.groups]
     turns = tuple(
         data.draw(st.integers(0, len(group.sequence) - 1)) if turn else 0
-        for group, turn in zip(arbitration.groups, rotating, strict=True)
+        for group, turn in zip(arbiters.groups, rotating, strict=True)
     )
-    decided, after = arbitration.decide(enabled, turns)
+    decided, after = arbiters.decide(enabled, turns)
     terms, competition = Terms(), Competition.of([(net, lambda t: f"t{t}")])
-    for group, turn, then in zip(arbitration.groups, turns, after, strict=True):
+    for group, turn, then in zip(arbiters.groups, turns, after, strict=True):
         sequence, rest = ([f"t{t}" for t in part] for part in (group.sequence, group.rest))
         turned = group.by is not ArbitrationRule.PRIORITY
-        chosen = choice(terms, sequence, rest, competition, turns=turned)
+        steps = Steps(terms)
+        chosen = choice(terms, steps, sequence, rest, competition, turns=turned)
         assignment = {f"enabled(t{t})": t in enabled for t in range(4)}
         assignment |= {f"turn({i})": i == turn for i in range(len(sequence))}
+        for is_so in steps.definitions():
+            assignment[is_so.operands[0].name] = value(is_so.operands[1], assignment)
         for t in (*group.sequence, *group.rest):
             assert value(chosen.granted[f"t{t}"], assignment) == (t in decided)
         if turned:
             winners = [t for t in group.preference(turn) if value(chosen.winning[f"t{t}"], assignment)]
             assert then == (group.turn_after(winners[-1], turn) if winners else turn)
+
+
+def test_net_and_table_share_every_step_of_the_choice_and_no_step_is_an_or_of_ors() -> None:
+    """So a solver has nothing to search for in what is equal, and nothing grows with the competitors of a place."""
+    sides = Task(split(family_net("vehicles-3-8")), 60_000).sides
+    assert all(len(sides.central_groups[name].rest) > 20 for name in sides.groups)
+    for obligation in list(arbitration(sides))[1:]:
+        for claim in obligation.claim.operands:
+            if claim.operator is Operator.EQUAL:
+                assert claim.operands[0] is claim.operands[1]
+        assert obligation.definitions
+        for definition in obligation.definitions:
+            assert all(operand.operator is not Operator.OR for operand in definition.operands[1].operands)
+
+
+def test_refuted_choice_is_told_without_its_steps() -> None:
+    decomposition = split(robot_with_jobs(4, ArbitrationRule.PRIORITY))
+    (group,) = decomposition.groups
+    turned = replace(decomposition, groups=(replace(group, rest=group.rest[::-1], sequence=group.sequence[::-1]),))
+    witness = refuted(turned)[f"arbitration.{group.name}"].witness
+    assert witness is not None
+    assert {name.partition("(")[0] for name, _ in witness.assignment} == {"enabled"}
 
 
 def robot_with_jobs(n: int, by: ArbitrationRule) -> Net:
