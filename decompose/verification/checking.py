@@ -38,7 +38,7 @@ def check_bundle(bundle: Bundle, *, solver: str = "cvc5", timeout_ms: int = TIME
 
     Raises `InputError`: F5002 where a verdict that the net requires is not proved, F6002 where the bundle does not show
     what it claims, and `ModuleNotFoundError` where the solver is not installed. Takes time linear in the bundle, but
-    for what its documents of evidence take.
+    for what its documents of evidence take, and groups of hundreds of competitors, which cvc5 may give up.
     """
     if problems := unproved(bundle):
         raise InputError(problems)
