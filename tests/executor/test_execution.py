@@ -1,17 +1,13 @@
-"""Running decompositions on the simulated cell: workpieces, situations, the operator's controls, the right to run."""
+"""Running decompositions on the simulated cell: workpieces, situations, the operator's controls."""
 
 import asyncio
 import io
 import random
-import subprocess
-import sys
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import cache
-from pathlib import Path
 
 import pytest
-from support.evidence_names import document_naming
+from support.cells import decomposition_of, firings, plant_of
 from support.owned_nets import owned_net
 
 from firable.decompose.splitting.cut import split
@@ -20,34 +16,20 @@ from firable.executor.execution import Execution
 from firable.executor.messages import ProtocolError
 from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.recorder import Recorder
-from firable.executor.running import Operator, RunReport, execute, load, run
+from firable.executor.running import Operator, RunReport, execute
 from firable.executor.situation import State, is_deadlock
 from firable.executor.token_player import TokenPlayer
-from firable.nets.bundle import Bundle, write_bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.decomposition import Decomposition
-from firable.nets.diagnostics import InputError
-from firable.nets.machines.plant_file import PlantModel, parse_plant, read_plant
+from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
-from firable.nets.right_to_run import required_verdicts
 from firable.nets.text import parse_net
-from firable.nets.verdict import Status, Verdict
 from firable.semantics.judgement import Judgement, judge
 from firable.semantics.player import Player
 from firable.semantics.replaying import replay
 from firable.semantics.trace import CommandSent, Fired, Noted, Trace, parse_trace
 
 CELLS = ["one_robot", "one_robot_mc_late_capacity", "two_robots_shared", "two_robots_separate"]
-
-
-@cache
-def decomposition_of(cell: str) -> Decomposition:
-    return split(catalogue_net(cell))
-
-
-@cache
-def plant_of(cell: str) -> PlantModel:
-    return read_plant(catalogue_path(cell).with_name(f"{cell}.plant.yaml"))
 
 
 def run_cell(
@@ -176,10 +158,6 @@ def test_sensor_stuck_at_one_makes_the_cell_act_on_nothing_which_the_plant_tells
     report, _ = run_cell("one_robot", 2, disturbances=[StuckSensor("conveyor.part_at_entry", value=True)])
     assert report.state is State.FAULT
     assert "CV1 is to carry from cv1_entry, where no workpiece lies" in report.situation.message
-
-
-def firings(execution: Execution) -> int:
-    return sum(execution.recorder.firings.values())
 
 
 def test_nothing_fires_during_a_pause_and_everything_goes_on_after_it() -> None:
@@ -465,78 +443,6 @@ def test_command_order_of_a_wrong_net_crashes_in_the_cell() -> None:
     assert "R pulls at a workpiece that is clamped on mc_table" in report.situation.message
 
 
-# The right to run
-
-
-def proved_bundle(cell: str = "one_robot") -> Bundle:
-    decomposition = decomposition_of(cell)
-    names = tuple(dict.fromkeys(required_verdicts(decomposition)))
-    verdicts = (
-        Verdict(name, Status.PROVED, "holds", "by hand", evidence=("file",), discipline="interleaving")
-        for name in names
-    )
-    return Bundle(decomposition, tuple(verdicts), {"file": document_naming(decomposition.net, names)})
-
-
-def test_proved_bundle_is_loaded_and_run(tmp_path: Path) -> None:
-    write_bundle(tmp_path / "cell.bundle", proved_bundle())
-    report = run(
-        load(tmp_path / "cell.bundle"), plant_of("one_robot"), workpieces=3, trace_path=tmp_path / "trace.jsonl"
-    )
-    assert report.delivered == (1, 2, 3)
-    assert report.to_json()["state"] == "done"
-    replayed = replay(catalogue_net("one_robot"), parse_trace((tmp_path / "trace.jsonl").read_text("utf-8")))
-    assert (replayed.firings, replayed.complete) == (45, True)
-
-
-@pytest.mark.parametrize("status", [Status.UNKNOWN, Status.VIOLATED])
-def test_bundle_with_an_unproved_verdict_is_refused(status: Status, tmp_path: Path) -> None:
-    bundle = proved_bundle()
-    verdicts = (*bundle.verdicts[:-1], replace(bundle.verdicts[-1], status=status))
-    write_bundle(tmp_path / "cell.bundle", replace(bundle, verdicts=verdicts))
-    with pytest.raises(InputError) as refusal:
-        load(tmp_path / "cell.bundle")
-    assert {problem.code for problem in refusal.value.diagnostics} == {"F5002"}
-    with pytest.raises(InputError):
-        run(replace(bundle, verdicts=verdicts), plant_of("one_robot"), workpieces=1)
-
-
-def test_bundle_without_a_verdict_is_refused(tmp_path: Path) -> None:
-    write_bundle(tmp_path / "cell.bundle", replace(proved_bundle(), verdicts=()))
-    with pytest.raises(InputError) as refusal:
-        load(tmp_path / "cell.bundle")
-    assert {problem.code for problem in refusal.value.diagnostics} == {"F5002"}
-
-
-def test_bundle_with_no_evidence_that_its_net_has_no_deadlock_is_not_run(tmp_path: Path) -> None:
-    """The deadlocking cell, with every verdict called proved, all but one with evidence."""
-    bundle = proved_bundle("one_robot_mc_late")
-    others = tuple(v.name for v in bundle.verdicts if v.name != "deadlock-free")
-    bare = tuple(replace(v, evidence=()) if v.name == "deadlock-free" else v for v in bundle.verdicts)
-    for verdicts, text in ((bare, bundle.evidence["file"]), (bundle.verdicts, document_naming(bundle.net, others))):
-        write_bundle(tmp_path / "cell.bundle", replace(bundle, verdicts=verdicts, evidence={"file": text}))
-        with pytest.raises(InputError) as refusal:
-            load(tmp_path / "cell.bundle")
-        assert [(d.code, d.subject) for d in refusal.value.diagnostics] == [("F5002", ("verdicts", "deadlock-free"))]
-
-
-def test_changed_bundle_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "cell.bundle"
-    write_bundle(path, proved_bundle())
-    data = path.read_bytes()
-    for at in range(0, len(data), len(data) // 37):
-        path.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
-        with pytest.raises(InputError) as refusal:
-            load(path)
-        assert [problem.code for problem in refusal.value.diagnostics] == ["F5001"]
-
-
-def test_plant_of_another_cell_is_refused() -> None:
-    with pytest.raises(InputError) as refusal:
-        run(proved_bundle(), plant_of("two_robots_shared"), workpieces=1)
-    assert {problem.code for problem in refusal.value.diagnostics} == {"F5003"}
-
-
 @pytest.mark.parametrize(("workpieces", "speed", "overdue_seconds"), [(-1, None, 1.0), (1, 0.0, 1.0), (1, None, 0.0)])
 def test_senseless_quantities_are_refused(workpieces: int, speed: float | None, overdue_seconds: float) -> None:
     with pytest.raises(ValueError, match="must"):
@@ -546,64 +452,3 @@ def test_senseless_quantities_are_refused(workpieces: int, speed: float | None, 
 def test_run_without_workpieces_is_done_at_once() -> None:
     report, _ = run_cell("one_robot", 0)
     assert (report.state, report.commands, report.simulated_seconds) == (State.DONE, 0, 0.0)
-
-
-def test_trace_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
-    for path in (tmp_path, tmp_path / "no" / "trace.jsonl"):
-        with pytest.raises(InputError) as refusal:
-            run(proved_bundle(), plant_of("one_robot"), workpieces=1, trace_path=path)
-        assert [problem.code for problem in refusal.value.diagnostics] == ["F1017"]
-
-
-def test_refused_run_leaves_an_older_trace_as_it_is(tmp_path: Path) -> None:
-    trace = tmp_path / "trace.jsonl"
-    trace.write_text("kept", encoding="utf-8")
-    unproved = replace(proved_bundle(), verdicts=())
-    for bundle, plant in ((proved_bundle(), plant_of("two_robots_shared")), (unproved, plant_of("one_robot"))):
-        with pytest.raises(InputError):
-            run(bundle, plant, workpieces=1, trace_path=trace)
-    with pytest.raises(ValueError, match="must"):
-        run(proved_bundle(), plant_of("one_robot"), workpieces=-1, trace_path=trace)
-    assert trace.read_text("utf-8") == "kept"
-
-
-def test_trace_is_on_disk_as_far_as_it_goes_while_the_run_waits(tmp_path: Path) -> None:
-    async def operator(execution: Execution) -> None:
-        while firings(execution) < 3:
-            await asyncio.sleep(0.5)
-        await execution.quiet()
-        so_far.append(parse_trace((tmp_path / "trace").read_text("utf-8")))
-
-    so_far: list[Trace] = []
-    run(proved_bundle(), plant_of("one_robot"), workpieces=1, trace_path=tmp_path / "trace", operator=operator)
-    assert replay(catalogue_net("one_robot"), so_far[0]).firings == 3
-
-
-@pytest.mark.parametrize("workpieces", [0, 1])  # the disk is full at the end, or in the middle of the run
-def test_full_disk_is_an_error_of_the_trace(workpieces: int) -> None:
-    with pytest.raises(InputError) as refusal:
-        run(proved_bundle(), plant_of("one_robot"), workpieces=workpieces, trace_path="/dev/full")
-    assert [problem.code for problem in refusal.value.diagnostics] == ["F1017"]
-    assert "/dev/full: the trace cannot be written: No space left" in str(refusal.value)
-
-
-def test_other_errors_of_the_system_are_not_taken_for_errors_of_the_trace(tmp_path: Path) -> None:
-    async def operator(execution: Execution) -> None:
-        raise ConnectionResetError("the panel is gone")
-
-    with pytest.raises(ConnectionResetError):
-        run(proved_bundle(), plant_of("one_robot"), workpieces=1, trace_path=tmp_path / "trace", operator=operator)
-
-
-def test_executor_runs_without_solvers_and_without_the_rooms_that_prove(tmp_path: Path) -> None:
-    write_bundle(tmp_path / "cell.bundle", proved_bundle())
-    program = f"""
-import sys
-from firable.executor import load, read_plant, run
-plant = read_plant({str(catalogue_path("one_robot").with_name("one_robot.plant.yaml"))!r})
-assert run(load({str(tmp_path / "cell.bundle")!r}), plant, workpieces=2).delivered == (1, 2)
-heavy = {{"z3", "networkx", "numpy", "firable.analysis", "firable.decompose", "firable.cli"}}
-print(sorted(heavy & set(sys.modules)))
-"""
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert (done.stdout, done.stderr) == ("[]\n", "")
