@@ -104,7 +104,8 @@ class Correspondence:
 
     def renamed(self, of: T) -> T:
         """A property or formula of the conceptual net in the names of the detailed one."""
-        return self._renamed(of)  # type: ignore[no-any-return]
+        renamed: T = self._renamed(of)
+        return renamed
 
     def _renamed(self, node: Any) -> Any:
         match node:
@@ -116,11 +117,11 @@ class Correspondence:
                 return Fires(self.transitions[transition])
             case tuple():
                 return tuple(self._renamed(one) for one in node)
-            case _ if is_dataclass(node):
+            case _ if is_dataclass(node) and not isinstance(node, type):
                 changed = {one.name: self._renamed(getattr(node, one.name)) for one in fields(node)}
                 if "places" in changed:  # a count names its places by themselves
                     changed["places"] = tuple(self.places[place] for place in changed["places"])
-                return replace(node, **changed)  # type: ignore[type-var]
+                return replace(node, **changed)
         return node
 
 

@@ -125,7 +125,7 @@ def _by_optimiser(asked: _Asked, known: Found | None, deadline: Deadline) -> Fou
         solver.add(z3.PbEq([(one, 1) for one in of_block], 1))
         for part in range(1, asked.n_parts):
             opened = [at[before][part - 1] for before in range(block)]
-            solver.add(z3.Implies(of_block[part], z3.Or(*opened, z3.BoolVal(False, solver.ctx))))  # noqa: FBT003
+            solver.add(z3.Implies(of_block[part], z3.Or(opened)) if opened else z3.Not(of_block[part]))
     heaviest = z3.Int("heaviest", solver.ctx)
     for part in parts:
         weight = z3.Sum([z3.If(of[part], w, 0) for of, w in zip(at, graph.weights, strict=True)])

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from threading import Event
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -15,6 +16,8 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.equivalence import branching_bisimilar
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
+from firable.analysis.spaces.space import StateSpace
+from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.decompose.protocol import exploring
 from firable.decompose.protocol.building import ProtocolNet, protocol_net
 from firable.decompose.protocol.divergence import not_falling, weights
@@ -85,9 +88,7 @@ def test_table_and_diagram_agree_on_the_protocol() -> None:
     assert table.space.n_markings == diagram.space.n_markings
 
 
-def _diagram(protocol: ProtocolNet):  # type: ignore[no-untyped-def]
-    from firable.analysis.spaces.symbolic import explore_symbolically
-
+def _diagram(protocol: ProtocolNet) -> StateSpace[Any]:
     return explore_symbolically(protocol.net, orders=protocol.orders)
 
 

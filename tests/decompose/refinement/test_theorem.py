@@ -314,7 +314,13 @@ tasks:
     end: {from: taking}
   take:
     roles:
-      hand: {steps: {grasp: {place: "grasp_{shelf}", send: {machine: "{hand.machine}", command: GRASP}, until: "{hand.prefix}touch"}, lift: {place: "lift_{shelf}"}}}
+      hand:
+        steps:
+          grasp:
+            place: "grasp_{shelf}"
+            send: {machine: "{hand.machine}", command: GRASP}
+            until: "{hand.prefix}touch"
+          lift: {place: "lift_{shelf}"}
       shelf: {steps: {held: {place: "{shelf}_held"}}}
     moves: {b: {from: [hand.grasp, shelf.held], to: hand.lift, release: shelf}}
   place:
@@ -322,7 +328,7 @@ tasks:
       robot: {steps: {carry: {place: "to_{target}"}, put: {place: "put_{target}"}}}
       target: {steps: {open: {place: "open_for_{robot}"}}}
     moves: {c: {from: robot.carry, to: robot.put}}
-"""  # noqa: E501 - a file of tasks
+"""
 
 
 def test_tasks_within_tasks_are_opened_to_the_innermost_and_the_theorem_holds_through_them() -> None:
