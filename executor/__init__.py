@@ -14,11 +14,11 @@ The voting protocol (`coordinator`, `controller`, `messages`) is pure: no clock,
 imports `semantics` and `nets` and nothing that proves.
 """
 
-from firable.executor.drivers import Driver
-from firable.executor.execution import Execution
-from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
-from firable.executor.running import Operator, RunReport, execute, load, run
-from firable.executor.situation import Blocked, Situation, State
+from firable.executor.cell.plant import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.drivers.driver import Driver
+from firable.executor.operating.execution import Execution
+from firable.executor.operating.running import Operator, RunReport, execute, load, run
+from firable.executor.operating.situation import Blocked, Situation, State
 from firable.nets.machines.plant_file import PlantModel, read_plant
 
 __all__ = [

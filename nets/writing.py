@@ -3,7 +3,8 @@
 The bytes go into a file beside the place, to the disk, and are renamed into the place: whoever opens the file finds
 the old content or the new, also after a power failure, and never half of either. Writing into the place itself would
 lose the old content first. A link is followed, so that it stays one; a device or a pipe is refused, because a rename
-would put a file where it was. A trace, which grows while a cell runs, is written by `firable.executor.recorder`.
+would put a file where it was. A trace, which grows while a cell runs, is
+written by `firable.executor.operating.recorder`.
 """
 
 from __future__ import annotations

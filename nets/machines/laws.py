@@ -1,9 +1,9 @@
 """The laws of the plant as cases: what each command wants when it is sent, what it does when it is done.
 
-These are the laws that the simulated cell obeys (`firable.executor.plant`), without times: each station and each hand
-holds a workpiece or none; a machine is idle or at one command; a hand is at one position; a station is clamped or not.
-Each of these facts is a place, and what has one of several values is *one-hot*: a place for each value, so that each
-condition is one gate. What cannot be done (laying a workpiece on another, a command to a busy machine) is an
+These are the laws that the simulated cell obeys (`firable.executor.cell.plant`), without times: each station and each
+hand holds a workpiece or none; a machine is idle or at one command; a hand is at one position; a station is clamped or
+not. Each of these facts is a place, and what has one of several values is *one-hot*: a place for each value, so that
+each condition is one gate. What cannot be done (laying a workpiece on another, a command to a busy machine) is an
 *accident*.
 
 A command acts at two instants. It is *sent*: what it wants is checked, and a conveyor takes its workpiece. It is

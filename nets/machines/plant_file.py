@@ -6,8 +6,8 @@ a net and its cell, so a plant knows nothing that a real cell would not. Times a
 end in `_s`.
 
 One file serves both readers, because both must be told the same facts. `firable run` plays it with its times
-(`firable.executor.plant`); `firable check --machines` leaves the times out and keeps every order in which things can
-happen (`firable.nets.machines.closing`). Two keys speak to the second reader alone: `may_fail` of a command, and
+(`firable.executor.cell.plant`); `firable check --machines` leaves the times out and keeps every order in which things
+can happen (`firable.nets.machines.closing`). Two keys speak to the second reader alone: `may_fail` of a command, and
 `may_flicker` and `may_linger` of a sensor; a simulated run is disturbed by its caller instead. The alternative, a file
 of machines beside the plant file, with "idle, busy, done" and the sensors that each command sets, says the same things
 a second time and cannot say why two machines collide.

@@ -7,6 +7,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from support.executor_modules import executor_modules
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("nets", "semantics", "analysis", "decompose", "executor", "cli")
@@ -55,8 +56,8 @@ def test_the_executor_and_the_help_need_no_solver(thin: Path, tmp_path: Path) ->
     installed = run(thin / "python", "-m", "pip", "list", "--disable-pip-version-check").lower()
     assert not any(solver in installed for solver in ("z3", "networkx", "numpy"))
     assert "Usage: firable" in run(thin / "firable", "--help", cwd=tmp_path)
-    modules = [f"firable.executor.{path.stem}" for path in (ROOT / "executor").glob("*.py") if path.stem != "__init__"]
-    run(thin / "python", "-c", f"import firable.executor, {', '.join(modules)}", cwd=tmp_path)
+    modules = executor_modules()
+    run(thin / "python", "-c", f"import {', '.join(modules)}", cwd=tmp_path)
     assert "<svg" in run(thin / "firable", "draw", "catalogue:one_robot", cwd=tmp_path)
 
 

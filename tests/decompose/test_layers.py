@@ -17,7 +17,7 @@ from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.proving import prove
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.table import table_text
-from firable.executor.simulation import Network, Simulation
+from firable.executor.simulation.network import Network, Simulation
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError

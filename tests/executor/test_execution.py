@@ -11,14 +11,14 @@ from support.cells import decomposition_of, firings, plant_of
 from support.owned_nets import owned_net
 
 from firable.decompose.splitting.cut import split
-from firable.executor.drivers import SimulatedDriver
-from firable.executor.execution import Execution
-from firable.executor.messages import ProtocolError
-from firable.executor.plant import Disturbance, NeverCompletes, StuckSensor
-from firable.executor.recorder import Recorder
-from firable.executor.running import Operator, RunReport, execute
-from firable.executor.situation import State, is_deadlock
-from firable.executor.token_player import TokenPlayer
+from firable.executor.cell.plant import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.drivers.simulated import SimulatedDriver
+from firable.executor.operating.execution import Execution
+from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.running import Operator, RunReport, execute
+from firable.executor.operating.situation import State, is_deadlock
+from firable.executor.protocol.messages import ProtocolError
+from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.machines.plant_file import PlantModel, parse_plant
@@ -382,7 +382,7 @@ def test_nothing_fires_in_a_step_that_a_stop_overtakes(yields: int) -> None:
 
 
 def test_net_that_runs_in_circles_without_its_cell_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("firable.executor.execution.FIRINGS_AT_ONCE_MAX", 500)
+    monkeypatch.setattr("firable.executor.operating.execution.FIRINGS_AT_ONCE_MAX", 500)
     report = execute(circles("a"), NO_MACHINES, workpieces=1)
     assert report.state is State.FAULT
     assert "fire without end" in report.situation.message

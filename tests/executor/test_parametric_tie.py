@@ -19,9 +19,9 @@ from support.reference import load_net
 
 from firable.decompose.protocol.parametric.system import PROTOCOL
 from firable.decompose.splitting.cut import split
-from firable.executor.controller import LocalController
-from firable.executor.coordinator import Coordinator, Round
-from firable.executor.messages import (
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator, Round
+from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
     Effect,
@@ -32,8 +32,8 @@ from firable.executor.messages import (
     Vote,
     VoteRequest,
 )
-from firable.executor.simulation import Network, Simulation
-from firable.executor.token_player import Compiled, TokenPlayer
+from firable.executor.protocol.token_player import Compiled, TokenPlayer
+from firable.executor.simulation.network import Network, Simulation
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition

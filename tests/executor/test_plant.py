@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from firable.executor.plant import (
+from firable.executor.cell.plant import (
     CommandDone,
     Disturbance,
     NeverCompletes,

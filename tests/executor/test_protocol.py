@@ -12,9 +12,9 @@ from support.owned_nets import owned_net, owned_nets
 from support.reference import load_net
 
 from firable.decompose.splitting.cut import split
-from firable.executor.controller import LocalController, Promise
-from firable.executor.coordinator import Coordinator, Round
-from firable.executor.messages import (
+from firable.executor.protocol.controller import LocalController, Promise
+from firable.executor.protocol.coordinator import Coordinator, Round
+from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
     Effect,
@@ -29,8 +29,8 @@ from firable.executor.messages import (
     Vote,
     VoteRequest,
 )
-from firable.executor.simulation import Network, ProgressLostError, Simulation
-from firable.executor.token_player import Compiled, TokenPlayer
+from firable.executor.protocol.token_player import Compiled, TokenPlayer
+from firable.executor.simulation.network import Network, ProgressLostError, Simulation
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError

@@ -10,8 +10,8 @@ import pytest
 from support.cells import decomposition_of, firings, plant_of
 from support.evidence_names import document_naming
 
-from firable.executor.execution import Execution
-from firable.executor.running import load, run
+from firable.executor.operating.execution import Execution
+from firable.executor.operating.running import load, run
 from firable.nets.bundle import Bundle, write_bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError

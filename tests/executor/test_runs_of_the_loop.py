@@ -13,9 +13,9 @@ from functools import cache
 import pytest
 
 from firable.decompose.splitting.cut import split
-from firable.executor.plant import Disturbance, NeverCompletes
-from firable.executor.running import execute
-from firable.executor.situation import State
+from firable.executor.cell.plant import Disturbance, NeverCompletes
+from firable.executor.operating.running import execute
+from firable.executor.operating.situation import State
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines.closing import close
 from firable.nets.machines.loop import ClosedLoop, Faults, Sending

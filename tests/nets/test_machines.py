@@ -11,9 +11,9 @@ import pytest
 from support.bench_cell import COMMANDS, bench, free_cell
 from support.examples import seeds
 
-from firable.executor.plant import Plant, PlantFault, PlantReport
-from firable.executor.plant import _Busy as Busy
-from firable.executor.plant import _Finish as Finish
+from firable.executor.cell.plant import Plant, PlantFault, PlantReport
+from firable.executor.cell.plant import _Busy as Busy
+from firable.executor.cell.plant import _Finish as Finish
 from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.closing import close

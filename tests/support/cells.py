@@ -3,7 +3,7 @@
 from functools import cache
 
 from firable.decompose.splitting.cut import split
-from firable.executor.execution import Execution
+from firable.executor.operating.execution import Execution
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.machines.plant_file import PlantModel, read_plant

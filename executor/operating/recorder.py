@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
-from firable.executor.token_player import TokenPlayer
+from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
 from firable.nets.source import printable

@@ -18,12 +18,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from firable.executor.drivers import SimulatedDriver
-from firable.executor.execution import Execution
-from firable.executor.plant import Disturbance, Plant
-from firable.executor.recorder import LineStream, Recorder, TraceFile
-from firable.executor.situation import Situation, State
-from firable.executor.virtual_time import run_in_virtual_time
+from firable.executor.cell.plant import Disturbance, Plant
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.simulated import SimulatedDriver
+from firable.executor.operating.execution import Execution
+from firable.executor.operating.recorder import LineStream, Recorder, TraceFile
+from firable.executor.operating.situation import Situation, State
 from firable.nets.bundle import Bundle, read_bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from firable.executor.messages import (
+from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
     Effect,
@@ -31,7 +31,7 @@ from firable.executor.messages import (
     Vote,
     VoteRequest,
 )
-from firable.executor.token_player import Arbiter, TokenPlayer
+from firable.executor.protocol.token_player import Arbiter, TokenPlayer
 from firable.nets.decomposition import Decomposition
 
 

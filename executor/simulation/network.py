@@ -16,9 +16,9 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from firable.executor.controller import LocalController
-from firable.executor.coordinator import Coordinator
-from firable.executor.messages import (
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
     Effect,
@@ -30,7 +30,7 @@ from firable.executor.messages import (
     Vote,
     VoteRequest,
 )
-from firable.executor.token_player import TokenPlayer
+from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Marking, SignalKind
 from firable.semantics.trace import CommandSent, End, Event, Fired, Header, SignalChanged, Trace

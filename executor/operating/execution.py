@@ -22,11 +22,13 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from typing import Final, assert_never
 
-from firable.executor.controller import LocalController
-from firable.executor.coordinator import Coordinator
-from firable.executor.drivers import Driver
-from firable.executor.mailbox import Continue, Mailbox, SignalRead
-from firable.executor.messages import (
+from firable.executor.drivers.driver import Driver
+from firable.executor.operating.mailbox import Continue, Mailbox, SignalRead
+from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.situation import Situation, State, blocked, is_deadlock
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
     Effect,
@@ -39,8 +41,6 @@ from firable.executor.messages import (
     Vote,
     VoteRequest,
 )
-from firable.executor.recorder import Recorder
-from firable.executor.situation import Situation, State, blocked, is_deadlock
 from firable.nets.decomposition import Decomposition
 
 COORDINATOR: Final = ""

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from firable.executor.messages import (
+from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
     Effect,
@@ -34,7 +34,7 @@ from firable.executor.messages import (
     Vote,
     VoteRequest,
 )
-from firable.executor.token_player import Arbiter, Compiled, TokenPlayer
+from firable.executor.protocol.token_player import Arbiter, Compiled, TokenPlayer
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Marking
 

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
-from firable.executor.token_player import TokenPlayer, Word
+from firable.executor.protocol.token_player import TokenPlayer, Word
 
 
 class State(StrEnum):

@@ -1,0 +1,1 @@
+"""The simulated cell: machines, stations and workpieces, and a clock that jumps."""

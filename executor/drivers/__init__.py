@@ -1,0 +1,1 @@
+"""Drivers: the border between the executor and the machines."""
