@@ -18,7 +18,7 @@ from typing import NoReturn
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.net import Marking, Net
 from firable.semantics.player import Player
-from firable.semantics.trace import CommandSent, Discipline, End, Fired, Noted, SignalChanged, Trace
+from firable.semantics.trace import CommandSent, Discipline, End, Event, Fired, Header, Noted, SignalChanged, Trace
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,105 +33,118 @@ class Replay:
 
 def replay(net: Net, trace: Trace) -> Replay:
     """Play the trace by the reference player; raises `InputError` F5004 with the line that is no event of the net."""
-    return _Replayer(net, trace).run()
+    replayer = Replayer(net, trace.header, trace.file)
+    for event in trace.events:
+        replayer.take(event)
+    if trace.end is not None:
+        replayer.end(trace.end)
+    return Replay(replayer.marking, replayer.firings, replayer.commands, trace.end is not None)
 
 
-class _Replayer:
-    """The marking, the valuation and the commands owed, as the trace goes on."""
+class Replayer:
+    """The marking, the valuation and the commands owed, as a trace goes on: a judge of one event after the other.
 
-    def __init__(self, net: Net, trace: Trace) -> None:
+    `player` plays the tokens: the reference player, or one that remembers what it has answered. Raises `InputError`
+    F5004 at the first line that is no event of the net, the header among them.
+    """
+
+    def __init__(self, net: Net, header: Header, file: str = "<trace>", player: Player | None = None) -> None:
         self.net = net
-        self.trace = trace
-        self.player = Player(net)
+        self.header = header
+        self.file = file
+        self.player = player or Player(net)
         self.marking = net.initial_marking
         self.signals: dict[str, bool] = {}
         self.owed: set[str] = set()
         self.now_seconds = 0.0
         self.firings = 0
         self.commands = 0
+        self.line = 1
+        """The number of the line that is judged."""
+        if header.net != net.name:
+            self._deviates(header, f"the trace is of the net '{header.net}'", f"this net is '{net.name}'")
 
-    def deviates(self, number: int, message: str, hint: str) -> NoReturn:
-        record = (self.trace.header, *self.trace.events, *((self.trace.end,) if self.trace.end else ()))[number - 1]
-        span = Span(self.trace.file, number, 1, json.dumps(record.to_json()))
+    def _deviates(self, record: Header | Event | End, message: str, hint: str) -> NoReturn:
+        span = Span(self.file, self.line, 1, json.dumps(record.to_json()))
         raise InputError([Diagnostic("F5004", message, hint, span=span)])
 
-    def run(self) -> Replay:
-        if self.trace.header.net != self.net.name:
-            self.deviates(1, f"the trace is of the net '{self.trace.header.net}'", f"this net is '{self.net.name}'")
-        number = 1
-        for number, event in enumerate(self.trace.events, start=2):
-            self.passed(number, event.at_seconds)
-            match event:
-                case Fired():
-                    self.fired(number, event)
-                case SignalChanged():
-                    self.changed(number, event)
-                case CommandSent():
-                    self.sent(number, event)
-                case Noted():
-                    pass
-        if self.trace.end is not None:
-            self.passed(number + 1, self.trace.end.at_seconds)
-            self.ended(number + 1, self.trace.end)
-        return Replay(self.marking, self.firings, self.commands, self.trace.end is not None)
+    def take(self, event: Event) -> None:
+        """Judge the next event."""
+        self.line += 1
+        self._passed(event, event.at_seconds)
+        match event:
+            case Fired():
+                self._fired(event)
+            case SignalChanged():
+                self._changed(event)
+            case CommandSent():
+                self._sent(event)
+            case Noted():
+                pass
 
-    def passed(self, number: int, at_seconds: float) -> None:
+    def end(self, end: End) -> None:
+        """Judge the last line."""
+        self.line += 1
+        self._passed(end, end.at_seconds)
+        self._ended(end)
+
+    def _passed(self, record: Event | End, at_seconds: float) -> None:
         if at_seconds < self.now_seconds:
-            self.deviates(number, "time runs backwards", f"the line before is of {self.now_seconds:g} s")
+            self._deviates(record, "time runs backwards", f"the line before is of {self.now_seconds:g} s")
         self.now_seconds = at_seconds
 
-    def changed(self, number: int, event: SignalChanged) -> None:
+    def _changed(self, event: SignalChanged) -> None:
         if event.signal not in self.net.signal_index:
-            self.deviates(number, f"there is no signal '{event.signal}'", "is the trace of another net?")
+            self._deviates(event, f"there is no signal '{event.signal}'", "is the trace of another net?")
         unsent = [place for place in sorted(self.owed) if self.net.place(place).completion == event.signal]
         if event.value and unsent:
-            self.deviates(
-                number, f"'{event.signal}' completes a command of '{unsent[0]}' that was not sent", "it is stale"
+            self._deviates(
+                event, f"'{event.signal}' completes a command of '{unsent[0]}' that was not sent", "it is stale"
             )
         self.signals[event.signal] = event.value
 
-    def fired(self, number: int, event: Fired) -> None:
+    def _fired(self, event: Fired) -> None:
         if unknown := [name for name in event.transitions if name not in self.net.transition_index]:
-            self.deviates(number, f"there is no transition '{unknown[0]}'", "is the trace of another net?")
-        if self.trace.header.discipline is Discipline.INTERLEAVING and len(event.transitions) > 1:
-            self.deviates(number, "several transitions fire at once", "under interleaving they fire one at a time")
+            self._deviates(event, f"there is no transition '{unknown[0]}'", "is the trace of another net?")
+        if self.header.discipline is Discipline.INTERLEAVING and len(event.transitions) > 1:
+            self._deviates(event, "several transitions fire at once", "under interleaving they fire one at a time")
         fired = [self.net.transition_index[name] for name in event.transitions]
         if len(set(fired)) < len(fired):
-            self.deviates(number, "a transition fires twice at once", "write it once")
+            self._deviates(event, "a transition fires twice at once", "write it once")
         firable = self.player.firable(self.marking)
-        judged = self.trace.header.signals
+        judged = self.header.signals
         enabled = self.player.enabled(self.marking, self.signals) if judged else firable
         for t in fired:
             transition = self.net.transitions[t]
             if t not in firable:
-                self.deviates(number, f"'{transition.name}' is not firable", self.why_not(t))
+                self._deviates(event, f"'{transition.name}' is not firable", self._why_not(t))
             if not transition.openable:
-                self.deviates(number, f"'{transition.name}' can never fire", "it wants one signal both 1 and 0")
+                self._deviates(event, f"'{transition.name}' can never fire", "it wants one signal both 1 and 0")
             if t not in enabled:
                 # That it is closed, the firing rule has said; which gate it is, the message wants to know.
                 gate = next(g for g in transition.external if self.signals.get(g.signal, False) != g.wanted)
-                self.deviates(
-                    number,
+                self._deviates(
+                    event,
                     f"'{transition.name}' fires although its external gate is closed",
                     f"'{gate.signal}' is {int(not gate.wanted)} and must be {int(gate.wanted)}",
                 )
         if not self.player.conflicts.free(fired):
-            self.deviates(number, "transitions in conflict fire together", "they share an input or an output place")
-        step = self.trace.header.discipline is Discipline.STEP
-        if step and not self.is_a_step(fired):
-            self.deviates(number, "not a maximal step", "an enabled transition without conflict is left out")
+            self._deviates(event, "transitions in conflict fire together", "they share an input or an output place")
+        step = self.header.discipline is Discipline.STEP
+        if step and not self._is_a_step(fired):
+            self._deviates(event, "not a maximal step", "an enabled transition without conflict is left out")
         after = self.player.fire(self.marking, fired)
-        self.entered(number, after)
+        self._entered(event, after)
         self.marking = after
         self.firings += len(fired)
 
-    def is_a_step(self, fired: list[int]) -> bool:
+    def _is_a_step(self, fired: list[int]) -> bool:
         wanted = tuple(sorted(fired))
-        if self.trace.header.signals:
+        if self.header.signals:
             return wanted in self.player.maximal_steps(self.player.enabled(self.marking, self.signals))
         return self.player.is_step(self.marking, wanted)
 
-    def why_not(self, t: int) -> str:
+    def _why_not(self, t: int) -> str:
         masks, names = self.net.masks[t], self.net.names
         reasons = []
         if missing := names((masks.inputs | masks.permissive) & ~self.marking):
@@ -140,36 +153,36 @@ class _Replayer:
             reasons.append(f"{', '.join(full)} must be empty")
         return "; ".join(reasons)
 
-    def entered(self, number: int, after: Marking) -> None:
+    def _entered(self, event: Fired, after: Marking) -> None:
         entered = self.net.names(after & ~self.marking)
         for place in entered:
             if (completion := self.net.place(place).completion) is not None:
                 self.signals[completion] = False
-        if not self.trace.header.commands:
+        if not self.header.commands:
             return
         left = self.net.names(self.marking & ~after)
         if unsent := [place for place in left if place in self.owed]:
             command = self.net.place(unsent[0]).command
-            self.deviates(number, f"the token leaves '{unsent[0]}' before its command was sent", f"expected: {command}")
+            self._deviates(event, f"the token leaves '{unsent[0]}' before its command was sent", f"expected: {command}")
         self.owed.update(place for place in entered if self.net.place(place).command is not None)
 
-    def sent(self, number: int, event: CommandSent) -> None:
+    def _sent(self, event: CommandSent) -> None:
         if event.place not in self.owed:
             known = event.place in self.net.place_index
             reason = "no token has entered it since its last command" if known else "there is no such place"
-            self.deviates(number, f"a command of '{event.place}' that is not due", reason)
+            self._deviates(event, f"a command of '{event.place}' that is not due", reason)
         self.owed.remove(event.place)
         self.commands += 1
 
-    def ended(self, number: int, end: End) -> None:
+    def _ended(self, end: End) -> None:
         shown = self.net.names(self.marking)
         if set(end.marking) != set(shown) or len(end.marking) != len(shown):
-            self.deviates(
-                number, "the trace ends in another marking than it shows", f"reached: {', '.join(shown) or 'none'}"
+            self._deviates(
+                end, "the trace ends in another marking than it shows", f"reached: {', '.join(shown) or 'none'}"
             )
         if end.reason == "deadlock" and not self.player.deadlocked(self.marking):
-            self.deviates(number, "the trace ends in a deadlock that is none", "some transition is firable")
+            self._deviates(end, "the trace ends in a deadlock that is none", "some transition is firable")
         if self.owed:
-            self.deviates(
-                number, f"the command of '{min(self.owed)}' was never sent", "each entry sends its command once"
+            self._deviates(
+                end, f"the command of '{min(self.owed)}' was never sent", "each entry sends its command once"
             )
