@@ -24,6 +24,9 @@ from firable.cli.text import show_errors
 _EXTRA = {
     **dict.fromkeys(("z3", "networkx", "numpy", "platformdirs"), ("prove", "all that checking and proving need")),
     "mtkahypar": ("split", "what looks for owners of large nets"),
+    "zenoh": ("zenoh", "the link between hosts over a network"),
+    "serial": ("serial", "what serial lines need"),
+    "cryptography": ("sign", "what signs bundles and checks signatures"),
     "cvc5": ("verify", "the second solver; or ask the first one: --solver z3"),
 }
 

@@ -99,6 +99,9 @@ CODES: Final[dict[str, str]] = {
     "F5004": "the trace is not a trace of the net",
     "F5005": "the trace file is malformed",
     "F5006": "layers that are executed as one",
+    "F5020": "a host that may not take part",
+    "F5021": "a link that cannot be opened",
+    "F5022": "a link that is open to the network",
     # F6: evidence
     "F6001": "the evidence is damaged or malformed",
     "F6002": "the evidence does not show what it claims",

@@ -4,7 +4,12 @@ from pathlib import Path
 
 EXECUTOR = Path(__file__).parent.parent.parent / "executor"
 
-WITH_A_LIBRARY: frozenset[str] = frozenset()
+WITH_A_LIBRARY: frozenset[str] = frozenset(
+    {
+        "firable.executor.links.serial_line",
+        "firable.executor.links.zenoh_link",
+    }
+)
 """The modules that import what an extra brings: a device's protocol, or a transport between hosts."""
 
 

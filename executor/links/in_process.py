@@ -1,0 +1,116 @@
+"""Hosts in one process: a link that hands messages over on the event loop, as objects.
+
+Messages are frozen, so handing one over is as good as copying it. Each is delivered by an act of its own, never inside
+`send`: a machine is not asked anything while it is in the middle of an act. In virtual time that makes a run with
+several hosts a function of its seed, like one with a single host.
+
+`cut` and `mend` part hosts and join them again, for tests of what a cell does while a line is down. Messages under way
+are lost then, as they would be on a line.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable
+
+from firable.executor.links.link import Greeting, LinkListener, objection
+from firable.executor.protocol.messages import Message
+
+
+class Exchange:
+    """Where the links of one process meet."""
+
+    def __init__(self) -> None:
+        self.present: list[InProcessLink] = []
+        self.parted: set[InProcessLink] = set()
+
+    def reached(self, link: InProcessLink) -> list[InProcessLink]:
+        """The links that `link` is joined to."""
+        if link in self.parted or link not in self.present:
+            return []
+        return [other for other in self.present if other is not link and other not in self.parted]
+
+    def cut(self, link: InProcessLink) -> None:
+        """Part a host from all others."""
+        for other in self.reached(link):
+            link.lose(other)
+            other.lose(link)
+        self.parted.add(link)
+
+    def mend(self, link: InProcessLink) -> None:
+        """Join a host to the others again."""
+        self.parted.discard(link)
+        self._meet(link)
+
+    def enter(self, link: InProcessLink) -> None:
+        """A host has come."""
+        self.present.append(link)
+        self._meet(link)
+
+    def leave(self, link: InProcessLink) -> None:
+        """A host has gone."""
+        for other in self.reached(link):
+            other.lose(link)
+        self.present.remove(link)
+
+    def _meet(self, link: InProcessLink) -> None:
+        for other in self.reached(link):
+            link.meet(other)
+            other.meet(link)
+
+
+class InProcessLink:
+    """The link of one host of a process."""
+
+    def __init__(self, exchange: Exchange, greeting: Greeting) -> None:
+        self.exchange = exchange
+        self.greeting = greeting
+        self.listener: LinkListener | None = None
+        self.peers: dict[str, InProcessLink] = {}
+
+    async def run(self, listener: LinkListener) -> None:
+        """Be reached until cancelled."""
+        self.listener = listener
+        self.exchange.enter(self)
+        try:
+            await asyncio.get_running_loop().create_future()
+        finally:
+            self.exchange.leave(self)
+            self.peers.clear()
+            self.listener = None
+
+    def send(self, sender: str, receiver: str, message: Message) -> None:
+        """Hand over a message; without a host for its receiver it is lost."""
+        peer = self.peers.get(receiver)
+        if peer is not None:
+            asyncio.get_running_loop().call_soon(self._deliver, peer, sender, receiver, message)
+
+    def meet(self, other: InProcessLink) -> None:
+        """Greet another host."""
+        problem = objection(self.greeting, other.greeting)
+        for name in other.greeting.names:
+            if problem is not None:
+                self._tell().refused(name, problem)
+            else:
+                self.peers[name] = other
+                self._tell().connected(name)
+
+    def lose(self, other: InProcessLink) -> None:
+        """Another host is no longer reached."""
+        for name in _names_of(self.peers, other):
+            del self.peers[name]
+            self._tell().lost(name)
+
+    def _deliver(self, peer: InProcessLink, sender: str, receiver: str, message: Message) -> None:
+        # What was under way when the line was cut, or the receiver ended, is lost.
+        if self.peers.get(receiver) is peer and peer.listener is not None:
+            peer.listener.arrived(sender, receiver, message)
+
+    def _tell(self) -> LinkListener:
+        if self.listener is None:
+            raise RuntimeError("the link does not run")
+        return self.listener
+
+
+def _names_of(peers: dict[str, InProcessLink], link: InProcessLink) -> Iterable[str]:
+    return [name for name, peer in peers.items() if peer is link]

@@ -1,0 +1,100 @@
+"""The link: all that a host needs to know of how messages reach other hosts.
+
+A link carries messages between machines (controllers and coordinators) by their names. It may lose them, deliver them
+twice and in any order: repeats, epochs and deadlines are the protocol's and the host's, and would be done twice if a
+link did them, too. What a link does promise: a message arrives as it was sent or not at all, from the peer that it
+names, and only between hosts that hold the same bundle.
+
+At each connection both sides say who they are (`Greeting`): the version of the protocol, the digest of the bundle and
+the names of the machines. Whoever holds another bundle is refused, with a diagnostic that says so, and nothing of it
+is delivered: two controllers of different nets could promise each other parts that do not exist.
+
+Rejected: a link with acknowledged delivery. Its queue would hold old votes back behind a dead line and deliver them
+late, which the protocol must withstand anyway; and an end-to-end acknowledgement is needed all the same (O5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from firable.executor.protocol.messages import Message
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.source import printable
+
+PROTOCOL_VERSION: Final = 1
+"""Which messages there are and what they mean; hosts of different versions do not talk."""
+
+COORDINATOR: Final = ""
+"""The name of a coordinator that has no other; no controller has the empty name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Greeting:
+    """Who a host is: the digest of its bundle, and the machines that it runs."""
+
+    digest: str
+    names: tuple[str, ...]
+    version: int = PROTOCOL_VERSION
+
+
+class LinkListener(Protocol):
+    """Whom a link tells, always on the event loop that it runs on."""
+
+    def arrived(self, sender: str, receiver: str, message: Message) -> None:
+        """A message has come; `sender` is a connected peer, `receiver` one of the own machines."""
+        ...
+
+    def connected(self, peer: str) -> None:
+        """The machine `peer` can be reached, and has the same bundle."""
+        ...
+
+    def lost(self, peer: str) -> None:
+        """The machine `peer` can no longer be reached, or has been started anew, which `connected` says then."""
+        ...
+
+    def refused(self, peer: str, problem: Diagnostic) -> None:
+        """A host that calls itself `peer` was refused; nothing of it is delivered."""
+        ...
+
+
+class Link(Protocol):
+    """The way to the other hosts."""
+
+    async def run(self, listener: LinkListener) -> None:
+        """Serve until cancelled; raises `InputError` F5021 where the link cannot be opened."""
+        ...
+
+    def send(self, sender: str, receiver: str, message: Message) -> None:
+        """Hand over a message of one of the own machines, without waiting; it may be lost."""
+        ...
+
+
+def called(name: str) -> str:
+    """A machine in a sentence.
+
+    >>> called("robot"), called(COORDINATOR)
+    ("'robot'", 'the coordinator')
+    """
+    return f"'{printable(name)}'" if name != COORDINATOR else "the coordinator"
+
+
+def objection(ours: Greeting, theirs: Greeting) -> Diagnostic | None:
+    """Why a peer is refused (F5020), or None where it is not."""
+    who = ", ".join(map(called, theirs.names)) or "a host without machines"
+    if theirs.version != ours.version:
+        message = f"{who} speaks version {theirs.version} of the protocol, and this host version {ours.version}"
+        return Diagnostic("F5020", message, "install the same version of firable on all hosts of the cell")
+    if theirs.digest != ours.digest:
+        message = f"{who} holds another bundle: {printable(theirs.digest[:16])}…, and this host {ours.digest[:16]}…"
+        return Diagnostic("F5020", message, "give all hosts of the cell the same bundle file, and start them again")
+    if both := sorted(set(ours.names) & set(theirs.names)):
+        message = f"{', '.join(map(called, both))} is run by two hosts"
+        return Diagnostic("F5020", message, "each machine has one host: end one of the two")
+    return None
+
+
+def cannot_open(what: str, reason: str) -> InputError:
+    """The refusal of a link that does not come up (F5021)."""
+    message = f"the link {printable(what)} cannot be opened: {printable(reason)}"
+    return InputError([Diagnostic("F5021", message, "is the address right, and is another program using it?")])

@@ -1,0 +1,238 @@
+"""A link over Zenoh: peers over TCP or TLS, without routers, scouting or multicast.
+
+A greeting is a *liveliness token*, which Zenoh shows to every peer and takes back when the session ends, its TCP
+connection breaks or its lease is over. Its key says all that the greeting has to:
+
+    firable/VERSION/DIGEST/alive/NAME/SESSION            a machine is reached
+    firable/VERSION/DIGEST/to/NAME/SESSION/from/NAME/SESSION    a message
+
+Keys of messages bear version, digest and both sessions, so that nothing of another bundle, or meant for the process
+that ran the machine before, is even routed. Of two hosts that claim one machine the first is heard and the other
+refused; where the first is dead and nobody has noticed yet, the second takes its place when the lease is over.
+
+The *lease* is set, and not left at Zenoh's ten seconds: a frozen host is noticed after it. A killed one is noticed at
+once. While the line is down nothing is kept: what is sent then is lost, and the link is up again by itself.
+
+Nothing listens unless an address is given, and multicast is off. Beyond one machine, `tls/` addresses with certificates
+on both sides (`Certificates`) keep strangers out; plain `tcp/` beyond loopback lets anybody on the network speak.
+Whoever has a certificate of the site may be any of its machines.
+
+Zenoh calls back on threads of its own; all that happens there is a hand-over to the event loop. `put` does not wait: a
+message that finds the queue of a dead line full is dropped.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+from urllib.parse import quote, unquote
+
+import zenoh
+
+from firable.executor.links.encoding import EncodingError, decode, encode
+from firable.executor.links.link import COORDINATOR, Greeting, LinkListener, cannot_open, objection
+from firable.executor.protocol.messages import Message
+from firable.nets.diagnostics import Diagnostic, Severity
+from firable.nets.source import printable
+
+LEASE_SECONDS: Final = 1.0
+"""After how long a host that says nothing is lost."""
+
+_OPENING_SECONDS: Final = 2.0
+_NAMELESS: Final = "%"  # which no name is quoted to
+_REST: Final = "**"
+
+
+@dataclass(frozen=True, slots=True)
+class Certificates:
+    """The files of a host for TLS, as PEM: who it is, and by whose signature others are known."""
+
+    authority: str
+    certificate: str
+    key: str
+
+
+class ZenohLink:
+    """The link of one host; `listen` and `join` are addresses such as `tcp/127.0.0.1:7447` or `tls/10.0.0.2:7447`."""
+
+    def __init__(
+        self,
+        greeting: Greeting,
+        *,
+        listen: Sequence[str] = (),
+        join: Sequence[str] = (),
+        certificates: Certificates | None = None,
+        lease_seconds: float = LEASE_SECONDS,
+    ) -> None:
+        self.greeting = greeting
+        self.listen = tuple(listen)
+        self.join = tuple(join)
+        self.certificates = certificates
+        self.lease_seconds = lease_seconds
+        self.session: zenoh.Session | None = None
+        self.listener: LinkListener | None = None
+        self.identity = ""
+        self.claims: dict[str, list[str]] = {}
+        """For each peer the sessions that say they are it; the first is."""
+        self.damaged = 0
+
+    async def run(self, listener: LinkListener) -> None:
+        """Serve until cancelled; raises `InputError` F5021 where an address cannot be listened at."""
+        loop = asyncio.get_running_loop()
+        try:
+            session = await asyncio.to_thread(zenoh.open, self._configuration())
+        except zenoh.ZError as error:
+            raise cannot_open(", ".join((*self.listen, *self.join)), str(error).partition(" at /")[0]) from None
+        self.session, self.listener, self.identity = session, listener, str(session.info.zid())
+        try:
+            ours = self._key(self.greeting.version, self.greeting.digest)
+            kept: list[object] = []
+            for name in self.greeting.names:
+                at = f"{ours}/to/{_spelled(name)}/{self.identity}/{_REST}"
+                kept.append(session.declare_subscriber(at, lambda s: _on(loop, self._message, s)))
+            for name in self.greeting.names:
+                kept.append(session.liveliness().declare_token(f"{ours}/alive/{_spelled(name)}/{self.identity}"))
+            alive = "firable/*/*/alive/*/*"
+            tokens = session.liveliness()
+            kept.append(tokens.declare_subscriber(alive, lambda s: _on(loop, self._token, s), history=True))
+            await loop.create_future()
+        finally:
+            self.session = self.listener = None
+            self.claims.clear()
+            await asyncio.to_thread(session.close)
+
+    def send(self, sender: str, receiver: str, message: Message) -> None:
+        """Publish a message; where its receiver is not connected it is lost."""
+        sessions = self.claims.get(receiver)
+        if self.session is None or not sessions:
+            return
+        key = (
+            f"{self._key(self.greeting.version, self.greeting.digest)}/to/{_spelled(receiver)}/{sessions[0]}"
+            f"/from/{_spelled(sender)}/{self.identity}"
+        )
+        drop = zenoh.CongestionControl.DROP
+        self.session.put(key, encode(message), congestion_control=drop, express=True)
+
+    def _configuration(self) -> zenoh.Config:
+        settings: dict[str, Any] = {
+            "mode": "peer",
+            "listen/endpoints": list(self.listen),
+            "listen/exit_on_failure": True,
+            "connect/endpoints": list(self.join),
+            "connect/exit_on_failure": False,
+            "connect/timeout_ms": -1,
+            "connect/retry": {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2},
+            "scouting/multicast/enabled": False,
+            "scouting/gossip/enabled": False,
+            "transport/link/tx/lease": round(self.lease_seconds * 1000),
+            "transport/link/tx/keep_alive": 4,
+            # A connection that was begun while the line was down must not hold up the next for ten seconds.
+            "transport/unicast/open_timeout": round(_OPENING_SECONDS * 1000),
+            "transport/unicast/accept_timeout": round(_OPENING_SECONDS * 1000),
+        }
+        if self.certificates is not None:
+            settings["transport/link/tls"] = {
+                "root_ca_certificate": self.certificates.authority,
+                "listen_certificate": self.certificates.certificate,
+                "listen_private_key": self.certificates.key,
+                "connect_certificate": self.certificates.certificate,
+                "connect_private_key": self.certificates.key,
+                "enable_mtls": True,
+                "verify_name_on_connect": True,
+                "close_link_on_expiration": True,
+            }
+        configuration = zenoh.Config()
+        for key, value in settings.items():
+            configuration.insert_json5(key, json.dumps(value))
+        return configuration
+
+    @staticmethod
+    def _key(version: int, digest: str) -> str:
+        return f"firable/{version}/{_spelled(digest)}"
+
+    def _token(self, key: str, _payload: bytes, *, gone: bool) -> None:
+        """A host has come or gone."""
+        if self.listener is None:
+            return
+        _, version, digest, _, name, session = key.split("/")
+        if session == self.identity:
+            return
+        peer = _read(name)
+        greeting = Greeting(_read(digest), (peer,), int(version) if version.isdecimal() else -1)
+        if (problem := objection(self.greeting, greeting)) is not None:
+            if not gone:
+                self.listener.refused(peer, problem)
+            return
+        claims = self.claims.setdefault(peer, [])
+        first = claims[:1]
+        if gone and session in claims:
+            claims.remove(session)
+        elif not gone and session not in claims:
+            claims.append(session)
+            if len(claims) > 1:
+                twice = Greeting(greeting.digest, greeting.names)
+                self.listener.refused(peer, _required(objection(twice, twice)))
+        if claims[:1] != first:
+            if first:
+                self.listener.lost(peer)
+            if claims:
+                self.listener.connected(peer)
+
+    def _message(self, key: str, payload: bytes, *, gone: bool) -> None:
+        *_, receiver, _, _, sender, session = key.split("/")
+        peer = _read(sender)
+        # Only from the process that is known to run the machine: another one, or one not yet met, is not heard.
+        if self.listener is None or gone or self.claims.get(peer, [""])[0] != session:
+            return
+        try:
+            message = decode(payload)
+        except EncodingError:
+            self.damaged += 1
+            return
+        self.listener.arrived(peer, _read(receiver), message)
+
+
+def open_to_the_network(addresses: Sequence[str]) -> tuple[Diagnostic, ...]:
+    """A warning (F5022) for each address that anybody on the network could speak to: plain TCP beyond loopback."""
+    found = []
+    for address in addresses:
+        protocol, _, rest = address.partition("/")
+        host = rest.rpartition(":")[0].strip("[]")
+        if protocol != "tls" and not _is_loopback(host):
+            message = f"{printable(address)} is open to the network: whoever reaches it can take part in the cell"
+            hint = "use tls/ with the certificates of the site, or a network that nobody else is on"
+            found.append(Diagnostic("F5022", message, hint, severity=Severity.WARNING))
+    return tuple(found)
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _required(problem: Diagnostic | None) -> Diagnostic:
+    if problem is None:
+        raise AssertionError("a host with the same machines is refused")
+    return problem
+
+
+def _spelled(name: str) -> str:
+    return _NAMELESS if name == COORDINATOR else quote(name, safe="")
+
+
+def _read(spelled: str) -> str:
+    return COORDINATOR if spelled == _NAMELESS else unquote(spelled)
+
+
+def _on(loop: asyncio.AbstractEventLoop, act: Any, sample: zenoh.Sample) -> None:
+    """Hand a sample over to the event loop, from a thread of Zenoh; after the loop's end nobody is there to hear it."""
+    gone = sample.kind == zenoh.SampleKind.DELETE
+    key, payload = str(sample.key_expr), sample.payload.to_bytes()
+    if not loop.is_closed():
+        loop.call_soon_threadsafe(lambda: act(key, payload, gone=gone))

@@ -1,0 +1,156 @@
+"""What every link does, whatever carries it."""
+
+import asyncio
+from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager
+from dataclasses import replace
+
+import pytest
+from support.link_rigs import Heard, Rig, in_process, over_a_serial_line, over_zenoh, running
+
+from firable.executor.links.link import COORDINATOR, Greeting, Link
+from firable.executor.protocol.messages import Acknowledgement, Decision, Message, Readiness, Report, Vote, VoteRequest
+
+Make = Callable[[], AbstractAsyncContextManager[Rig]]
+
+CENTRE = Greeting("d1", (COORDINATOR,))
+ROBOT = Greeting("d1", ("robot",))
+READY = Readiness(4, frozenset({"G2", "G4"}))
+TO_CONTROLLER: list[Message] = [
+    VoteRequest("robot", (7 << 32) + 1, ("G2", "G4"), 7 << 32, -1),
+    Decision("robot", 1, None, 0, 3),
+    Decision("robot", 2, "Übergabe/*", 0, 3),
+]
+TO_COORDINATOR: list[Message] = [
+    Report("robot", READY),
+    Vote("robot", 1, frozenset(), READY),
+    Acknowledgement("robot", 2, READY),
+]
+
+
+async def deliver(link: Link, heard: Heard, sender: str, receiver: str, messages: list[Message]) -> None:
+    """Send until all have arrived: a link may lose some."""
+    while not set(messages) <= {m for _, _, m in heard.messages}:
+        for message in messages:
+            link.send(sender, receiver, message)
+        await asyncio.sleep(0.02)
+
+
+@pytest.mark.parametrize("make", [in_process, over_zenoh, over_a_serial_line])
+class TestLink:
+    def test_hosts_learn_who_is_connected(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig, running(rig.link(CENTRE)) as centre:
+                async with running(rig.link(ROBOT)) as robot, running(rig.link(replace(ROBOT, names=("mc",)))) as mc:
+                    await robot.until_told(("connected", COORDINATOR))
+                    await mc.until_told(("connected", COORDINATOR))
+                    await centre.until_told(("connected", "robot"), ("connected", "mc"))
+                await centre.until_told(("lost", "robot"), ("lost", "mc"))
+
+        asyncio.run(main())
+
+    def test_messages_arrive_as_they_were_sent_or_not_at_all(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                here, there = rig.link(CENTRE), rig.link(ROBOT)
+                async with asyncio.timeout(30), running(here) as centre, running(there) as robot:
+                    await robot.until_told(("connected", COORDINATOR))
+                    await deliver(here, robot, COORDINATOR, "robot", TO_CONTROLLER)
+                    await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR)
+                assert {(s, r) for s, r, _ in robot.messages} == {(COORDINATOR, "robot")}
+                assert {(s, r) for s, r, _ in centre.messages} == {("robot", COORDINATOR)}
+                assert {m for _, _, m in robot.messages} == set(TO_CONTROLLER)
+                assert {m for _, _, m in centre.messages} == set(TO_COORDINATOR)
+
+        asyncio.run(main())
+
+    def test_a_host_with_two_machines_is_reached_by_both_names(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                here, there = rig.link(CENTRE), rig.link(replace(ROBOT, names=("system", "robot")))
+                async with asyncio.timeout(30), running(here) as centre, running(there) as both:
+                    await centre.until_told(("connected", "robot"), ("connected", "system"))
+                    await deliver(here, both, COORDINATOR, "robot", TO_CONTROLLER)
+                    await deliver(here, both, COORDINATOR, "system", [VoteRequest("system", 9, ("G1",), 0, 0)])
+                assert {r for _, r, _ in both.messages} == {"robot", "system"}
+
+        asyncio.run(main())
+
+    @pytest.mark.parametrize("other", [replace(ROBOT, digest="d2"), replace(ROBOT, version=99)])
+    def test_a_host_of_another_bundle_or_version_is_refused_and_not_heard(self, make: Make, other: Greeting) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                here, there = rig.link(CENTRE), rig.link(other)
+                async with running(here) as centre, running(there) as stranger:
+                    await centre.until_told(("refused", "robot"))
+                    await stranger.until_told(("refused", COORDINATOR))
+                    there.send("robot", COORDINATOR, TO_COORDINATOR[0])
+                    here.send(COORDINATOR, "robot", TO_CONTROLLER[0])
+                    await asyncio.sleep(0.1)
+                    assert not centre.messages
+                    assert not stranger.messages
+                    assert {told for told, _ in centre.told} == {"refused"}
+                    assert {problem.code for problem in centre.problems} == {"F5020"}
+                    assert ("another bundle" in centre.problems[0].message) is (other.digest != "d1")
+
+        asyncio.run(main())
+
+    def test_a_cut_line_is_noticed_by_both_and_mends(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                here, there = rig.link(CENTRE), rig.link(ROBOT)
+                async with asyncio.timeout(30), running(here) as centre, running(there) as robot:
+                    await robot.until_told(("connected", COORDINATOR))
+                    await centre.until_told(("connected", "robot"))
+                    rig.cut()
+                    await robot.until_told(("lost", COORDINATOR))
+                    await centre.until_told(("lost", "robot"))
+                    there.send("robot", COORDINATOR, TO_COORDINATOR[0])  # lost, and no error
+                    rig.mend()
+                    await robot.until(lambda: robot.told[-1] == ("connected", COORDINATOR))
+                    await centre.until(lambda: centre.told[-1] == ("connected", "robot"))
+                    await deliver(here, robot, COORDINATOR, "robot", TO_CONTROLLER)
+                    await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR)
+
+        asyncio.run(main())
+
+    def test_a_host_that_is_started_anew_is_lost_and_connected(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                here = rig.link(CENTRE)
+                async with asyncio.timeout(30), running(here) as centre:
+                    for _ in range(2):
+                        there = rig.link(ROBOT)
+                        async with running(there) as robot:
+                            await robot.until_told(("connected", COORDINATOR))
+                            await centre.until(lambda: centre.told[-1:] == [("connected", "robot")])
+                            await deliver(here, robot, COORDINATOR, "robot", TO_CONTROLLER)
+                    assert [told for told, _ in centre.told][:3] == ["connected", "lost", "connected"]
+
+        asyncio.run(main())
+
+    def test_a_coordinator_that_is_started_anew_is_met_again(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                there = rig.link(ROBOT)
+                async with asyncio.timeout(30), running(there) as robot:
+                    for _ in range(2):
+                        here = rig.link(CENTRE)
+                        async with running(here) as centre:
+                            await robot.until(lambda: robot.told[-1:] == [("connected", COORDINATOR)])
+                            await centre.until_told(("connected", "robot"))
+                            await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR)
+                    assert [told for told, _ in robot.told][:3] == ["connected", "lost", "connected"]
+
+        asyncio.run(main())
+
+    def test_what_is_sent_to_nobody_is_lost_without_an_error(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                link = rig.link(CENTRE)
+                link.send(COORDINATOR, "robot", TO_CONTROLLER[0])
+                async with running(link):
+                    await asyncio.sleep(0.05)
+                    link.send(COORDINATOR, "robot", TO_CONTROLLER[0])
+
+        asyncio.run(main())

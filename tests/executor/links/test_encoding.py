@@ -1,0 +1,102 @@
+"""Messages as JSON: every message has one text, and nothing else is read."""
+
+import json
+from contextlib import suppress
+from typing import Any, cast, get_args
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.examples import examples
+
+from firable.executor.links.encoding import KINDS, MESSAGE_BYTES_MAX, EncodingError, decode, encode
+from firable.executor.protocol import messages
+from firable.executor.protocol.messages import Decision, Message, ToController, ToCoordinator, VoteRequest
+
+MESSAGES: st.SearchStrategy[Message] = st.one_of([st.from_type(kind) for kind in KINDS.values()])
+
+
+def test_every_message_of_the_protocol_can_be_sent() -> None:
+    assert set(KINDS.values()) == {*get_args(ToController), *get_args(ToCoordinator)}
+    assert all(getattr(messages, name) is kind for name, kind in KINDS.items())
+
+
+@examples(200)
+@given(MESSAGES)
+def test_a_message_is_read_as_it_was_written(message: Message) -> None:
+    assert decode(encode(message)) == message
+
+
+@examples(200)
+@given(MESSAGES, st.data())
+def test_no_edited_byte_is_read_as_the_same_message(message: Message, data: st.DataObject) -> None:
+    text = bytearray(encode(message))
+    at = data.draw(st.integers(0, len(text) - 1))
+    text[at] ^= data.draw(st.integers(1, 255))
+    with suppress(EncodingError):
+        assert decode(bytes(text)) != message
+
+
+@examples(200)
+@given(st.binary(max_size=60))
+def test_noise_is_refused(noise: bytes) -> None:
+    with pytest.raises(EncodingError):
+        decode(noise)
+
+
+def spelled(content: object, kind: str = "Decision") -> bytes:
+    return json.dumps({kind: content}, sort_keys=True, separators=(",", ":")).encode()
+
+
+def with_defaults(**changed: object) -> object:
+    """The content of a Decision with something changed."""
+    full = json.loads(encode(Decision("robot", 1, None, 0, -1)))["Decision"]
+    return {**full, **changed}
+
+
+def test_the_content_of_these_tests_is_that_of_a_message() -> None:
+    assert isinstance(decode(spelled(with_defaults())), Decision)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"",
+        b"null",
+        b"[]",
+        b"{}",
+        spelled(with_defaults(), "Verdict"),
+        spelled(with_defaults(more=1)),
+        spelled({"controller": "robot"}),
+        spelled(with_defaults(round="1")),
+        spelled(with_defaults(round=1.0)),
+        spelled(with_defaults(round=True)),
+        spelled(with_defaults(committed=3)),
+        spelled(with_defaults(round=float("nan"))),
+        spelled(with_defaults()) + b"\n",
+        spelled(with_defaults())[:-1],
+        spelled(with_defaults()).replace(b'"robot"', b'"\\u0072obot"'),
+        spelled(with_defaults()).replace(b'"robot"', b'"\\ud800"'),
+        spelled(with_defaults()).replace(b'"robot"', b'"\xff"'),
+        b'{"Decision":' + b"[" * 100_000,
+        b'{"Decision":' + b'{"controller":' * 100_000,
+        b" " * (MESSAGE_BYTES_MAX + 1),
+    ],
+)
+def test_what_is_not_written_as_ours_is_refused(text: bytes) -> None:
+    with pytest.raises(EncodingError):
+        decode(text)
+
+
+def test_a_set_in_another_order_or_with_a_doubled_entry_is_refused() -> None:
+    message = messages.Vote("robot", 1, frozenset({"G1", "G2"}), messages.Readiness(0, frozenset()))
+    text = encode(message)
+    assert decode(text) == message
+    for other in (b'"promised":["G2","G1"]', b'"promised":["G1","G1","G2"]'):
+        with pytest.raises(EncodingError):
+            decode(text.replace(b'"promised":["G1","G2"]', other))
+
+
+def test_what_is_no_value_of_a_message_is_not_written() -> None:
+    with pytest.raises(TypeError):
+        encode(VoteRequest("robot", 1, cast(Any, {"G1"}), 0, 0))

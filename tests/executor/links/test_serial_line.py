@@ -1,0 +1,179 @@
+"""Frames and the bus of the serial line, with noise on it."""
+
+import asyncio
+import random
+from collections.abc import Iterator
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.examples import examples
+from support.link_rigs import CONTROLLERS, Heard, SerialRig, over_a_serial_line, running
+
+from firable.executor.links.framing import PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
+from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.serial_line import SerialLink, addresses_on_a_line
+from firable.executor.protocol.messages import Decision
+from firable.nets.diagnostics import InputError
+
+FRAMES = st.builds(
+    Frame,
+    st.integers(0, 255),
+    st.integers(0, 255),
+    st.sampled_from(Kind),
+    st.integers(0, 255),
+    st.one_of(st.binary(max_size=600), st.integers(0, 1100).map(bytes), st.integers(0, 1100).map(lambda n: b"\1" * n)),
+)
+
+
+@examples(200)
+@given(st.lists(FRAMES, max_size=4), st.integers(1, 50))
+def test_frames_are_read_as_they_were_written_however_the_bytes_come(frames: list[Frame], at_once: int) -> None:
+    line = b"".join(map(pack_frame, frames))
+    reader = FrameReader()
+    found = [f for i in range(0, len(line), at_once) for f in reader.feed(line[i : i + at_once])]
+    assert found == frames
+    assert not reader.damaged
+
+
+@examples(200)
+@given(FRAMES, FRAMES, st.data())
+def test_a_damaged_frame_is_dropped_and_the_next_one_read(first: Frame, second: Frame, data: st.DataObject) -> None:
+    line = bytearray(pack_frame(first))
+    at = data.draw(st.integers(1, len(line) - 2))
+    match data.draw(st.sampled_from(["flipped", "lost", "doubled"])):
+        case "flipped":
+            line[at] ^= data.draw(st.integers(1, 255))
+        case "lost":
+            del line[at]
+        case "doubled":
+            line.insert(at, line[at])
+    reader = FrameReader()
+    same = line == pack_frame(first)  # of two equal bytes side by side, one was lost and the other doubled by nobody
+    assert list(reader.feed(bytes(line) + pack_frame(second))) == ([first, second] if same else [second])
+
+
+def test_noise_makes_no_frame_and_no_heap() -> None:
+    dice, reader = random.Random(3), FrameReader()
+    for _ in range(200):
+        assert not list(reader.feed(dice.randbytes(5000)))
+        assert not list(reader.feed(b"\1" * 5000))
+        assert len(reader.buffer) < 3 * PAYLOAD_BYTES_MAX
+    assert reader.damaged > 100
+    list(reader.feed(b"\0"))
+    frame = Frame(1, 0, Kind.MESSAGES, 1, b"x")
+    assert list(reader.feed(pack_frame(frame))) == [frame]
+
+
+def test_a_payload_that_is_too_long_is_not_packed() -> None:
+    with pytest.raises(ValueError, match="more than a frame holds"):
+        pack_frame(Frame(1, 0, Kind.MESSAGES, 1, bytes(PAYLOAD_BYTES_MAX + 1)))
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [{"flipped": 0.0005}, {"lost": 0.0005}, {"doubled": 0.0005}, {"flipped": 3e-4, "lost": 3e-4, "doubled": 3e-4}],
+)
+def test_on_a_noisy_line_messages_are_lost_and_none_is_damaged(noise: dict[str, float]) -> None:
+    async def main() -> None:
+        async with over_a_serial_line() as rig:
+            here, stations = rig.link(Greeting("d", (COORDINATOR,))), []
+            for name in CONTROLLERS:
+                stations.append(rig.link(Greeting("d", (name,))))
+            async with (
+                asyncio.timeout(60),
+                running(here) as centre,
+                running(stations[0]) as a,
+                running(stations[1]) as b,
+                running(stations[2]) as c,
+            ):
+                await centre.until_told(*(("connected", name) for name in CONTROLLERS[:3]))
+                for name, value in noise.items():
+                    setattr(rig, name, value)
+                sent, number = set(), 0
+                readers = [here.reader, *(station.reader for station in stations)]
+                while sum(reader.damaged for reader in readers) < 20 or len(a.messages) < 50:
+                    number += 1
+                    for name in CONTROLLERS[:3]:
+                        message = Decision(name, number, f"G{number}", 0, 0)
+                        sent.add((COORDINATOR, name, message))
+                        here.send(COORDINATOR, name, message)
+                    await asyncio.sleep(0.001)
+                # The line is quiet again, and what comes now goes through.
+                rig.flipped = rig.lost = rig.doubled = 0.0
+                for name, heard in zip(CONTROLLERS, (a, b, c), strict=False):
+                    last = Decision(name, 0, None, 0, 0)
+                    sent.add((COORDINATOR, name, last))
+                    while not heard.messages or heard.messages[-1][2] != last:
+                        here.send(COORDINATOR, name, last)
+                        await asyncio.sleep(0.01)
+                assert {*a.messages, *b.messages, *c.messages} <= sent
+
+    asyncio.run(main())
+
+
+class CountingReader(FrameReader):
+    def __init__(self) -> None:
+        super().__init__()
+        self.polls: list[int] = []
+
+    def feed(self, data: bytes) -> Iterator[Frame]:
+        for frame in super().feed(data):
+            self.polls.append(frame.to)
+            yield frame
+
+
+def test_a_dead_station_does_not_keep_the_others_waiting() -> None:
+    async def main() -> None:
+        async with over_a_serial_line() as rig:
+            here, there = rig.link(Greeting("d", (COORDINATOR,))), rig.link(Greeting("d", ("robot",)))
+            there.reader, polls = (counting := CountingReader()), counting.polls
+            async with running(here), running(there) as robot:
+                await robot.until_told(("connected", COORDINATOR))
+                polls.clear()
+                while len(polls) < 40:
+                    await asyncio.sleep(0.05)
+                assert polls.count(2) > 20  # of three that are dead, each is asked one time in five
+
+    asyncio.run(main())
+
+
+def test_a_port_that_is_none_is_refused() -> None:
+    async def main() -> None:
+        link = SerialLink(Greeting("d", ("robot",)), "/dev/no-such-line", addresses_on_a_line(("",), CONTROLLERS), 2)
+        with pytest.raises(InputError, match="F5021"):
+            async with asyncio.timeout(20):
+                await link.run(Heard())
+
+    asyncio.run(main())
+
+
+def test_a_line_that_is_taken_away_ends_the_link() -> None:
+    async def main() -> None:
+        rig = SerialRig()
+        link = rig.link(Greeting("d", ("robot",)))
+        task = asyncio.create_task(link.run(Heard()))
+        await asyncio.sleep(0.1)
+        rig.close()
+        with pytest.raises(InputError, match="F5021"):
+            async with asyncio.timeout(20):
+                await task
+
+    asyncio.run(main())
+
+
+def test_a_message_that_no_frame_holds_ends_the_link() -> None:
+    async def main() -> None:
+        async with over_a_serial_line() as rig:
+            here, there = rig.link(Greeting("d", (COORDINATOR,))), rig.link(Greeting("d", ("robot",)))
+            centre = asyncio.create_task(here.run(Heard()))
+            async with running(there) as robot:
+                await robot.until_told(("connected", COORDINATOR))
+                while not centre.done():
+                    here.send(COORDINATOR, "robot", Decision("robot", 1, "G" * PAYLOAD_BYTES_MAX, 0, 0))
+                    await asyncio.sleep(0.01)
+                with pytest.raises(InputError, match="longer than a frame"):
+                    async with asyncio.timeout(20):
+                        await centre
+
+    asyncio.run(main())

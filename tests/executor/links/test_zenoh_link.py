@@ -1,0 +1,162 @@
+"""What is Zenoh's own: certificates, who is heard of two, what listens, and what strangers publish."""
+
+import asyncio
+import json
+import socket
+from contextlib import AsyncExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import zenoh
+from support.certificates import Site
+from support.link_rigs import Heard, free_port, running
+
+from firable.executor.links.encoding import encode
+from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.zenoh_link import Certificates, ZenohLink, open_to_the_network
+from firable.executor.protocol.messages import Decision, Readiness, Report
+from firable.nets.diagnostics import InputError, Severity
+
+CENTRE = Greeting("d1", (COORDINATOR,))
+ROBOT = Greeting("d1", ("robot",))
+
+
+def test_hosts_with_certificates_of_the_site_are_connected(tmp_path: Path) -> None:
+    site = Site(tmp_path / "site")
+
+    async def main() -> None:
+        at = f"tls/127.0.0.1:{free_port()}"
+        here = ZenohLink(CENTRE, listen=[at], certificates=site.host("centre"))
+        there = ZenohLink(ROBOT, join=[at], certificates=site.host("robot"))
+        async with running(here) as centre, running(there) as robot:
+            await centre.until_told(("connected", "robot"))
+            await robot.until_told(("connected", COORDINATOR))
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("who", ["of another site", "nobody"])
+def test_a_host_without_a_certificate_of_the_site_is_kept_out(tmp_path: Path, who: str) -> None:
+    site, other = Site(tmp_path / "site"), Site(tmp_path / "other")
+    of_other = other.host("robot")
+    stranger = Certificates(str(site.authority), of_other.certificate, of_other.key)
+
+    async def main() -> None:
+        at = f"tls/127.0.0.1:{free_port()}"
+        here = ZenohLink(CENTRE, listen=[at], certificates=site.host("centre"))
+        there = ZenohLink(ROBOT, join=[at], certificates=stranger if who == "of another site" else None)
+        late = ZenohLink(replace(ROBOT, names=("mc",)), join=[at], certificates=site.host("mc"))
+        async with running(here) as centre, running(there) as robot:
+            await asyncio.sleep(0.6)  # several attempts
+            async with running(late):
+                await centre.until_told(("connected", "mc"))
+            assert not [peer for _, peer in centre.told if peer == "robot"]
+            assert not robot.told
+
+    asyncio.run(main())
+
+
+def test_of_two_hosts_with_one_name_the_first_is_heard_until_it_ends() -> None:
+    async def main() -> None:
+        at = f"tcp/127.0.0.1:{free_port()}"
+        here, first, second = ZenohLink(CENTRE, listen=[at]), ZenohLink(ROBOT, join=[at]), ZenohLink(ROBOT, join=[at])
+        message = Decision("robot", 1, None, 0, 0)
+        async with running(here) as centre, AsyncExitStack() as until_it_ends:
+            one = await until_it_ends.enter_async_context(running(first))
+            await centre.until_told(("connected", "robot"))
+            async with asyncio.timeout(30), running(second) as two:
+                await centre.until_told(("refused", "robot"))
+                assert [problem.code for problem in centre.problems] == ["F5020"]
+                assert "two hosts" in centre.problems[0].message
+                await two.until_told(("connected", COORDINATOR))
+                while not one.messages:
+                    second.send("robot", COORDINATOR, Report("robot", Readiness(0, frozenset())))
+                    here.send(COORDINATOR, "robot", message)
+                    await asyncio.sleep(0.02)
+                assert not two.messages
+                assert not centre.messages
+                await until_it_ends.aclose()
+                await centre.until(lambda: centre.told.count(("connected", "robot")) == 2)
+                while not two.messages:
+                    here.send(COORDINATOR, "robot", message)
+                    await asyncio.sleep(0.02)
+
+    asyncio.run(main())
+
+
+def test_what_a_stranger_publishes_is_not_delivered() -> None:
+    async def main() -> None:
+        port = free_port()
+        here, there = (
+            ZenohLink(CENTRE, listen=[f"tcp/127.0.0.1:{port}"]),
+            ZenohLink(ROBOT, join=[f"tcp/127.0.0.1:{port}"]),
+        )
+        async with asyncio.timeout(30), running(here) as centre, running(there) as robot:
+            await centre.until_told(("connected", "robot"))
+            await robot.until_told(("connected", COORDINATOR))
+            assert there.session is not None
+            message = encode(Report("robot", Readiness(0, frozenset())))
+            to = f"firable/1/d1/to/%/{here.identity}/from/robot"
+            there.session.put(f"{to}/{there.identity}", b"\xff" + message)  # damaged
+            there.session.put(f"{to}/abc", message)  # of a process that is not known
+            there.session.delete(f"{to}/{there.identity}")  # not a message
+            there.session.put(f"firable/1/d2/to/%/{here.identity}/from/robot/{there.identity}", message)
+            while not centre.messages:
+                there.send("robot", COORDINATOR, Report("robot", Readiness(7, frozenset())))
+                await asyncio.sleep(0.02)
+            assert here.damaged == 1
+            assert {m for _, _, m in centre.messages} == {Report("robot", Readiness(7, frozenset()))}
+
+    asyncio.run(main())
+
+
+def test_an_address_that_is_taken_is_refused() -> None:
+    async def main() -> None:
+        with socket.socket() as taken:
+            taken.bind(("127.0.0.1", 0))
+            taken.listen()
+            link = ZenohLink(CENTRE, listen=[f"tcp/127.0.0.1:{taken.getsockname()[1]}"])
+            with pytest.raises(InputError, match="F5021"):
+                async with asyncio.timeout(30):
+                    await link.run(Heard())
+
+    asyncio.run(main())
+
+
+def test_a_link_listens_at_what_it_is_told_and_asks_nobody_else() -> None:
+    configuration = ZenohLink(CENTRE)._configuration()
+    assert json.loads(configuration.get_json("listen/endpoints")) == []
+    assert json.loads(configuration.get_json("scouting/multicast/enabled")) is False
+    assert json.loads(configuration.get_json("scouting/gossip/enabled")) is False
+    assert json.loads(configuration.get_json("transport/link/tx/lease")) == 1000
+
+
+@pytest.mark.parametrize(
+    ("address", "open_"),
+    [
+        ("tcp/127.0.0.1:7447", False),
+        ("tcp/[::1]:7447", False),
+        ("tcp/localhost:7447", False),
+        ("tls/10.0.0.1:7447", False),
+        ("tcp/10.0.0.1:7447", True),
+        ("tcp/0.0.0.0:7447", True),
+        ("tcp/[::]:7447", True),
+        ("udp/10.0.0.1:7447", True),
+        ("tcp/cell.example:7447", True),
+    ],
+)
+def test_plain_addresses_beyond_the_host_are_warned_of(address: str, open_: bool) -> None:
+    found = open_to_the_network([address])
+    assert [(d.code, d.severity) for d in found] == ([("F5022", Severity.WARNING)] if open_ else [])
+
+
+def test_the_session_of_a_link_is_closed_with_it() -> None:
+    async def main() -> zenoh.Session:
+        link = ZenohLink(CENTRE, listen=[f"tcp/127.0.0.1:{free_port()}"])
+        async with running(link):
+            while link.session is None:
+                await asyncio.sleep(0.01)
+            return link.session
+
+    assert asyncio.run(main()).is_closed()
