@@ -21,17 +21,33 @@ _TOLD_MAX = 40
 @click.command(short_help="Play a trace by the reference player: is it one of the net?")
 @click.argument("trace", metavar="TRACE")
 @click.option("--net", "of", metavar="NET", required=True, help="The net, or the bundle, that the trace is of.")
+@click.option(
+    "--machines",
+    metavar="PLANT",
+    help="Ask too whether the machines did what this plant file allows; catalogue:NAME for one of the catalogue.",
+)
+@click.option(
+    "--latency",
+    "latency_seconds",
+    type=click.FloatRange(min=0.0, min_open=True),
+    help="With --machines: how many seconds after its change a signal is taken at the latest.  [default: 0.5]",
+)
 @format_option
-def replay(trace: str, of: str, format_: str) -> int:
+def replay(trace: str, of: str, machines: str | None, latency_seconds: float | None, format_: str) -> int:
     """Play TRACE, a log of `firable run` or a counterexample of `firable check`, token by token.
 
     Every firing must be firable with its gates open as recorded, every command sent exactly once, and the marking at
     the end the one shown. A trace that was cut off is unknown.
+
+    With --machines, the signals and commands are held against the machines of a plant file, as a run does: the first
+    signal, or the absence of one, that nothing explains is shown, with the places of the cell that it touches.
     """
-    return answer("replay", format_, lambda: _report(trace, of), _show)
+    if latency_seconds is not None and machines is None:
+        raise click.UsageError("--latency is of the machines: say which with --machines")
+    return answer("replay", format_, lambda: _report(trace, of, machines, latency_seconds), _show)
 
 
-def _report(file: str, argument: str) -> Report:
+def _report(file: str, argument: str, machines: str | None, latency_seconds: float | None) -> Report:
     from firable.nets.interchange import net_digest
     from firable.semantics.trace import Fired, read_trace
 
@@ -45,7 +61,7 @@ def _report(file: str, argument: str) -> Report:
         "replay",
         file,
         net,
-        (verdict,),
+        (verdict, *(() if machines is None else (_machines(net, trace, machines, latency_seconds),))),
         notes=loaded.notes,
         run={
             "firings": {name: sum(name in fired for fired in firings) for name in net.transition_index},
@@ -76,6 +92,21 @@ def _verdict(net: Net, trace: Trace) -> tuple[Verdict, tuple[str, ...]]:
     status = Status.PROVED if done.complete else Status.UNKNOWN
     bound = "" if done.complete else "the trace was cut off; all its lines so far are of the net"
     return Verdict(name, status, statement, method, bound=bound), net.names(done.marking)
+
+
+def _machines(net: Net, trace: Trace, argument: str, latency_seconds: float | None) -> Verdict:
+    from firable.cli.loop import read_machines
+    from firable.executor.operating.monitor import LATENCY_SECONDS, Monitor, watch
+    from firable.nets.verdict import Status, Verdict
+
+    latency = LATENCY_SECONDS if latency_seconds is None else latency_seconds
+    name, method = "machines", f"markings of the closed loop that explain what was seen, latency {latency:g} s"
+    statement = f"the machines did what '{argument}' allows, as far as signals show"
+    found = watch(Monitor(net, read_machines(argument), latency_seconds=latency), trace)
+    if found is None:
+        return Verdict(name, Status.PROVED, statement, method)
+    hint = f"at {found.at_seconds:.2f} s: {found.message}"
+    return Verdict(name, Status.VIOLATED, statement, method, subjects=found.places, hint=hint)
 
 
 def _show(report: Report) -> None:

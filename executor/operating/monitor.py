@@ -1,0 +1,339 @@
+"""The monitor: are the machines doing what the model of them allows, as far as their signals show?
+
+Everything that was proved of the cell *with* its machines was proved of the loop that `firable.nets.machines.closing`
+makes of net and plant file. While the cell runs, that loop is held against it: the monitor keeps the *belief*, the set
+of all markings of the loop that explain what has been seen so far, and a cell whose belief is empty does something
+that the model excludes. This is the diagnoser of discrete event systems (Sampath et al., "Diagnosability of
+discrete-event systems", 1995) with the belief tracked on line instead of compiled before: a compiled one has as many
+states as there are sets of markings, of which a run meets few.
+
+*Seen* are the firings, the commands sent and the signals taken; *hidden* is what machines, workpieces and sensors do by
+themselves. A signal is taken later than it changed: on the way lie a driver, a link, a promise that latches it. So
+what a signal is and what was taken of it may differ for `latency_seconds`, and no longer. Which firing was open by
+which sensor is not asked again (the replay asks it): those gates are stripped from the loop, because a vote may outlive
+its gate (O4). Those of completions stay, which only their command clears.
+
+*Absence* is seen too, because a plant file has times: a command is done at the latest after its time, its jitter and
+the latency, but for one that waits until its place is free. A marking of the belief in which the machine is still at it
+is then dropped, as one whose signal should have been taken by now; what is left, if anything, explains the silence.
+
+The first divergence is the last: a model that the cell has left says nothing of what follows. Rejected: a twin, the
+simulated cell run beside the real one. It has one history where the belief has all, so it needs a tolerance for every
+difference, and it does not know when workpieces come.
+
+A pure machine: events with their times in, one divergence out, at the event that shows it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+from firable.nets.machines.closing import close
+from firable.nets.machines.laws import Laws
+from firable.nets.machines.loop import Sending
+from firable.nets.machines.plant_file import Carry, PlantModel, Put, Stop
+from firable.nets.net import Marking, Net
+from firable.semantics.trace import CommandSent, Fired, Noted, SignalChanged, Trace
+
+LATENCY_SECONDS: Final = 0.5
+"""How long after its change a signal is taken at the latest, unless a caller knows better."""
+
+_NEVER: Final = -math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Divergence:
+    """The machines did what the model excludes, or did not do what it demands.
+
+    `subject` is the signal, command or transition that shows it, `places` those places of the cell with a token that
+    it touches: that wait for the signal, command the machine, or were left or entered.
+    """
+
+    at_seconds: float
+    subject: str
+    message: str
+    places: tuple[str, ...]
+
+    def __str__(self) -> str:
+        touched = f" (touches {', '.join(self.places)})" if self.places else ""
+        return f"{self.message}{touched}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Move:
+    """A transition of the loop as masks over its places."""
+
+    needs: Marking
+    forbids: Marking
+    flips: Marking
+    says: str
+
+    def firable(self, marking: Marking) -> bool:
+        return marking & self.needs == self.needs and not marking & self.forbids
+
+
+@dataclass(frozen=True, slots=True)
+class _Work:
+    """A machine at a command: the place of the loop that says so, how long at most, and what it may wait for."""
+
+    busy: Marking
+    longest_seconds: float
+    waits_while_empty: Marking
+    """The place that says that the target is empty, if the command waits for it; no bit where it does not wait."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class _Demand:
+    """The command of a place must be done, or a signal taken, by a time."""
+
+    due_seconds: float
+    subject: str
+
+
+_Belief = dict[Marking, tuple[float, ...]]
+"""Each marking of the loop with, for each signal, when it last changed there without having been taken since."""
+
+
+class Monitor:
+    """The belief in a cell with the machines of a plant, from its beginning.
+
+    Raises `InputError` F5003 where the plant does not fit the net.
+    """
+
+    def __init__(self, net: Net, model: PlantModel, *, latency_seconds: float = LATENCY_SECONDS) -> None:
+        loop = close(_without_sensor_gates(net), model, sending=Sending.LATE)
+        laws = Laws(model, net)
+        self.net = net
+        self.latency_seconds = latency_seconds
+        self.index = loop.net.place_index
+        moves = {one.name: _compiled(loop.net, t) for t, one in enumerate(loop.net.transitions)}
+        own = {variant for variants in loop.variants.values() for variant in variants}
+        self.firing = {name: [moves[one] for one in variants] for name, variants in loop.variants.items()}
+        unsent = {place: self._bit(name) for place, name in loop.unsent.items()}
+        every_unsent = _union(unsent.values())
+        sends = {name for name, move in moves.items() if name not in own and move.flips & every_unsent}
+        self.sending: dict[str, list[_Move]] = {place: [] for place in unsent}
+        self.refusing: dict[str, list[_Move]] = {place: [] for place in unsent}
+        for place, bit in unsent.items():
+            for name in sends:
+                if moves[name].flips & bit:
+                    (self.refusing if name in loop.accidents else self.sending)[place].append(moves[name])
+        self.hidden = [m for name, m in moves.items() if name not in own | sends and name not in loop.accidents]
+        self.signals = tuple(signal.name for signal in net.signals)
+        self.shown = tuple((self._bit(place), means) for place, means in map(loop.shown.__getitem__, self.signals))
+        self.work = {place.name: self._work(laws, place.name, loop.at) for place in laws.commanding}
+        self.taken = [bool(loop.net.initial_marking & bit) == means for bit, means in self.shown]
+        self.sent_seconds: dict[str, float] = {}
+        self.marking = net.initial_marking
+        self.divergence: Divergence | None = None
+        """The first divergence; after it nothing is watched."""
+        self.belief = self._closed({loop.net.initial_marking: (_NEVER,) * len(self.signals)}, 0.0)
+
+    def fired(self, at_seconds: float, transition: str) -> Divergence | None:
+        """A transition of the cell has fired."""
+        masks = self.net.masks[self.net.transition_index[transition]]
+        self.marking = self.marking & ~masks.inputs | masks.outputs
+        message = f"'{transition}' fired, and the machines cannot have been where it leaves them"
+        entered = self.net.transition(transition).outputs
+        return self._seen(at_seconds, self.firing[transition], transition, message, entered)
+
+    def sent(self, at_seconds: float, place: str) -> Divergence | None:
+        """The command of a place was sent to its machine."""
+        if self.divergence is not None:
+            return None
+        believed = self._closed(self.belief, at_seconds)
+        refused = [move.says for move in self.refusing[place] if any(map(move.firable, believed))]
+        message = refused[0] if refused else f"'{self.net.place(place).command}' was sent where it cannot be"
+        self.sent_seconds[place] = at_seconds
+        return self._seen(at_seconds, self.sending[place], place, message, (place,))
+
+    def signal(self, at_seconds: float, name: str, value: bool) -> Divergence | None:
+        """A controller has taken a new value of a signal, or cleared a completion by its command."""
+        if self.divergence is not None:
+            return None
+        if self.passed(at_seconds) is not None:
+            return self.divergence
+        s = self.net.signal_index[name]
+        self.taken[s] = value
+        if not value and any(place.completion == name for place in self.net.places):
+            # The command that clears it follows; until then the bit differs from what was taken, and not for long.
+            self.belief = {m: (*since[:s], at_seconds, *since[s + 1 :]) for m, since in self.belief.items()}
+            return None
+        bit, means = self.shown[s]
+        believed = self._closed(self.belief, at_seconds)
+        explained = {m: since for m, since in believed.items() if (bool(m & bit) == means) == value}
+        message = f"'{name}' became {int(value)}, and nothing that the machines can have done explains it"
+        return self._believe(explained, at_seconds, name, message, self._waiting_for(name))
+
+    def passed(self, at_seconds: float) -> Divergence | None:
+        """Time has passed, and nothing was seen: what has become too late is left, one deadline after the other."""
+        if self.divergence is not None:
+            return None
+        while (due := self.deadline_seconds()) is not None and due < at_seconds:
+            believed = self._closed(self.belief, due)  # what has not moved may move at the last moment
+            late = {
+                m: min((demand for demand in self._demands(m, since) if demand.due_seconds <= due), default=None)
+                for m, since in believed.items()
+            }
+            left = {m: since for m, since in believed.items() if late[m] is None}
+            first = min(filter(None, late.values()), default=None)
+            self._believe(left, at_seconds, *(("", "", ()) if first is None else self._told(first)))
+        return self.divergence
+
+    def deadline_seconds(self) -> float | None:
+        """When time alone can show a divergence; None: never, as long as nothing else is seen."""
+        if self.divergence is not None:
+            return None
+        demands = (demand for marking, since in self.belief.items() for demand in self._demands(marking, since))
+        return min((demand.due_seconds for demand in demands), default=None)
+
+    def _seen(
+        self, at_seconds: float, moves: Iterable[_Move], subject: str, message: str, places: tuple[str, ...]
+    ) -> Divergence | None:
+        if self.divergence is not None:
+            return None
+        if self.passed(at_seconds) is not None:
+            return self.divergence
+        believed: _Belief = {}
+        for marking, since in self._closed(self.belief, at_seconds).items():
+            for move in moves:
+                if move.firable(marking):
+                    self._add(believed, *self._after(marking, since, move, at_seconds))
+        return self._believe(believed, at_seconds, subject, message, places)
+
+    def _believe(
+        self, belief: _Belief, at_seconds: float, subject: str, message: str, places: tuple[str, ...]
+    ) -> Divergence | None:
+        if not belief:
+            self.divergence = Divergence(at_seconds, subject, message, self._with_token(places))
+            return self.divergence
+        self.belief = belief
+        return None
+
+    def _closed(self, belief: Mapping[Marking, tuple[float, ...]], at_seconds: float) -> _Belief:
+        """The belief with everything that may have happened hidden, as late as it can have."""
+        closed, open_ = dict(belief), list(belief)
+        while open_:
+            marking = open_.pop()
+            since = closed[marking]
+            for move in self.hidden:
+                if move.firable(marking):
+                    after, stamps = self._after(marking, since, move, at_seconds)
+                    if self._add(closed, after, stamps):
+                        open_.append(after)
+        return closed
+
+    def _after(
+        self, marking: Marking, since: tuple[float, ...], move: _Move, at_seconds: float
+    ) -> tuple[Marking, tuple[float, ...]]:
+        stamps = since
+        for s, (bit, _) in enumerate(self.shown):
+            if move.flips & bit:
+                stamps = (*stamps[:s], at_seconds, *stamps[s + 1 :])
+        return marking ^ move.flips, stamps
+
+    @staticmethod
+    def _add(belief: _Belief, marking: Marking, since: tuple[float, ...]) -> bool:
+        """Believe a marking; of two histories of it the later times count, which excuses more. Whether that is new."""
+        known = belief.get(marking)
+        merged = since if known is None else tuple(map(max, known, since))
+        belief[marking] = merged
+        return merged != known
+
+    def _demands(self, marking: Marking, since: tuple[float, ...]) -> Iterator[_Demand]:
+        """What must have happened by when, if the loop is in this marking."""
+        for place, work in self.work.items():
+            waits = work.waits_while_empty and not marking & work.waits_while_empty
+            if marking & work.busy and not waits:
+                begun = self.sent_seconds.get(place, 0.0)
+                yield _Demand(begun + work.longest_seconds + self.latency_seconds, place)
+        for name, (bit, means), stamp, taken in zip(self.signals, self.shown, since, self.taken, strict=True):
+            if (bool(marking & bit) == means) != taken:
+                yield _Demand(stamp + self.latency_seconds, name)
+
+    def _told(self, missed: _Demand) -> tuple[str, str, tuple[str, ...]]:
+        """Subject, message and places of a demand that was not met."""
+        name = missed.subject
+        if name not in self.work:
+            taken = int(self.taken[self.signals.index(name)])
+            return name, f"'{name}' must be {1 - taken} by now, and is still {taken}", self._waiting_for(name)
+        message = (
+            f"'{self.net.place(name).command}', sent at {self.sent_seconds.get(name, 0.0):.1f} s, must be done after "
+            f"{self.work[name].longest_seconds:g} s at the latest, and nothing shows that it is"
+        )
+        return name, message, (name,)
+
+    def _waiting_for(self, signal: str) -> tuple[str, ...]:
+        readers = [one for one in self.net.transitions if any(gate.signal == signal for gate in one.external)]
+        waiting = [place.name for place in self.net.places if place.completion == signal]
+        return tuple(dict.fromkeys((*waiting, *(name for one in readers for name in one.inputs))))
+
+    def _with_token(self, places: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(name for name in places if self.marking >> self.net.place_index[name] & 1)
+
+    def _bit(self, place: str) -> Marking:
+        return 1 << self.index[place]
+
+    def _work(self, laws: Laws, place: str, at: Mapping[str, str]) -> _Work:
+        action = laws.action(self.net.place(place))
+        if isinstance(action, Stop):
+            return _Work(0, math.inf, 0)
+        target = None
+        if isinstance(action, Carry | Put) and action.when_full == "wait":
+            target = action.target if isinstance(action, Carry) else self._put_at(laws, place)
+        waits = self._bit(laws.empty(target)) if target is not None else 0
+        return _Work(self._bit(at[place]), action.takes_s + action.jitter_s, waits)
+
+    def _put_at(self, laws: Laws, place: str) -> str | None:
+        _, machine = laws.machine(self.net.place(place))
+        command = self.net.place(place).command
+        return machine.positions[dict(command.parameters)["at"]] if command is not None else None
+
+
+def watch(monitor: Monitor, trace: Trace) -> Divergence | None:
+    """Hold a whole trace against the model, from its first event to its last line; the first divergence, if any."""
+    for event in trace.events:
+        match event:
+            case Fired(at, transitions):
+                for transition in transitions:
+                    monitor.fired(at, transition)
+            case SignalChanged(at, name, value):
+                monitor.signal(at, name, value)
+            case CommandSent(at, place):
+                monitor.sent(at, place)
+            case Noted(at):
+                monitor.passed(at)
+    if trace.end is not None:
+        monitor.passed(trace.end.at_seconds)
+    return monitor.divergence
+
+
+def _without_sensor_gates(net: Net) -> Net:
+    completions = {place.completion for place in net.places}
+    return replace(
+        net,
+        transitions=tuple(
+            replace(one, external=tuple(gate for gate in one.external if gate.signal in completions))
+            for one in net.transitions
+        ),
+    )
+
+
+def _compiled(net: Net, t: int) -> _Move:
+    masks = net.masks[t]
+    return _Move(
+        masks.inputs | masks.permissive,
+        masks.outputs | masks.inhibitive,
+        masks.inputs | masks.outputs,
+        net.transitions[t].description,
+    )
+
+
+def _union(masks: Iterable[int]) -> int:
+    union = 0
+    for mask in masks:
+        union |= mask
+    return union

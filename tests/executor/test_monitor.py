@@ -1,0 +1,155 @@
+"""The monitor: silent on every run of machines that keep to their plant file, loud on those that do not."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import pytest
+
+from firable.decompose.splitting.cut import split
+from firable.executor.cell.plant import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.operating.monitor import Divergence, Monitor, watch
+from firable.executor.operating.running import execute
+from firable.nets.catalogue import catalogue_net, catalogue_plant
+from firable.nets.diagnostics import InputError
+from firable.nets.machines.plant_file import Move, PlantModel
+from firable.semantics.trace import CommandSent, Event, SignalChanged, Trace, parse_trace
+
+CELLS = [
+    "one_robot",
+    "one_robot_mc_late",
+    "one_robot_mc_late_capacity",
+    "two_cells",
+    "two_robots_separate",
+    "two_robots_shared",
+]
+
+
+def run_of(
+    cell: str, *disturbances: Disturbance, workpieces: int = 6, seed: int = 1, plant: PlantModel | None = None
+) -> Trace:
+    stream = io.StringIO()
+    execute(
+        split(catalogue_net(cell)),
+        plant or catalogue_plant(cell),
+        workpieces=workpieces,
+        seed=seed,
+        trace=stream,
+        disturbances=disturbances,
+    )
+    return parse_trace(stream.getvalue())
+
+
+def watched(cell: str, trace: Trace) -> Divergence | None:
+    return watch(Monitor(catalogue_net(cell), catalogue_plant(cell)), trace)
+
+
+def altered(trace: Trace, events: list[Event]) -> Trace:
+    return replace(trace, events=tuple(events))
+
+
+def slower(model: PlantModel, machine: str, command: str, takes_s: float) -> PlantModel:
+    machines = dict(model.machines)
+    action = machines[machine].commands[command]
+    assert isinstance(action, Move)
+    commands = {**machines[machine].commands, command: action.model_copy(update={"takes_s": takes_s})}
+    machines[machine] = machines[machine].model_copy(update={"commands": commands})
+    return model.model_copy(update={"machines": machines})
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_machines_that_keep_to_their_plant_file_never_diverge(cell: str) -> None:
+    for seed in range(4):
+        assert watched(cell, run_of(cell, seed=seed)) is None
+
+
+def test_a_command_that_never_completes_is_a_divergence_at_its_place_soon_after_its_time() -> None:
+    trace = run_of("one_robot", NeverCompletes("R", "MOVE", 3))
+    found = watched("one_robot", trace)
+    assert found is not None
+    assert "robot.back" in found.places
+    sent = [
+        event.at_seconds for event in trace.events if isinstance(event, CommandSent) and event.place == "robot.back"
+    ]
+    assert sent[0] + 2.2 < found.at_seconds < sent[0] + 2.2 + 2.0, "known 110 s before the command would be overdue"
+
+
+def test_a_completion_that_a_stuck_sensor_holds_back_is_named() -> None:
+    found = watched("one_robot", run_of("one_robot", StuckSensor("robot.touch", value=False, from_seconds=30.0)))
+    assert found is not None
+    assert found.subject == "robot.touch"
+    assert "robot.grasp_cv1" in found.places
+
+
+def test_a_sensor_that_drops_while_the_workpiece_lies_there_is_unexplained() -> None:
+    found = watched("one_robot", run_of("one_robot", StuckSensor("mc.part_present", value=False, from_seconds=10.0)))
+    assert found is not None
+    assert found.subject == "mc.part_present"
+    assert "nothing that the machines can have done explains it" in found.message
+
+
+def test_a_machine_that_is_slower_than_its_plant_file_is_noticed() -> None:
+    slow = slower(catalogue_plant("one_robot"), "R", "MOVE", 4.0)
+    found = watched("one_robot", run_of("one_robot", plant=slow))
+    assert found is not None
+    assert "by now" in found.message
+    assert found.places[0] == "robot.to_cv1"
+
+
+def test_a_machine_that_is_quicker_than_its_plant_file_is_not_blamed() -> None:
+    quick = slower(catalogue_plant("one_robot"), "R", "MOVE", 0.5)
+    assert watched("one_robot", run_of("one_robot", plant=quick)) is None
+
+
+def test_every_completion_that_comes_twice_or_unasked_is_unexplained() -> None:
+    trace = run_of("one_robot")
+    events = list(trace.events)
+    for name in ("robot.at_cv1", "robot.at_mc", "mc.program_end", "robot.put_done"):
+        where = next(i for i, e in enumerate(events) if isinstance(e, SignalChanged) and e.signal == name and e.value)
+        unasked = SignalChanged(events[0].at_seconds, name, value=True)
+        found = watched("one_robot", altered(trace, [unasked, *events]))
+        assert found is not None
+        assert found.subject == name
+        lost = watched("one_robot", altered(trace, [*events[:where], *events[where + 1 :]]))
+        assert lost is not None, f"{name} left out"
+
+
+@pytest.mark.parametrize(("after_seconds", "explained"), [(0.0, True), (2.2, True), (3.1, True), (3.3, False)])
+def test_a_completion_may_be_taken_as_late_as_time_jitter_and_latency_say(
+    after_seconds: float, explained: bool
+) -> None:
+    trace = run_of("one_robot", workpieces=1)
+    index = next(i for i, e in enumerate(trace.events) if isinstance(e, CommandSent) and e.place == "robot.to_cv1")
+    monitor = Monitor(catalogue_net("one_robot"), catalogue_plant("one_robot"))
+    assert watch(monitor, replace(trace, events=trace.events[: index + 2], end=None)) is None
+    sent = trace.events[index].at_seconds
+    found = monitor.signal(sent + after_seconds, "robot.at_cv1", value=True)
+    assert (monitor.divergence is None) == explained
+    assert explained or (found is not None and found.subject == "robot.at_cv1")
+
+
+def test_a_command_that_the_plant_refuses_says_why() -> None:
+    trace = run_of("one_robot")
+    events = list(trace.events)
+    where = next(i for i, e in enumerate(events) if isinstance(e, CommandSent) and e.place == "robot.to_cv1")
+    early: list[Event] = [e for e in events[:where] if not isinstance(e, SignalChanged)]
+    found = watched("one_robot", altered(trace, early))
+    assert found is not None
+    assert "conveyor" in found.subject
+
+
+def test_after_the_first_divergence_nothing_more_is_said() -> None:
+    monitor = Monitor(catalogue_net("one_robot"), catalogue_plant("one_robot"))
+    first = monitor.signal(1.0, "mc.program_end", value=True)
+    assert first is not None
+    assert monitor.signal(2.0, "robot.at_mc", value=True) is None
+    assert monitor.fired(3.0, "G1") is None
+    assert monitor.divergence == first
+    assert monitor.deadline_seconds() is None
+
+
+def test_a_plant_of_another_cell_is_refused() -> None:
+    with pytest.raises(InputError) as caught:
+        Monitor(catalogue_net("one_robot"), catalogue_plant("two_cells"))
+    assert {diagnostic.code for diagnostic in caught.value.diagnostics} == {"F5003"}
