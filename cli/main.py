@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import click
 
 from firable import __version__
-from firable.cli import bundle, check, convert, draw, prove, refine, replay, run, schema, split, verify
+from firable.cli import bundle, check, convert, draw, prove, refine, replay, run, schema, sign, split, verify
 from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
@@ -54,6 +54,7 @@ for _command in (
     split.split,
     prove.prove,
     bundle.bundle,
+    sign.sign,
     run.run,
     replay.replay,
     verify.verify,

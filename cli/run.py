@@ -10,6 +10,7 @@ import click
 from firable.cli import text
 from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option
 from firable.cli.report import Report
+from firable.cli.sign import trust_option
 
 if TYPE_CHECKING:
     from firable.executor import RunReport
@@ -36,6 +37,7 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
     help="Times real time; max is virtual time, where a run is a function of bundle, plant and seed.",
 )
 @click.option("--trace", metavar="FILE", help="Write what happens to a file, for `firable replay`.")
+@trust_option
 @click.option("--step", is_flag=True, help="Fire one transition at a time, by the keys above.")
 @format_option
 def run(
@@ -45,13 +47,14 @@ def run(
     seed: int,
     speed: str,
     trace: str | None,
+    trust: tuple[str, ...],
     step: bool,
     format_: str,
 ) -> int:
     """Run BUNDLE: a coordinator and a controller for each subnet, on a simulated cell of machines and workpieces.
 
-    A bundle that is changed or not proved is refused. Ctrl-C stops the machines, and the run ends in order, with its
-    report and its trace.
+    A bundle that is changed or not proved is refused, and with --trust one that none of these keys has signed. Ctrl-C
+    stops the machines, and the run ends in order, with its report and its trace.
 
     With --step, Enter fires the next transition, r runs on, e stops at the end of the cycle, when the cell is empty,
     and s stops now. In real time (--speed 1 or 10) the machines end what they are at while you think, and Enter pauses
@@ -63,7 +66,7 @@ def run(
         from firable.executor import load, read_plant
         from firable.executor import run as run_bundle
 
-        loaded = load(bundle)
+        loaded = load(bundle, trust)
         plant_file = _plant_file(loaded, plant)
         model = read_plant(plant_file)
         if trace is not None:

@@ -13,6 +13,7 @@ import click
 from firable.cli import text
 from firable.cli.options import answer_all, format_option, load_net, write_folder
 from firable.cli.report import Report
+from firable.cli.sign import trust_option
 
 if TYPE_CHECKING:
     from firable.analysis.evidence.checking.checker import CheckedRecord
@@ -44,9 +45,16 @@ _CLAIM_MAX = 100  # characters told of one claim
     metavar="SECONDS",
     help="Give up an obligation after so much time.",
 )
+@trust_option
 @format_option
 def verify(
-    evidence: tuple[str, ...], of: str | None, solver: str, smt_dir: str | None, timeout: float, format_: str
+    evidence: tuple[str, ...],
+    of: str | None,
+    solver: str,
+    smt_dir: str | None,
+    timeout: float,
+    trust: tuple[str, ...],
+    format_: str,
 ) -> int:
     """Check EVIDENCE again: documents that `firable check --evidence DIR` wrote, or bundles.
 
@@ -61,7 +69,9 @@ def verify(
     milliseconds = max(1, round(timeout * 1000))
     net = None if of is None else load_net(of).net
     many = len(evidence) > 1
-    asked = _Asked(net, solver, smt_dir, milliseconds, many=many)
+    asked = _Asked(net, solver, smt_dir, milliseconds, many=many, trust=trust)
+    if trust and not all(map(_is_bundle, evidence)):
+        raise click.UsageError("--trust is for bundles: documents of evidence are not signed, and need not be")
     makers = [partial(_of_bundle if _is_bundle(file) else _report, file, asked) for file in evidence]
     return answer_all("verify", format_, makers, _show)
 
@@ -75,6 +85,7 @@ class _Asked:
     smt_dir: str | None
     timeout_ms: int
     many: bool
+    trust: tuple[str, ...]
 
     def write(self, file: str, texts: Mapping[str, str]) -> tuple[str, ...]:
         """Write SMT-LIB 2 files where that is asked for: of many inputs, in a folder for each."""
@@ -101,12 +112,17 @@ def _of_bundle(file: str, asked: _Asked) -> Report:
     from firable.nets.bundle import read_bundle
 
     bundle = read_bundle(file)
+    signers: tuple[str, ...] = ()
+    if asked.trust:
+        from firable.nets.signing import demand_signature
+
+        signers = demand_signature(bundle, file, asked.trust)
     if asked.of is not None:
         _refuse_another_net(file, bundle.net, asked.of)
     checked = check_bundle(bundle, solver=asked.solver, timeout_ms=asked.timeout_ms)
     verdicts = [_told(one.verdict, one.method, one.only_claimed, shown=one.shown) for one in checked]
     files = asked.write(file, {name: text for name, text in bundle.evidence.items() if name.endswith(".smt2")})
-    of = {"digest": bundle.digest, "solver": asked.solver}
+    of = {"digest": bundle.digest, "solver": asked.solver, **({"signed_by": ", ".join(signers)} if signers else {})}
     return Report("verify", file, bundle.net, verdicts, files=files, bundle=of)
 
 
@@ -213,6 +229,8 @@ def _show_bundle(report: Report) -> None:
     from firable.decompose.verification.restating import HEADS
 
     click.echo(f"  the bundle {report.bundle['digest'][:16]}…: split anew, and stated anew what it must prove")
+    if signers := report.bundle.get("signed_by"):
+        click.echo("  signed by " + ", ".join(f"{name[:16]}…" for name in signers.split(", ")) + ", which you trust")
     titles = {**HEADS, "protocol": TITLE, "persistent": "of each vote it is shown whether it is persistent"}
     families: dict[str, list[Verdict]] = {family: [] for family in titles}
     others: list[Verdict] = []

@@ -102,6 +102,8 @@ CODES: Final[dict[str, str]] = {
     "F5020": "a host that may not take part",
     "F5021": "a link that cannot be opened",
     "F5022": "a link that is open to the network",
+    "F5023": "a bundle without the signature that is demanded",
+    "F5024": "a key or signatures that are none, or damaged",
     # F6: evidence
     "F6001": "the evidence is damaged or malformed",
     "F6002": "the evidence does not show what it claims",

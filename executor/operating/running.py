@@ -73,9 +73,16 @@ class RunReport:
         }
 
 
-def load(path: Path | str) -> Bundle:
-    """Read a bundle that may run; raises `InputError` F5001 where it is changed, F5002 where it is not proved."""
+def load(path: Path | str, trust: Sequence[Path | str] = ()) -> Bundle:
+    """Read a bundle that may run, signed by one of the public keys in the files of `trust`, where there are any.
+
+    Raises `InputError` F5001 where it is changed, F5002 where it is not proved, F5023 where it is not signed.
+    """
     bundle = read_bundle(path)
+    if trust:
+        from firable.nets.signing import demand_signature  # the extra `sign`, which only such a site needs
+
+        demand_signature(bundle, path, trust)
     if problems := unproved(bundle):
         raise InputError(problems)
     return bundle
