@@ -8,6 +8,8 @@ WITH_A_LIBRARY: frozenset[str] = frozenset(
     {
         "firable.executor.links.serial_line",
         "firable.executor.links.zenoh_link",
+        "firable.executor.operating.control",
+        "firable.executor.operating.metrics",
     }
 )
 """The modules that import what an extra brings: a device's protocol, or a transport between hosts."""

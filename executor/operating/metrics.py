@@ -1,0 +1,140 @@
+"""The figures of a run as Prometheus reads them: how often, how long, how many in vain.
+
+They are counted from what the trace shows and from the messages between controllers and coordinator, so that a figure
+and a trace cannot disagree. Times are those of the run. A time that somebody would look at as a distribution (the
+cycle, from one firing of a transition to its next) is a histogram; those of which there is one for every place are a
+count and a sum, because a histogram for each of a thousand places is what monitoring systems choke on.
+
+`prometheus_client` keeps and prints the numbers. Its process-wide registry is not used: two runs in one process would
+count into each other.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Summary, generate_latest
+
+from firable.executor.protocol.messages import Decision, Message, Vote
+from firable.nets.net import Net
+from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged
+
+CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
+
+_CYCLE_SECONDS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 45, 60, 90, 120, 300, 600, 1800, 3600)
+
+
+class Metrics:
+    """The figures of one run of a net."""
+
+    def __init__(self, net: Net) -> None:
+        self.net = net
+        self.registry = registry = CollectorRegistry()
+        self.firings = Counter("firable_firings", "Firings of a transition", ["transition"], registry=registry)
+        self.cycles = Histogram(
+            "firable_cycle_seconds",
+            "Time from one firing of a transition to its next",
+            ["transition"],
+            buckets=_CYCLE_SECONDS,
+            registry=registry,
+        )
+        self.held = Summary("firable_place_seconds", "How long a token stayed on a place", ["place"], registry=registry)
+        self.marked = Gauge("firable_marked", "1 while a place holds a token", ["place"], registry=registry)
+        self.commands = Counter(
+            "firable_commands", "Commands sent to a machine", ["machine", "command", "place"], registry=registry
+        )
+        self.completions = Summary(
+            "firable_command_seconds",
+            "Time from a command to its completion",
+            ["machine", "command", "place"],
+            registry=registry,
+        )
+        self.signals = Counter("firable_signal_changes", "Changes of a signal taken in", ["signal"], registry=registry)
+        self.coalesced = Counter(
+            "firable_coalesced_inputs",
+            "Changes of a signal that came faster than they were read",
+            ["signal"],
+            registry=registry,
+        )
+        self.messages = Counter(
+            "firable_messages", "Messages between controllers and coordinator", ["kind"], registry=registry
+        )
+        self.votes = Counter(
+            "firable_votes",
+            "Votes of a controller on a part of a transition",
+            ["controller", "answer"],
+            registry=registry,
+        )
+        self.rounds = Counter("firable_rounds", "Rounds of votes, by how they ended", ["outcome"], registry=registry)
+        self.repeats = Counter("firable_repeats", "Messages sent again, unanswered so far", registry=registry)
+        self.faults = Counter("firable_faults", "Faults and divergences told", ["kind"], registry=registry)
+        self.since: dict[str, float] = {}
+        self.fired_at: dict[str, float] = {}
+        self.sent_at: dict[str, tuple[float, str]] = {}
+        """For each completion signal, when the command that it completes was sent, and of which place."""
+        self.decided: set[int] = set()
+        """The rounds that are decided and not closed; each has a decision for every participant."""
+        for place in net.places:
+            self.marked.labels(place.name).set(place.marked)
+            if place.marked:
+                self.since[place.name] = 0.0
+        for transition in net.transitions:
+            self.firings.labels(transition.name)
+
+    def seen(self, event: Event) -> None:
+        """Count an event of the trace."""
+        match event:
+            case Fired(at, transitions):
+                for name in transitions:
+                    self._fired(at, name)
+            case SignalChanged(at, name, value):
+                self.signals.labels(name).inc()
+                if value and name in self.sent_at:
+                    sent, place = self.sent_at.pop(name)
+                    self.completions.labels(*self._labels(place)).observe(at - sent)
+            case CommandSent(at, place):
+                self.commands.labels(*self._labels(place)).inc()
+                if (completion := self.net.place(place).completion) is not None:
+                    self.sent_at[completion] = at, place
+            case Noted(_, note):
+                if note in ("fault", "divergence"):
+                    self.faults.labels(note).inc()
+
+    def message(self, message: Message, *, again: bool = False) -> None:
+        """Count a message between a controller and the coordinator; `again` where it repeats an unanswered one."""
+        if again:
+            self.repeats.inc()
+            return
+        self.messages.labels(type(message).__name__).inc()
+        match message:
+            case Vote(controller, _, promised):
+                self.votes.labels(controller, "yes" if promised else "no").inc()
+            case Decision(round=number) if number not in self.decided:
+                self.decided = {one for one in self.decided if one >= message.closed_below} | {number}
+                self.rounds.labels("aborted" if message.committed is None else "committed").inc()
+
+    def inputs_coalesced(self, signal: str, changes: int = 1) -> None:
+        """Count changes of a signal that a driver saw and could not hand over one by one."""
+        self.coalesced.labels(signal).inc(changes)
+
+    def text(self) -> bytes:
+        """All figures in Prometheus' text format."""
+        return generate_latest(self.registry)
+
+    def _fired(self, at_seconds: float, name: str) -> None:
+        self.firings.labels(name).inc()
+        if (before := self.fired_at.get(name)) is not None:
+            self.cycles.labels(name).observe(at_seconds - before)
+        self.fired_at[name] = at_seconds
+        transition = self.net.transition(name)
+        for place in transition.inputs:
+            self.marked.labels(place).set(0)
+            if (since := self.since.pop(place, None)) is not None:
+                self.held.labels(place).observe(at_seconds - since)
+        for place in transition.outputs:
+            self.marked.labels(place).set(1)
+            self.since[place] = at_seconds
+
+    def _labels(self, place: str) -> tuple[str, str, str]:
+        command = self.net.place(place).command
+        return (command.machine, command.command, place) if command is not None else ("", "", place)

@@ -1,0 +1,79 @@
+"""The figures of a run agree with its trace, and are text that Prometheus reads."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+
+from prometheus_client.parser import text_string_to_metric_families
+
+from firable.decompose.splitting.cut import split
+from firable.executor.operating.metrics import Metrics
+from firable.executor.operating.running import execute
+from firable.executor.protocol.messages import Decision, Readiness, Vote
+from firable.nets.catalogue import catalogue_net, catalogue_plant
+from firable.semantics.trace import CommandSent, Fired, Trace, parse_trace
+
+NET = catalogue_net("one_robot")
+
+
+def run_of(workpieces: int) -> Trace:
+    stream = io.StringIO()
+    execute(split(NET), catalogue_plant("one_robot"), workpieces=workpieces, seed=3, trace=stream)
+    return parse_trace(stream.getvalue())
+
+
+def samples(metrics: Metrics) -> dict[tuple[str, tuple[str, ...]], float]:
+    found = {}
+    for family in text_string_to_metric_families(metrics.text().decode()):
+        for sample in family.samples:
+            if not sample.name.endswith("_created"):
+                found[sample.name, tuple(value for _, value in sorted(sample.labels.items()))] = sample.value
+    return found
+
+
+def test_figures_are_those_of_the_trace() -> None:
+    trace, metrics = run_of(4), Metrics(NET)
+    for event in trace.events:
+        metrics.seen(event)
+    found = samples(metrics)
+    firings = Counter(name for event in trace.events if isinstance(event, Fired) for name in event.transitions)
+    commands = Counter(event.place for event in trace.events if isinstance(event, CommandSent))
+    assert {name: found["firable_firings_total", (name,)] for name in firings} == firings
+    assert {place: found["firable_commands_total", ("MOVE", "R", place)] for place in ("robot.to_cv1",)} == {
+        "robot.to_cv1": commands["robot.to_cv1"]
+    }
+    times = [event.at_seconds for event in trace.events if isinstance(event, Fired) and "G1" in event.transitions]
+    assert found["firable_cycle_seconds_count", ("G1",)] == len(times) - 1
+    assert abs(found["firable_cycle_seconds_sum", ("G1",)] - (times[-1] - times[0])) < 1e-6
+    moved = found["firable_command_seconds_sum", ("MOVE", "R", "robot.to_cv1")] / commands["robot.to_cv1"]
+    assert 1.8 <= moved <= 2.2, "the plant file says 2.0 s, with 0.2 s of jitter"
+    marked = {labels[0] for (name, labels), value in found.items() if name == "firable_marked" and value}
+    assert trace.end is not None
+    assert marked == set(trace.end.marking)
+
+
+def test_a_round_counts_once_however_many_take_part_and_however_often_it_is_told() -> None:
+    metrics = Metrics(NET)
+    for controller in ("robot", "mc"):
+        metrics.message(Vote(controller, 7, frozenset({"G2"}), Readiness(1, frozenset())))
+    metrics.message(Vote("system", 7, frozenset(), Readiness(1, frozenset())))
+    told = [Decision(controller, 7, None, 7, 0) for controller in ("robot", "mc", "system")]
+    for decision in told:
+        metrics.message(decision)
+    metrics.message(told[0], again=True)
+    metrics.message(Decision("robot", 8, "G2", 8, 0))
+    found = samples(metrics)
+    assert found["firable_rounds_total", ("aborted",)] == 1
+    assert found["firable_rounds_total", ("committed",)] == 1
+    assert found["firable_votes_total", ("yes", "robot")] == 1
+    assert found["firable_votes_total", ("no", "system")] == 1
+    assert found["firable_messages_total", ("Decision",)] == 4
+    assert found["firable_repeats_total", ()] == 1
+
+
+def test_two_runs_in_one_process_do_not_count_into_each_other() -> None:
+    first, second = Metrics(NET), Metrics(NET)
+    first.inputs_coalesced("robot.touch", 3)
+    assert samples(first)["firable_coalesced_inputs_total", ("robot.touch",)] == 3
+    assert ("firable_coalesced_inputs_total", ("robot.touch",)) not in samples(second)
