@@ -104,6 +104,9 @@ CODES: Final[dict[str, str]] = {
     "F5022": "a link that is open to the network",
     "F5023": "a bundle without the signature that is demanded",
     "F5024": "a key or signatures that are none, or damaged",
+    "F5060": "an operator's endpoint that is open to everybody",
+    "F5061": "an operator's endpoint that cannot be served",
+    "F5062": "a certificate that cannot be used",
     # F6: evidence
     "F6001": "the evidence is damaged or malformed",
     "F6002": "the evidence does not show what it claims",

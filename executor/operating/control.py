@@ -1,0 +1,219 @@
+"""The operator from elsewhere: what a person at the cell can do, over HTTP, for those who may.
+
+    GET  /situation                  what the run is doing, and what waits for what
+    GET  /metrics                    its figures, for Prometheus
+    POST /pause  /resume  /step      let nothing fire; let fire; fire one transition
+    POST /stop                       stop every machine where it is, and end the run
+    POST /stop-at-end                let no new work in, and end when the cell is empty
+    POST /emergency-stop             drive the safe outputs at once
+
+*Who may* is asked of every request, reading ones too: a bearer token, compared in constant time, or, where a client
+authority is named, a certificate that it signed. Nothing is trusted for coming from this host, because a page in a
+browser here can post to it. Beyond loopback nothing is served without TLS: a token in the clear is everybody's.
+Each command is a line of the trace, with the name of who gave it.
+
+This is no safety function: an emergency stop over a network is a convenience beside the one that is wired.
+
+`aiohttp` serves inside the event loop of the run, so a command is one act like any other and needs no lock. Rejected:
+a server process of its own (uvicorn), which takes the signals of the process, Ctrl-C first.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import secrets
+import ssl
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from aiohttp import web
+
+from firable.executor.operating.situation import Situation
+from firable.nets.diagnostics import Diagnostic, InputError
+
+METRICS_CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
+
+
+class Operated(Protocol):
+    """A run that an operator may act on."""
+
+    def situation(self) -> Situation:
+        """What the run is doing."""
+        ...
+
+    def pause(self) -> None:
+        """Let nothing fire any more."""
+        ...
+
+    def resume(self) -> None:
+        """Let transitions fire again."""
+        ...
+
+    async def step(self) -> str | None:
+        """While paused, fire one transition; its name, or None."""
+        ...
+
+    def stop(self, *, at_end_of_cycle: bool = False) -> None:
+        """End the run."""
+        ...
+
+    def emergency_stop(self, reason: str) -> None:
+        """Drive the safe outputs at once."""
+        ...
+
+    def commanded(self, command: str, by: str) -> None:
+        """Keep in the trace who commanded what."""
+        ...
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """Where to serve, and for whom; raises `InputError` F5060 where that is open to everybody.
+
+    `token` is what a bearer shows; with `tls` whose context demands client certificates, one of those suffices too.
+    """
+
+    host: str
+    port: int
+    token: str
+    tls: ssl.SSLContext | None = None
+
+    def __post_init__(self) -> None:
+        if self.tls is None and not _is_loopback(self.host):
+            message = f"the operator's endpoint would be open on {self.host}, without TLS"
+            hint = "give --tls-cert and --tls-key, or serve on 127.0.0.1 and come through a tunnel"
+            raise InputError([Diagnostic("F5060", message, hint)])
+        if len(self.token) < 16:
+            message = "the token of the operator's endpoint has fewer than 16 characters"
+            raise InputError([Diagnostic("F5060", message, "let `firable run` make one, or draw one at random")])
+
+    @property
+    def demands_certificates(self) -> bool:
+        """Whether the connection itself says who comes."""
+        return self.tls is not None and self.tls.verify_mode is ssl.CERT_REQUIRED
+
+
+@asynccontextmanager
+async def serving(run: Operated, endpoint: Endpoint, figures: Callable[[], bytes]) -> AsyncIterator[str]:
+    """Serve a run for as long as the context lasts; gives the address that is served.
+
+    Raises `InputError` F5061 where the address cannot be had.
+    """
+    runner = web.AppRunner(application(run, endpoint, figures), access_log=None)
+    await runner.setup()
+    try:
+        site = web.TCPSite(runner, endpoint.host, endpoint.port, ssl_context=endpoint.tls)
+        try:
+            await site.start()
+        except OSError as error:
+            message = f"the operator's endpoint cannot be had at {endpoint.host}:{endpoint.port}: {error.strerror}"
+            raise InputError([Diagnostic("F5061", message, "name another port; 0 takes a free one")]) from None
+        host, port = runner.addresses[0][:2]
+        shown = f"[{host}]" if ":" in host else host
+        yield f"{'http' if endpoint.tls is None else 'https'}://{shown}:{port}"
+    finally:
+        await runner.cleanup()
+
+
+def application(run: Operated, endpoint: Endpoint, figures: Callable[[], bytes]) -> web.Application:
+    """The endpoint as an application; every handler runs only for who may."""
+
+    @web.middleware
+    async def who_may(
+        request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+    ) -> web.StreamResponse:
+        if _name_of(request, endpoint) is None:
+            return web.json_response(
+                {"error": "who are you? show the token"}, status=401, headers={"WWW-Authenticate": "Bearer"}
+            )
+        return await handler(request)
+
+    def who(request: web.Request) -> str:
+        return _name_of(request, endpoint) or ""
+
+    async def situation(_: web.Request) -> web.Response:
+        return web.json_response(_situation(run))
+
+    async def metrics(_: web.Request) -> web.Response:
+        return web.Response(body=figures(), headers={"Content-Type": METRICS_CONTENT_TYPE})
+
+    def commanding(command: str, act: Callable[[], None]) -> Callable[[web.Request], Awaitable[web.Response]]:
+        async def handler(request: web.Request) -> web.Response:
+            run.commanded(command, who(request))
+            act()
+            return web.json_response(_situation(run))
+
+        return handler
+
+    async def step(request: web.Request) -> web.Response:
+        run.commanded("step", who(request))
+        fired = await run.step()
+        return web.json_response({"fired": fired, **_situation(run)})
+
+    async def emergency_stop(request: web.Request) -> web.Response:
+        by = who(request)
+        run.emergency_stop(f"by {by}")  # before anything else, a line of the trace included
+        run.commanded("emergency-stop", by)
+        return web.json_response(_situation(run))
+
+    app = web.Application(middlewares=[who_may], client_max_size=1024)
+    app.router.add_get("/situation", situation)
+    app.router.add_get("/metrics", metrics)
+    app.router.add_post("/pause", commanding("pause", run.pause))
+    app.router.add_post("/resume", commanding("resume", run.resume))
+    app.router.add_post("/step", step)
+    app.router.add_post("/stop", commanding("stop", run.stop))
+    app.router.add_post("/stop-at-end", commanding("stop-at-end", lambda: run.stop(at_end_of_cycle=True)))
+    app.router.add_post("/emergency-stop", emergency_stop)
+    return app
+
+
+def new_token() -> str:
+    """A token that nobody guesses."""
+    return secrets.token_urlsafe(24)
+
+
+def tls_context(certificate: str, key: str, client_authority: str | None) -> ssl.SSLContext:
+    """The server's side of TLS; with an authority, of clients that it has signed only. Raises `InputError` F5062."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    try:
+        context.load_cert_chain(certificate, key)
+        if client_authority is not None:
+            context.load_verify_locations(client_authority)
+            context.verify_mode = ssl.CERT_REQUIRED
+    except (OSError, ssl.SSLError) as error:
+        message = f"the certificate of the operator's endpoint cannot be used: {error.strerror or error}"
+        raise InputError([Diagnostic("F5062", message, "name PEM files of a certificate and its key")]) from None
+    return context
+
+
+def _name_of(request: web.Request, endpoint: Endpoint) -> str | None:
+    """Who comes: the common name of the certificate, or "token"; None where neither is shown."""
+    if endpoint.demands_certificates and request.transport is not None:
+        certificate = request.transport.get_extra_info("peercert") or {}
+        names = [value for rdn in certificate.get("subject", ()) for key, value in rdn if key == "commonName"]
+        return names[0] if names else "a certificate without a name"
+    scheme, _, shown = request.headers.get("Authorization", "").partition(" ")
+    if scheme == "Bearer" and secrets.compare_digest(shown.encode(), endpoint.token.encode()):
+        return "token"
+    return None
+
+
+def _situation(run: Operated) -> dict[str, object]:
+    now = run.situation()
+    return {
+        "state": now.state.value,
+        "message": now.message,
+        "marking": list(now.marking),
+        "blocked": [str(blocked) for blocked in now.blocked],
+    }
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

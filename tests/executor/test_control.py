@@ -1,0 +1,225 @@
+"""The operator's endpoint obeys those who may, and nobody else."""
+
+from __future__ import annotations
+
+import asyncio
+import datetime
+import ssl
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+from aiohttp import ClientConnectorError, ClientSession
+from aiohttp.client_exceptions import ClientError
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import NameOID
+
+from firable.executor.operating.control import Endpoint, new_token, serving, tls_context
+from firable.executor.operating.situation import Situation, State
+from firable.nets.diagnostics import InputError
+
+TOKEN = "a-token-of-some-length"
+BEARER = {"Authorization": f"Bearer {TOKEN}"}
+
+
+class Told:
+    """A run that writes down what it is told."""
+
+    def __init__(self) -> None:
+        self.log: list[str] = []
+
+    def situation(self) -> Situation:
+        return Situation(State.WAITING, ("robot.free",))
+
+    def pause(self) -> None:
+        self.log.append("pause")
+
+    def resume(self) -> None:
+        self.log.append("resume")
+
+    async def step(self) -> str | None:
+        self.log.append("step")
+        return "G1"
+
+    def stop(self, *, at_end_of_cycle: bool = False) -> None:
+        self.log.append("stop at end" if at_end_of_cycle else "stop")
+
+    def emergency_stop(self, reason: str) -> None:
+        self.log.append(f"emergency stop {reason}")
+
+    def commanded(self, command: str, by: str) -> None:
+        self.log.append(f"{by}: {command}")
+
+
+def with_endpoint(
+    endpoint: Endpoint, ask: Callable[[ClientSession, str], Awaitable[None]], ssl_context: ssl.SSLContext | None = None
+) -> list[str]:
+    run = Told()
+
+    async def main() -> None:
+        async with serving(run, endpoint, lambda: b"firable_firings_total 1.0\n") as url, ClientSession() as session:
+            await ask(session, url)
+
+    assert (ssl_context is None) == (endpoint.tls is None)
+    asyncio.run(main())
+    return run.log
+
+
+def test_every_command_reaches_the_run_with_the_name_of_who_gave_it() -> None:
+    async def ask(session: ClientSession, url: str) -> None:
+        for command in ("pause", "step", "resume", "stop-at-end", "stop", "emergency-stop"):
+            async with session.post(f"{url}/{command}", headers=BEARER) as answer:
+                assert answer.status == 200
+                told = await answer.json()
+                assert told["state"] == "waiting"
+                assert told["marking"] == ["robot.free"]
+                assert told.get("fired") == ("G1" if command == "step" else None)
+
+    assert with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask) == [
+        "token: pause",
+        "pause",
+        "token: step",
+        "step",
+        "token: resume",
+        "resume",
+        "token: stop-at-end",
+        "stop at end",
+        "token: stop",
+        "stop",
+        "emergency stop by token",
+        "token: emergency-stop",
+    ]
+
+
+@pytest.mark.parametrize("headers", [{}, {"Authorization": "Bearer wrong"}, {"Authorization": f"Basic {TOKEN}"}])
+def test_who_shows_no_token_learns_nothing_and_moves_nothing(headers: dict[str, str]) -> None:
+    async def ask(session: ClientSession, url: str) -> None:
+        for method, path in [("POST", "/stop"), ("POST", "/resume"), ("GET", "/situation"), ("GET", "/metrics")]:
+            async with session.request(method, url + path, headers=headers) as answer:
+                assert answer.status == 401
+                assert "robot" not in await answer.text()
+
+    assert with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask) == []
+
+
+def test_figures_are_served_as_text_for_prometheus() -> None:
+    async def ask(session: ClientSession, url: str) -> None:
+        async with session.get(f"{url}/metrics", headers=BEARER) as answer:
+            assert answer.headers["Content-Type"].startswith("text/plain; version=0.0.4")
+            assert await answer.text() == "firable_firings_total 1.0\n"
+
+    with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask)
+
+
+def test_commands_are_not_given_by_looking() -> None:
+    async def ask(session: ClientSession, url: str) -> None:
+        async with session.get(f"{url}/stop", headers=BEARER) as answer:
+            assert answer.status == 405
+
+    assert with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask) == []
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "cell.example"])
+def test_nothing_is_served_beyond_loopback_without_tls(host: str) -> None:
+    with pytest.raises(InputError) as caught:
+        Endpoint(host, 0, TOKEN)
+    assert caught.value.diagnostics[0].code == "F5060"
+
+
+def test_a_token_that_can_be_guessed_is_refused() -> None:
+    with pytest.raises(InputError) as caught:
+        Endpoint("127.0.0.1", 0, "secret")
+    assert caught.value.diagnostics[0].code == "F5060"
+    assert len(new_token()) >= 32
+    assert new_token() != new_token()
+
+
+def test_an_address_that_is_taken_is_one_clear_error() -> None:
+    async def main() -> None:
+        async with serving(Told(), Endpoint("127.0.0.1", 0, TOKEN), bytes) as url:
+            port = int(url.rpartition(":")[2])
+            async with serving(Told(), Endpoint("127.0.0.1", port, TOKEN), bytes):
+                pass
+
+    with pytest.raises(InputError) as caught:
+        asyncio.run(main())
+    assert caught.value.diagnostics[0].code == "F5061"
+
+
+def pem(folder: Path, name: str, signer: tuple[x509.Name, ec.EllipticCurvePrivateKey] | None = None) -> tuple[str, str]:
+    """A certificate and its key as files: signed by itself, or by another."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
+    issuer, issuer_key = (subject, key) if signer is None else signer
+    now = datetime.datetime.now(datetime.UTC)
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(issuer)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - datetime.timedelta(days=1))
+        .not_valid_after(now + datetime.timedelta(days=1))
+        .add_extension(x509.BasicConstraints(ca=signer is None, path_length=None), critical=True)
+        .add_extension(x509.SubjectAlternativeName([x509.DNSName("localhost")]), critical=False)
+        .sign(issuer_key, hashes.SHA256())
+    )
+    at, key_at = folder / f"{name}.pem", folder / f"{name}.key"
+    at.write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
+    key_at.write_bytes(
+        key.private_bytes(serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
+    )
+    return str(at), str(key_at)
+
+
+def test_a_certificate_of_the_authority_names_the_operator_and_no_other_gets_in(tmp_path: Path) -> None:
+    authority, authority_key = pem(tmp_path, "authority")
+    signer = (
+        x509.load_pem_x509_certificate(Path(authority).read_bytes()).subject,
+        serialization.load_pem_private_key(Path(authority_key).read_bytes(), None),
+    )
+    assert isinstance(signer[1], ec.EllipticCurvePrivateKey)
+    server, anna, stranger = (
+        pem(tmp_path, "server", (signer[0], signer[1])),
+        pem(tmp_path, "anna", (signer[0], signer[1])),
+        pem(tmp_path, "stranger"),
+    )
+
+    def client(certificate: tuple[str, str] | None) -> ssl.SSLContext:
+        context = ssl.create_default_context(cafile=authority)
+        context.check_hostname = False
+        if certificate is not None:
+            context.load_cert_chain(*certificate)
+        return context
+
+    async def ask(session: ClientSession, url: str) -> None:
+        async with session.post(f"{url}/pause", ssl=client(anna)) as answer:
+            assert answer.status == 200
+        for certificate in (stranger, None):
+            with pytest.raises((ClientError, ConnectionError, ssl.SSLError)):
+                async with session.post(f"{url}/resume", ssl=client(certificate), headers=BEARER) as answer:
+                    await answer.read()
+
+    tls = tls_context(*server, authority)
+    assert with_endpoint(Endpoint("127.0.0.1", 0, TOKEN, tls), ask, tls) == ["anna: pause", "pause"]
+
+
+def test_files_that_are_no_certificate_are_one_clear_error(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.pem"
+    broken.write_text("no certificate")
+    with pytest.raises(InputError) as caught:
+        tls_context(str(broken), str(broken), None)
+    assert caught.value.diagnostics[0].code == "F5062"
+
+
+def test_when_the_run_is_over_nobody_answers() -> None:
+    async def main() -> None:
+        async with serving(Told(), Endpoint("127.0.0.1", 0, TOKEN), bytes) as url:
+            pass
+        async with ClientSession() as session:
+            with pytest.raises(ClientConnectorError):
+                await session.get(f"{url}/situation", headers=BEARER)
+
+    asyncio.run(main())
