@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from firable.cli import text
-from firable.cli.options import answer, format_option, load_net
+from firable.cli.options import answer, format_option, load_net, write_text
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
+    from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
     from firable.semantics.trace import Trace
 
 _TOLD_MAX = 40
+_RUN: dict[str, Any] = {"firings": {}, "marking": [], "told": [], "recorded_on_this_net": True}
+_NAME, _METHOD = "trace", "replay by the reference player"
 
 
 @click.command(short_help="Play a trace by the reference player: is it one of the net?")
-@click.argument("trace", metavar="TRACE")
+@click.argument("traces", metavar="TRACE...", nargs=-1, required=True)
 @click.option("--net", "of", metavar="NET", required=True, help="The net, or the bundle, that the trace is of.")
 @click.option(
     "--machines",
@@ -32,37 +35,64 @@ _TOLD_MAX = 40
     type=click.FloatRange(min=0.0, min_open=True),
     help="With --machines: how many seconds after its change a signal is taken at the latest.  [default: 0.5]",
 )
+@click.option("-o", "--output", metavar="FILE", help="Write the one trace that the traces of several hosts make.")
 @format_option
-def replay(trace: str, of: str, machines: str | None, latency_seconds: float | None, format_: str) -> int:
+def replay(
+    traces: tuple[str, ...],
+    of: str,
+    machines: str | None,
+    latency_seconds: float | None,
+    output: str | None,
+    format_: str,
+) -> int:
     """Play TRACE, a log of `firable run` or a counterexample of `firable check`, token by token.
 
     Every firing must be firable with its gates open as recorded, every command sent exactly once, and the marking at
     the end the one shown. A trace that was cut off is unknown.
+
+    Where a cell ran on several hosts, name the traces of all of them: they are joined by the rounds of their
+    coordinator, and their clocks need not agree.
 
     With --machines, the signals and commands are held against the machines of a plant file, as a run does: the first
     signal, or the absence of one, that nothing explains is shown, with the places of the cell that it touches.
     """
     if latency_seconds is not None and machines is None:
         raise click.UsageError("--latency is of the machines: say which with --machines")
-    return answer("replay", format_, lambda: _report(trace, of, machines, latency_seconds), _show)
+    return answer("replay", format_, lambda: _report(traces, of, machines, latency_seconds, output), _show)
 
 
-def _report(file: str, argument: str, machines: str | None, latency_seconds: float | None) -> Report:
+def _report(
+    files: tuple[str, ...], argument: str, machines: str | None, latency_seconds: float | None, output: str | None
+) -> Report:
+    from firable.nets.diagnostics import InputError
     from firable.nets.interchange import net_digest
+    from firable.semantics.joining import join
     from firable.semantics.trace import Fired, read_trace
 
     loaded = load_net(argument)
     net = loaded.net
-    trace = read_trace(file)
+    read = [read_trace(file) for file in files]
+    of_hosts = len(read) > 1 or bool(read[0].header.machines)
+    try:
+        trace = join(net, read) if of_hosts else read[0]
+    except InputError as error:
+        if error.diagnostics[0].code != "F5004":
+            raise
+        return Report(
+            "replay", ", ".join(files), net, (_violated(net, error.diagnostics[0]),), run=_RUN, notes=loaded.notes
+        )
+    if output is not None:
+        write_text(output, "".join(f"{line}\n" for line in trace.lines()))
     firings = [event.transitions for event in trace.events if isinstance(event, Fired)]
     verdict, marking = _verdict(net, trace)
     same = not trace.header.digest or trace.header.digest == net_digest(net)
     return Report(
         "replay",
-        file,
+        ", ".join(files),
         net,
         (verdict, *(() if machines is None else (_machines(net, trace, machines, latency_seconds),))),
         notes=loaded.notes,
+        files=(output,) if output else (),
         run={
             "firings": {name: sum(name in fired for fired in firings) for name in net.transition_index},
             "marking": list(marking),
@@ -77,21 +107,25 @@ def _verdict(net: Net, trace: Trace) -> tuple[Verdict, tuple[str, ...]]:
     from firable.nets.verdict import Status, Verdict
     from firable.semantics.replaying import replay as play
 
-    name, method = "trace", "replay by the reference player"
+    name, method = _NAME, _METHOD
     try:
         done = play(net, trace)
     except InputError as error:
-        found = error.diagnostics[0]
-        where = f"line {found.span.line}: " if found.span else ""
-        statement = f"the trace is a trace of '{net.name}'"
-        hint = f"{where}{found.message}; {found.hint}"
-        return Verdict(name, Status.VIOLATED, statement, method, code=found.code, hint=hint), ()
+        return _violated(net, error.diagnostics[0]), ()
     statement = f"the trace is a trace of '{net.name}': {text.counted(done.firings, 'firing')}"
     if done.commands:
         statement += f", {text.counted(done.commands, 'command')}"
     status = Status.PROVED if done.complete else Status.UNKNOWN
     bound = "" if done.complete else "the trace was cut off; all its lines so far are of the net"
     return Verdict(name, status, statement, method, bound=bound), net.names(done.marking)
+
+
+def _violated(net: Net, found: Diagnostic) -> Verdict:
+    from firable.nets.verdict import Status, Verdict
+
+    where = f"line {found.span.line}: " if found.span else ""
+    hint = f"{where}{found.message}; {found.hint}"
+    return Verdict(_NAME, Status.VIOLATED, f"the trace is a trace of '{net.name}'", _METHOD, code=found.code, hint=hint)
 
 
 def _machines(net: Net, trace: Trace, argument: str, latency_seconds: float | None) -> Verdict:

@@ -8,6 +8,9 @@ first line is a header, the last says where the trace ended; between them stand,
     {"at": 1.25, "command": "robot.to_cv1"}              the output signal of a place, sent
     {"at": 1.25, "note": "fault", ...}                   anything else, kept and not judged
 
+A firing that a coordinator decided bears the number of its `round` where the trace is that of one host among others;
+`firable.semantics.joining` makes one trace of those of all hosts.
+
 `at` is in seconds from the start of the run, and never runs backwards. A trace that is cut off, because the run was
 killed, has no last line. Whether a trace is one of the net is decided by `firable.semantics.replaying`.
 """
@@ -39,14 +42,16 @@ class Discipline(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Fired:
-    """Transitions fired together; one, under interleaving."""
+    """Transitions fired together; one, under interleaving. In the trace of a host, `round` is the one that decided."""
 
     at_seconds: float
     transitions: tuple[str, ...]
+    round: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The line of the trace file."""
-        return {"at": self.at_seconds, "fired": list(self.transitions)}
+        of_round = {} if self.round is None else {"round": self.round}
+        return {"at": self.at_seconds, "fired": list(self.transitions), **of_round}
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +100,8 @@ class Header:
     """The first line: of which net the trace is, and what it records.
 
     With `signals` the changes of external signals are recorded and gates are judged; without, gates are free. With
-    `commands` the commands sent are recorded and judged.
+    `commands` the commands sent are recorded and judged. `machines` are those of the host whose trace it is, where it
+    is one of several hosts (the coordinator is ""), and `began` is when, in seconds since 1970.
     """
 
     net: str
@@ -103,6 +109,8 @@ class Header:
     discipline: Discipline = Discipline.INTERLEAVING
     signals: bool = False
     commands: bool = False
+    machines: tuple[str, ...] = ()
+    began: float = 0.0
 
     def to_json(self) -> dict[str, Any]:
         """The line of the trace file."""
@@ -113,6 +121,7 @@ class Header:
             "discipline": self.discipline.value,
             "signals": self.signals,
             "commands": self.commands,
+            **({"machines": list(self.machines), "began": self.began} if self.machines else {}),
         }
 
 
@@ -226,16 +235,23 @@ class _Reader:
             }:
                 if version != VERSION:
                     raise self.failure(1, line, f"version {version} of the trace format is not known")
-                return Header(net, digest, Discipline(discipline), signals, commands)
+                machines, began = data.get("machines", []), data.get("began", 0.0)
+                if (
+                    isinstance(machines, list)
+                    and all(isinstance(name, str) for name in machines)
+                    and isinstance(began, int | float)
+                ):
+                    kind = Discipline(discipline)
+                    return Header(net, digest, kind, signals, commands, tuple(machines), float(began))
         raise self.failure(1, line, "not the header of a trace")
 
     def event(self, number: int, line: str) -> Event | End:
         data = self.record(number, line)
         match data:
-            case {"at": float() | int() as at, "fired": list(names)} if names and all(
-                isinstance(n, str) for n in names
+            case {"at": float() | int() as at, "fired": list(names)} if (
+                names and all(isinstance(n, str) for n in names) and isinstance(data.get("round"), int | None)
             ):
-                return Fired(float(at), tuple(names))
+                return Fired(float(at), tuple(names), data.get("round"))
             case {"at": float() | int() as at, "signal": str(signal), "value": 0 | 1 as value}:
                 return SignalChanged(float(at), signal, bool(value))
             case {"at": float() | int() as at, "command": str(place)}:
