@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from firable.semantics.trace import Trace
 
 _TOLD_MAX = 40
-_RUN: dict[str, Any] = {"firings": {}, "marking": [], "told": [], "recorded_on_this_net": True}
+_NOTHING_PLAYED: dict[str, Any] = {"firings": {}, "marking": [], "told": [], "recorded_on_this_net": True}
 _NAME, _METHOD = "trace", "replay by the reference player"
 
 
@@ -79,7 +79,12 @@ def _report(
         if error.diagnostics[0].code != "F5004":
             raise
         return Report(
-            "replay", ", ".join(files), net, (_violated(net, error.diagnostics[0]),), run=_RUN, notes=loaded.notes
+            "replay",
+            ", ".join(files),
+            net,
+            (_violated(net, error.diagnostics[0]),),
+            run=_NOTHING_PLAYED,
+            notes=loaded.notes,
         )
     if output is not None:
         write_text(output, "".join(f"{line}\n" for line in trace.lines()))

@@ -103,8 +103,8 @@ def join(net: Net, traces: Sequence[Trace]) -> Trace:
     """The trace of the central net that the traces of its hosts make; incomplete where one of them is cut off.
 
     Raises `InputError`: F5005 where they are not traces of all hosts of a run on this net, because a machine is missing
-    or there twice; F5004 where something was applied that nobody decided, or decided without the votes. Whether what they make is
-    a trace of the net, `firable.semantics.replaying` says.
+    or there twice; F5004 where something was applied that nobody decided, or decided without the votes. Whether
+    what they make is a trace of the net, `firable.semantics.replaying` says.
     """
     _refuse_other_hosts(net, traces)
     joined = _Joined(net, [_Part(trace, _yes(trace)) for trace in traces], set())
