@@ -33,6 +33,8 @@ from firable.executor.protocol.messages import (
     Decision,
     Effect,
     Firing,
+    Hello,
+    Keep,
     Message,
     ProtocolError,
     Report,
@@ -266,7 +268,7 @@ class Execution:
         while True:
             await box.wait()
             match box.items.popleft():
-                case VoteRequest() | Decision() as message:
+                case VoteRequest() | Decision() | Hello() as message:
                     self._perform(controller.receive(message))
                 case SignalRead(signal, value, entry):
                     self._perform(controller.read(signal, value, entry))
@@ -308,12 +310,14 @@ class Execution:
                     self.recorder.signal(self.now_seconds(), signal, value)
                 case Sending(place, entry):
                     self._send(place, entry)
-                case VoteRequest() | Decision():
+                case VoteRequest() | Decision() | Hello():
                     self.messages += 1
                     self._post(effect.controller, effect)
                 case Report() | Vote() | Acknowledgement():
                     self.messages += 1
                     self._post(COORDINATOR, effect)
+                case Keep():
+                    pass  # without a journal, what a crash would lose is lost
                 case _:
                     assert_never(effect)
 

@@ -13,30 +13,61 @@ of the place is cleared in the image, and the command is sent (O7). Nothing read
 A pure machine: inputs are method calls, outputs the effects that they return. It asks no clock and remembers a round
 only until the coordinator says that nobody will speak of it again. The alternative, a promise with a time limit, needs
 clocks that agree; here a lost decision is repeated until acknowledged, and until then the part stays blocked (O6).
+
+What is kept in stable storage, and the fault that would show if it were not:
+
+- `word`, the marking and the completion signals in the image, whenever a firing, a promise or a completion has changed
+  it: a token would be back where it was, and fire its transition, and send its command, a second time; or a completion
+  that was told once would be awaited for ever.
+- `promise/<round>`, the parts promised in a round that is not decided: the commit may be under way, and what the part
+  needs would be gone when it comes. `word` holds the values of the signals that the promise reads, which stay in the
+  image until it ends. A vote that promises nothing is not kept: given again, it may be another, and an undecided round
+  takes the newer one, a decided one none.
+- `closed`, the rounds decided, and below which all are: a late copy of a request would be promised once more, and a
+  late copy of its commit then applied a second time.
+- `command/...`: see `commands`. A machine would be commanded twice, or never.
+- `turns` of the arbiter, if there are any: a rule "twice this, once that" would begin anew and break its own order.
+- `epoch`: reports would be numbered from 0 again, and ignored as old ones; then nobody asks for what is enabled here.
+
+Not kept: *sensors*, because nobody knows what they show after an outage: their gates are closed, wanted 1 or 0, until
+the driver has told them anew. *Latched* values, for the same reason; a completion among them is told again, because
+its command is asked after. What the coordinator was *told* and has *seen*, because a report of the new epoch is newer
+than all. Which local transition fired *last*, because it only shares out turns where no arbiter decides. The
+coordinator's epoch, because a message of an earlier one can only repeat what is true: rounds below `closed_below` are
+closed for ever, and what it has seen of reports is older than those of the new epoch here.
+
+After a restart a controller is *held*: nothing moves because a computer has started. It fires nothing, promises nothing
+more and sends no command, until an operator resumes it. What it promised before is still promised: its votes are
+repeated, and their decisions applied, with the commands owed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Self
 
+from firable.executor.protocol.commands import Answer, Commands
 from firable.executor.protocol.messages import (
+    EPOCH_BITS,
     Acknowledgement,
     Decision,
     Effect,
     Firing,
+    Hello,
+    Keep,
     ProtocolError,
     Readiness,
     Report,
-    Sending,
+    Stored,
     Taken,
     ToController,
     Vote,
     VoteRequest,
 )
-from firable.executor.protocol.token_player import Arbiter, Compiled, TokenPlayer
+from firable.executor.protocol.token_player import Arbiter, Compiled, TokenPlayer, Word
 from firable.nets.decomposition import Decomposition
-from firable.nets.net import Marking
+from firable.nets.net import Marking, SignalKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,35 +93,76 @@ class LocalController:
         self.parts: dict[str, Compiled] = {row: compiled[part] for part, row in part_of.items()}
         self.locals: tuple[Compiled, ...] = tuple(c for c in compiled.values() if c.name not in part_of)
         self.arbiter = Arbiter(self.subnet, (group for group in decomposition.groups if group.controller == name))
+        self.kept_turns = self.arbiter.turns
         self.word = self.subnet.initial_marking
+        self.kept_word = self.word
+        """The word that a restart would find."""
         self.promises: dict[int, Promise] = {}
         self.closed: set[int] = set()
         self.closed_below = 0
         self.latched: dict[str, bool] = {}
-        self.entries: dict[str, int] = {}
-        """For each completion signal, how many commands that it completes have been sent."""
-        self.readiness = Readiness(0, frozenset())
+        self.commands = Commands(self.subnet, {})
+        self.untold: Word = 0
+        """The sensors that have shown nothing since the restart."""
+        self.held = False
+        self.epoch = 0
+        self.readiness = Readiness(-1, frozenset())
         self.told = -1
         """The sequence number of the newest report that was sent."""
         self.seen = -1
-        """The sequence number of the newest report that is known to have arrived."""
+        """The sequence number of the newest report that is known to have arrived, in this epoch of the coordinator."""
+        self.epoch_of_coordinator = 0
+
+    @classmethod
+    def restored(cls, decomposition: Decomposition, name: str, kept: Mapping[str, Stored]) -> Self:
+        """The controller with what stable storage kept of it, held; a fresh one where it kept nothing."""
+        machine = cls(decomposition, name)
+        if kept:
+            machine._restore(kept)
+        return machine
 
     @property
     def marking(self) -> Marking:
         """The marking of the subnet."""
         return self.player.marking(self.word)
 
+    def start(self) -> list[Effect]:
+        """The first act: from now on this epoch is used, so it is kept before anything is said in it."""
+        return [Keep("epoch", self.epoch)]
+
+    def answer(self, place: str, entry: int, answer: Answer) -> list[Effect]:
+        """Take what is said of a command in `commands.questions`."""
+        completion = self.subnet.place(place).completion
+        if not self.commands.answer(place, entry, answer) or answer is not Answer.DONE:
+            return []
+        return (
+            list(self.commands.sent(place, entry))
+            if completion is None
+            else self.read(completion, value=True, entry=entry)
+        )
+
+    def resume(self) -> list[Effect]:
+        """End the hold after a restart, and send what is owed; `ProtocolError` while there are questions."""
+        owed = list(self.commands.resume(frozenset(self.subnet.names(self.marking))))
+        self.held = False
+        return owed
+
     def receive(self, message: ToController) -> list[Effect]:
         """Take a message of the coordinator."""
-        self.seen = max(self.seen, message.seen)
-        if message.closed_below > self.closed_below:
-            self.closed_below = message.closed_below
-            self.closed = {number for number in self.closed if number >= self.closed_below}
+        effects = list(self._close_below(message.closed_below))
+        if message.epoch > self.epoch_of_coordinator:
+            # It has restarted, and has forgotten which rounds were open: to name them makes it abort them.
+            self.epoch_of_coordinator, self.seen = message.epoch, -1
+            effects += self.resend()
+        if message.epoch == self.epoch_of_coordinator:
+            self.seen = max(self.seen, message.seen)
         match message:
             case VoteRequest():
-                return list(self._vote(message))
+                return [*effects, *self._vote(message)]
             case Decision():
-                return list(self._decided(message))
+                return [*effects, *self._decided(message)]
+            case Hello():
+                return effects
 
     def read(self, signal: str, value: bool, entry: int | None = None) -> list[Effect]:
         """Take a new value of a signal.
@@ -98,20 +170,30 @@ class LocalController:
         `entry` says of a completion signal which command is completed, as `Sending.entry` counted it: a completion of
         an earlier command is stale, and dropped.
         """
-        if entry is not None and entry != self.entries.get(signal, 0):
+        if entry is not None and entry != self.commands.entry(signal):
             return []
         if self.player.signal_bit(signal) & self._locked_reads():
             self.latched[signal] = value
             return []
         return list(self._take(signal, value))
 
+    def sent(self, place: str, entry: int) -> list[Effect]:
+        """Take the driver's word that it has the command of a place."""
+        return list(self.commands.sent(place, entry))
+
     def fire(self) -> list[Effect]:
         """Fire one local transition, if one is enabled and disturbs no promise; no effect means that none is."""
-        enabled = [c.name for c in self.locals if c.enabled(self.word) and not self._disturbs_promises(c)]
+        if self.held:
+            return []
+        enabled = [c.name for c in self.locals if self._is_enabled(c) and not self._disturbs_promises(c)]
         if not enabled:
             return []
         chosen = self.player.transitions[self.arbiter.choose(enabled)]
-        return [Firing(chosen.name), *self._fire(chosen)]
+        effects: list[Effect] = [Firing(chosen.name), *self._fire(chosen)]
+        if self.arbiter.turns != self.kept_turns:
+            self.kept_turns = self.arbiter.turns
+            effects.append(Keep("turns", self.kept_turns))
+        return effects
 
     def report(self) -> list[Effect]:
         """Tell the coordinator which parts are enabled, if that has changed since it was last told."""
@@ -122,29 +204,49 @@ class LocalController:
         return [Report(self.name, readiness)] if self.parts else []
 
     def resend(self) -> list[Effect]:
-        """Repeat the last report, unless it is known to have arrived; for links that lose messages."""
+        """Repeat what is unanswered, for links that lose messages: votes, and the last report if it is not seen."""
+        votes = [number for number, promise in self.promises.items() if promise.promised]
+        if votes:
+            return [Vote(self.name, number, self.promises[number].promised, self._told()) for number in votes]
         if self.told <= self.seen or not self.parts:
             return []
-        return [Report(self.name, self._readiness())]
+        return [Report(self.name, self._told())]
+
+    def _restore(self, kept: Mapping[str, Stored]) -> None:
+        self.held = True
+        self.epoch = _number(kept.get("epoch", 0)) + 1
+        self.readiness = Readiness((self.epoch << EPOCH_BITS) - 1, frozenset())
+        self.told = self.readiness.sequence
+        self.word = self.kept_word = int(str(kept.get("word", f"{self.word:x}")), 16)
+        self.commands = Commands(self.subnet, kept)
+        for key, value in kept.items():
+            match key.partition("/"), value:
+                case ("promise", _, number), [*names]:
+                    self.promises[int(number)] = self._promise(map(str, names))
+                case ("closed", _, _), [int(below), [*numbers]]:
+                    self.closed_below, self.closed = below, set(map(_number, numbers))
+                case ("turns", _, _), [*turns]:
+                    self.arbiter.turns = self.kept_turns = tuple(map(_number, turns))
+        sensors = (s.name for s in self.subnet.signals if s.kind is SignalKind.SENSOR)
+        self.untold = sum(map(self.player.signal_bit, sensors))
 
     def _vote(self, request: VoteRequest) -> Iterator[Effect]:
         if self._is_closed(request.round):
             return  # an old copy: the round is decided
         if request.round not in self.promises:
-            asked = [self.parts[name] for name in request.transitions if name in self.parts]
+            asked = [name for name in request.transitions if name in self.parts and not self.held]
             # The parts of one round may disturb each other: one of them is chosen. Those of other rounds may not.
-            free = [part.enabled(self.word) and not self._disturbs_promises(part) for part in asked]
-            promised = [part for part, yes in zip(asked, free, strict=True) if yes]
-            names = frozenset(name for name in request.transitions if self.parts.get(name) in promised)
-            self.promises[request.round] = Promise(
-                names, _union(part.writes for part in promised), _union(part.reads for part in promised)
-            )
+            yes = [n for n in asked if self._is_enabled(self.parts[n]) and not self._disturbs_promises(self.parts[n])]
+            self.promises[request.round] = self._promise(yes)
+            if yes:
+                yield Keep(f"promise/{request.round}", yes)
+                yield from self._keep_word()
         yield Vote(self.name, request.round, self.promises[request.round].promised, self._told())
 
     def _decided(self, decision: Decision) -> Iterator[Effect]:
         if not self._is_closed(decision.round):
-            promise = self.promises.pop(decision.round, None)
-            self.closed.add(decision.round)
+            promise = self.promises.get(decision.round)
+            yield from self._end(decision.round)
             if decision.committed in self.parts:
                 yield from self._apply(decision, promise)
             yield from self._release()
@@ -154,22 +256,40 @@ class LocalController:
         part = self.parts[str(decision.committed)]
         if promise is None or decision.committed not in promise.promised:
             raise ProtocolError(f"{self.name}: '{part.name}' is committed without a promise")
-        if not part.enabled(self.word):
+        if not part.enabled(self.word):  # the signals it reads are in the image as they were at the vote
             raise ProtocolError(f"{self.name}: '{part.name}' was promised and is not enabled")
         yield from self._fire(part)
+
+    def _end(self, number: int) -> Iterator[Effect]:
+        """End the promise of a round that is decided; whatever comes of the round later is an old copy."""
+        promise = self.promises.pop(number, None)
+        if promise is not None and promise.promised:
+            yield Keep(f"promise/{number}", None)
+        if number >= self.closed_below:
+            self.closed.add(number)
+        yield Keep("closed", (self.closed_below, sorted(self.closed)))
+
+    def _close_below(self, number: int) -> Iterator[Effect]:
+        """Forget the rounds that nobody will speak of again; one promised and unheard of was aborted by a restart."""
+        if number > self.closed_below:
+            self.closed_below = number
+            self.closed = {closed for closed in self.closed if closed >= number}
+            if aborted := [promised for promised in self.promises if promised < number]:
+                for promised in aborted:
+                    yield from self._end(promised)
+                yield from self._release()
 
     def _fire(self, transition: Compiled) -> Iterator[Effect]:
         before = self.word
         self.word = transition.fire(before)
+        yield from self._keep_word()
         for place in self.player.entered(transition.name):
             completion = self.subnet.place(place).completion
-            entry = 0
             if completion is not None:
-                entry = self.entries[completion] = self.entries.get(completion, 0) + 1
                 self.latched.pop(completion, None)  # a value from before the command
                 if before & self.player.signal_bit(completion):
                     yield Taken(completion, value=False)
-            yield Sending(place, entry)
+            yield from self.commands.enter(place, held=self.held)
 
     def _release(self) -> Iterator[Effect]:
         """Take in the signals that changed while a promise read them."""
@@ -180,9 +300,32 @@ class LocalController:
 
     def _take(self, signal: str, value: bool) -> Iterator[Effect]:
         bit = self.player.signal_bit(signal)
-        if bool(self.word & bit) != value:
-            self.word ^= bit
+        # What a sensor shows first after a restart is told even if it is nothing new: the image may be newer than what
+        # was kept of it, and who follows the trace saw the newer one.
+        if bool(self.word & bit) != value or bit & self.untold:
+            self.word = self.word | bit if value else self.word & ~bit
+            self.untold &= ~bit
             yield Taken(signal, value)
+            if self.subnet.signals[self.subnet.signal_index[signal]].kind is SignalKind.COMPLETION:
+                yield from self._keep_word()
+        if value:
+            yield from self.commands.completed(signal)
+
+    def _promise(self, names: Iterable[str]) -> Promise:
+        promised = frozenset(names)
+        parts = [self.parts[name] for name in promised]
+        return Promise(promised, _union(part.writes for part in parts), _union(part.reads for part in parts))
+
+    def _keep_word(self) -> Iterator[Effect]:
+        if self.word != self.kept_word:
+            self.kept_word = self.word
+            yield Keep("word", f"{self.word:x}")
+
+    def _is_enabled(self, transition: Compiled) -> bool:
+        """Enabled by what is known: a sensor untold since the restart closes its gates, unless a promise holds it."""
+        if self.untold and transition.reads & self.untold & ~self._locked_reads():
+            return False
+        return transition.enabled(self.word)
 
     def _is_closed(self, number: int) -> bool:
         return number < self.closed_below or number in self.closed
@@ -194,10 +337,10 @@ class LocalController:
         return _union(promise.reads for promise in self.promises.values())
 
     def _readiness(self) -> Readiness:
-        ready = frozenset(name for name, part in self.parts.items() if part.enabled(self.word))
-        if ready != self.readiness.transitions or self.told < 0:
-            sequence = self.readiness.sequence + 1 if self.told >= 0 else 0
-            self.readiness = Readiness(sequence, ready)
+        enabled = () if self.held else self.parts.items()
+        ready = frozenset(name for name, part in enabled if self._is_enabled(part))
+        if ready != self.readiness.transitions or self.readiness.sequence < self.epoch << EPOCH_BITS:
+            self.readiness = Readiness(self.readiness.sequence + 1, ready)
         return self.readiness
 
     def _told(self) -> Readiness:
@@ -211,3 +354,9 @@ def _union(masks: Iterable[int]) -> int:
     for mask in masks:
         union |= mask
     return union
+
+
+def _number(value: Stored) -> int:
+    if not isinstance(value, int):
+        raise TypeError(f"{value!r} was kept where a number belongs")
+    return value

@@ -10,23 +10,41 @@ The decision is the moment at which a coordinated transition fires: from then on
 participants do before they have applied it commutes with it (O1). A round stays open, and keeps what it would disturb
 from being asked for, until all participants have acknowledged.
 
-A pure machine, as the controllers are. Rejected: a decision as soon as one controller says no, without waiting for the
+A pure machine, as the controllers are. What is kept in stable storage, and the fault that would show if it were not:
+
+- `round/<number>`, what was asked and what is committed, from the decision until all have acknowledged: a transition
+  that has fired would be finished by those who heard of it, and aborted by the others.
+- `turns` of the arbiter, with the decision that used them: a rule "twice this, once that" would break its own order.
+- `epoch`: rounds would be numbered as earlier ones were, and a vote or an order of then be taken for one of now (O5).
+
+Not kept: that a round is *opened*, the *votes*, and *aborts*. A round of an earlier epoch that is not known to be
+committed never was and never will be, so its promises end: a vote of it, which controllers repeat, is answered by the
+abort, and `closed_below` rises over it. So only a round that fires something costs a write. That a round is *closed* is
+stored by deleting it, which may be lost: then its decision is repeated, and acknowledged, once more. *Acknowledgements*
+are given again for the same reason. The controllers' *readiness* is asked for by `Hello`, until it comes.
+
+Rejected: a decision as soon as one controller says no, without waiting for the
 rest of the votes. It saves time on rounds that fail, which are rare, and doubles the orders of messages to think
 about.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Self
 
 from firable.executor.protocol.messages import (
+    EPOCH_BITS,
     Acknowledgement,
     Decision,
     Effect,
     Firing,
+    Hello,
+    Keep,
     Readiness,
     Report,
+    Stored,
     ToCoordinator,
     Vote,
     VoteRequest,
@@ -62,6 +80,7 @@ class Coordinator:
         """For each coordinated transition, who has to promise it: those who own a gate of it alone, too (O3)."""
         ours = [group for group in decomposition.groups if group.controller is None]
         self.arbiter = Arbiter(decomposition.net, ours)
+        self.kept_turns = self.arbiter.turns
         together = [tuple(t for t in (*g.sequence, *g.rest) if t in self.participants) for g in ours]
         grouped = {name for group in together for name in group}
         self.groups = (
@@ -74,9 +93,22 @@ class Coordinator:
         self.waiting: dict[int, None] = {}
         """The groups that may be asked for, in the order in which they became ready."""
         self.rounds: dict[int, Round] = {}
+        self.epoch = 0
         self.next_round = 0
         self.permits: int | None = None
         """How many more transitions may be committed; None is without limit."""
+
+    @classmethod
+    def restored(cls, decomposition: Decomposition, kept: Mapping[str, Stored]) -> Self:
+        """The coordinator with what stable storage kept of it; a fresh one where it kept nothing."""
+        machine = cls(decomposition)
+        if kept:
+            machine._restore(kept)
+        return machine
+
+    def start(self) -> list[Effect]:
+        """The first act: from now on this epoch is used, so it is kept before anything is said in it."""
+        return [Keep("epoch", self.epoch), *self.resend()]
 
     @property
     def idle(self) -> bool:
@@ -111,12 +143,16 @@ class Coordinator:
         return [*effects, *self._open()]
 
     def resend(self) -> list[Effect]:
-        """Repeat what has not been answered; for links that lose messages."""
+        """Repeat what has not been answered; for links that lose messages, and after a restart."""
         effects: list[Effect] = []
+        if self.epoch:
+            for controller in dict.fromkeys(c for took_part in self.participants.values() for c in took_part):
+                if self.seen[controller] < 0:
+                    effects.append(Hello(controller, self.closed_below, -1, self.epoch))
         for open_round in self.rounds.values():
             for controller in open_round.participants:
                 if open_round.decided and controller not in open_round.acknowledged:
-                    effects.append(self._decision(open_round, controller))
+                    effects.append(self._decision(controller, open_round.number, open_round.committed))
                 elif not open_round.decided and controller not in open_round.votes:
                     effects.append(self._request(open_round, controller))
         return effects
@@ -153,19 +189,39 @@ class Coordinator:
                 yield from self._ask(group, names)
 
     def _ask(self, group: int, names: tuple[str, ...]) -> Iterator[Effect]:
+        opened = self._round(self.next_round, group, names)
+        self.rounds[opened.number] = opened
+        self.next_round += 1
+        for controller in opened.participants:
+            yield self._request(opened, controller)
+
+    def _round(self, number: int, group: int, names: tuple[str, ...]) -> Round:
         writes = reads = 0
         for name in names:
             compiled = self.player.transitions[name]
             writes, reads = writes | compiled.writes, reads | compiled.reads
         participants = tuple(dict.fromkeys(c for name in names for c in self.participants[name]))
-        opened = Round(self.next_round, group, names, participants, writes, reads)
-        self.rounds[opened.number] = opened
-        self.next_round += 1
-        for controller in participants:
-            yield self._request(opened, controller)
+        return Round(number, group, names, participants, writes, reads)
+
+    def _restore(self, kept: Mapping[str, Stored]) -> None:
+        for key, value in kept.items():
+            match key.partition("/"), value:
+                case ("epoch", _, _), int(epoch):
+                    self.epoch = epoch + 1
+                case ("turns", _, _), [*turns]:
+                    self.arbiter.turns = self.kept_turns = tuple(int(str(turn)) for turn in turns)
+                case ("round", _, number), [str(committed), *asked]:
+                    names = tuple(map(str, asked))
+                    opened = self._round(int(number), self.group_of[committed], names)
+                    opened.decided, opened.committed = True, committed
+                    self.rounds[opened.number] = opened
+        self.rounds = dict(sorted(self.rounds.items()))
+        self.next_round = self.epoch << EPOCH_BITS
 
     def _voted(self, vote: Vote) -> Iterator[Effect]:
         voted = self.rounds.get(vote.round)
+        if voted is None and vote.round < self.epoch << EPOCH_BITS:
+            yield self._decision(vote.controller, vote.round, None)  # nobody fires it: not committed, or over
         # A vote of a round that is decided, or of none of ours, is stale (O5).
         if voted is not None and not voted.decided:
             voted.votes[vote.controller] = vote.promised
@@ -183,9 +239,13 @@ class Coordinator:
         if committed is not None:
             if self.permits is not None:
                 self.permits -= 1
+            yield Keep(f"round/{decided.number}", (committed, *decided.transitions))
+            if self.arbiter.turns != self.kept_turns:
+                self.kept_turns = self.arbiter.turns
+                yield Keep("turns", self.kept_turns)
             yield Firing(committed)
         for controller in decided.participants:
-            yield self._decision(decided, controller)
+            yield self._decision(controller, decided.number, committed)
 
     def _acknowledged(self, message: Acknowledgement) -> Iterator[Effect]:
         acknowledged = self.rounds.get(message.round)
@@ -193,13 +253,15 @@ class Coordinator:
             acknowledged.acknowledged.add(message.controller)
             if len(acknowledged.acknowledged) == len(acknowledged.participants):
                 del self.rounds[message.round]
+                if acknowledged.committed is not None:
+                    yield Keep(f"round/{message.round}", None)
                 # Those that lost the arbitration are ready as before, and no report will say so again.
                 self.waiting.setdefault(acknowledged.group)
         yield from self._open()
 
     def _request(self, asked: Round, controller: str) -> VoteRequest:
         names = tuple(t for t in asked.transitions if controller in self.participants[t])
-        return VoteRequest(controller, asked.number, names, self.closed_below, self.seen[controller])
+        return VoteRequest(controller, asked.number, names, self.closed_below, self.seen[controller], self.epoch)
 
-    def _decision(self, decided: Round, controller: str) -> Decision:
-        return Decision(controller, decided.number, decided.committed, self.closed_below, self.seen[controller])
+    def _decision(self, controller: str, number: int, committed: str | None) -> Decision:
+        return Decision(controller, number, committed, self.closed_below, self.seen[controller], self.epoch)

@@ -16,11 +16,25 @@ hold each other's transitions up for ever, each promised where the other is need
 `closed_below` lets a controller forget: every round with a smaller number is decided and acknowledged by all, so
 that whatever still arrives of it is an old copy. `seen` tells which report has arrived, so that only lost ones are
 repeated. Messages may be lost, delayed, doubled and overtaken; none is trusted for more than its round.
+
+Whoever restarts begins a new *epoch*, and every number that it gives has the epoch in its high bits, so that none is
+ever given twice although not one of them is stored. A coordinator that has restarted knows which rounds it committed
+and nothing else: rounds of earlier epochs that it does not know are aborted (*presumed abort*), and it says `Hello`
+until the controllers have told it anew what is enabled. `executor/protocol/controller.py` and `coordinator.py` say what
+each keeps in stable storage, and why that is enough.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
+
+EPOCH_BITS: Final = 32
+"""A number is `epoch << EPOCH_BITS` and a count: 4 thousand million rounds before an epoch would run into the next."""
+
+Stored = bool | int | str | Sequence["Stored"] | Mapping[str, "Stored"]
+"""What stable storage holds under a key: JSON, without null, which deletes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +62,7 @@ class VoteRequest:
     transitions: tuple[str, ...]
     closed_below: int
     seen: int
+    epoch: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +84,17 @@ class Decision:
     committed: str | None
     closed_below: int
     seen: int
+    epoch: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """The coordinator has restarted, and knows nothing of this controller: which of its parts are enabled?"""
+
+    controller: str
+    closed_below: int
+    seen: int
+    epoch: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +106,7 @@ class Acknowledgement:
     readiness: Readiness
 
 
-ToController = VoteRequest | Decision
+ToController = VoteRequest | Decision | Hello
 """Messages from the coordinator; `controller` is the receiver."""
 
 ToCoordinator = Report | Vote | Acknowledgement
@@ -106,13 +132,29 @@ class Taken:
 
 @dataclass(frozen=True, slots=True)
 class Sending:
-    """The command of `place` goes to its machine; `entry` counts the commands that share its completion signal."""
+    """The command of `place` goes to its machine; `entry` counts the commands that share its completion signal.
+
+    With `again`, it was issued before the restart, and the machine has said that it did not receive it.
+    """
 
     place: str
     entry: int
+    again: bool = False
 
 
-Effect = Message | Firing | Taken | Sending
+@dataclass(frozen=True, slots=True)
+class Keep:
+    """A write to stable storage; None deletes.
+
+    The writes of one act, the effects of one call, are one batch: all of them are stored or none. Nothing of the act
+    leaves before its batch is durable, neither messages nor commands nor lines of the trace.
+    """
+
+    key: str
+    value: Stored | None
+
+
+Effect = Message | Firing | Taken | Sending | Keep
 """What a protocol machine wants done, in this order."""
 
 

@@ -23,6 +23,8 @@ from firable.executor.protocol.messages import (
     Decision,
     Effect,
     Firing,
+    Hello,
+    Keep,
     Message,
     Report,
     Sending,
@@ -141,7 +143,7 @@ class Simulation:
 
     def _receive(self, message: Message) -> None:
         self.messages += 1
-        if isinstance(message, VoteRequest | Decision):
+        if isinstance(message, VoteRequest | Decision | Hello):
             self._perform(self.controllers[message.controller].receive(message))
         else:
             self._perform(self.coordinator.receive(message))
@@ -158,8 +160,10 @@ class Simulation:
                     self.events.append(CommandSent(at, place))
                     if completion := self.net.place(place).completion:
                         self.completing.append((completion, entry))
-                case VoteRequest() | Decision() | Report() | Vote() | Acknowledgement():
+                case VoteRequest() | Decision() | Hello() | Report() | Vote() | Acknowledgement():
                     self.in_flight.append(effect)
+                case Keep():
+                    pass  # nobody crashes here
 
     def _quieten(self, *, fire: bool) -> None:
         """Deliver everything in order and repeat what is unanswered until nothing is; with `fire`, until one fires."""

@@ -1,0 +1,155 @@
+"""The commands of one controller: which were issued, which are completed, and what a restart has to find out.
+
+A command is issued once for each entry of a token, and numbered: `entry` counts the commands that share a completion
+signal, or those of a place whose command has none. Of each such count only the newest command matters, since a
+completion of an earlier one is stale. So one record a count is kept, under `command/...`: the place, the entry, and
+
+- *issued*: it was handed on to be sent. It may have been sent, or not, or half: who crashed cannot know;
+- *owed*: its token entered while the controller was held after a restart, and it was not handed on yet;
+- *over*: its completion has been taken into the process image or, where it has none, the driver has taken it.
+
+Why it is kept, and before the command leaves: a machine that gets a command twice may put a second workpiece on the
+first, and one that never gets it waits for ever. So after a restart each issued command is asked after (`questions`),
+at its driver, and where that does not know, at the operator; nothing is guessed and nothing is sent until every answer
+is there. An issued command that was not received is sent again under the same number, so that a driver which has
+received it after all can tell.
+
+Rejected: to keep each command until it is over and delete it then. Its number would have to be kept beside it, for the
+next one; the record that stays is both, and there are never more of them than signals and places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from firable.executor.protocol.messages import Effect, Keep, ProtocolError, Sending, Stored
+from firable.nets.net import Net
+
+PREFIX: Final = "command/"
+
+
+class Answer(StrEnum):
+    """What a driver, or an operator, says of a command that was issued before a restart."""
+
+    DONE = "done"
+    WORKING = "working"
+    NOT_RECEIVED = "not received"
+    UNKNOWN = "unknown"
+
+
+class Stage(StrEnum):
+    """How far a command has come."""
+
+    ISSUED = "issued"
+    OWED = "owed"
+    OVER = "over"
+
+
+@dataclass(slots=True)
+class Command:
+    """The newest command of its count; `answer` says what became of one that was issued before a restart."""
+
+    place: str
+    entry: int
+    stage: Stage
+    answer: Answer | None = None
+
+
+class Commands:
+    """The commands of a subnet, none issued yet, or as they were kept."""
+
+    def __init__(self, subnet: Net, kept: Mapping[str, Stored]) -> None:
+        self.subnet = subnet
+        self.newest: dict[str, Command] = {}
+        """By the key under which each is kept."""
+        for key, value in kept.items():
+            match value:
+                case [str(place), int(entry), str(stage)] if key.startswith(PREFIX):
+                    answer = Answer.UNKNOWN if stage == Stage.ISSUED else None
+                    self.newest[key] = Command(place, entry, Stage(stage), answer)
+
+    @property
+    def questions(self) -> tuple[tuple[str, int], ...]:
+        """The place and entry of each command of which nobody could tell yet whether it was received."""
+        return tuple((c.place, c.entry) for c in self.newest.values() if c.answer is Answer.UNKNOWN)
+
+    @property
+    def owed(self) -> tuple[tuple[str, int], ...]:
+        """The place and entry of each command that will be sent when the controller is resumed."""
+        return tuple((c.place, c.entry) for c in self.newest.values() if _is_owed(c))
+
+    def entry(self, completion: str) -> int:
+        """The entry of the newest command that this signal completes; 0 before the first."""
+        newest = self.newest.get(_signal_key(completion))
+        return newest.entry if newest is not None else 0
+
+    def enter(self, place: str, *, held: bool) -> Iterator[Effect]:
+        """A token enters a place with a command: issue it or, in a controller that is held, owe it."""
+        key = self._key(place)
+        earlier = self.newest.get(key)
+        entry = earlier.entry + 1 if earlier is not None else 1
+        self.newest[key] = Command(place, entry, Stage.OWED if held else Stage.ISSUED)
+        yield self._kept(key)
+        if not held:
+            yield Sending(place, entry)
+
+    def completed(self, completion: str) -> Iterator[Effect]:
+        """The completion signal of the newest command has been taken into the process image."""
+        yield from self._over(_signal_key(completion))
+
+    def sent(self, place: str, entry: int) -> Iterator[Effect]:
+        """The driver has taken a command: one without a completion signal is over with that."""
+        key = self._key(place)
+        if self.subnet.place(place).completion is None and self._is_newest(key, entry):
+            yield from self._over(key)
+
+    def answer(self, place: str, entry: int, answer: Answer) -> bool:
+        """Take what is said of a command issued before the restart; False where it is not asked after (any more)."""
+        key = self._key(place)
+        if not self._is_newest(key, entry) or self.newest[key].answer is not Answer.UNKNOWN:
+            return False
+        self.newest[key].answer = answer
+        return True
+
+    def resume(self, marked: frozenset[str]) -> Iterator[Effect]:
+        """Send what is owed; a command whose token has left its place meanwhile is void."""
+        if self.questions:
+            raise ProtocolError(f"resumed without knowing what became of {self.questions}")
+        for key, command in self.newest.items():
+            if _is_owed(command) and command.place not in marked:
+                yield from self._over(key)
+            elif command.stage is Stage.OWED:
+                command.stage = Stage.ISSUED
+                yield self._kept(key)
+                yield Sending(command.place, command.entry)
+            elif _is_owed(command):
+                command.answer = None
+                yield Sending(command.place, command.entry, again=True)
+
+    def _over(self, key: str) -> Iterator[Effect]:
+        command = self.newest.get(key)
+        if command is not None and command.stage is not Stage.OVER:
+            command.stage, command.answer = Stage.OVER, None
+            yield self._kept(key)
+
+    def _is_newest(self, key: str, entry: int) -> bool:
+        return key in self.newest and self.newest[key].entry == entry
+
+    def _key(self, place: str) -> str:
+        completion = self.subnet.place(place).completion
+        return _signal_key(completion) if completion is not None else f"{PREFIX}place/{place}"
+
+    def _kept(self, key: str) -> Keep:
+        command = self.newest[key]
+        return Keep(key, (command.place, command.entry, command.stage.value))
+
+
+def _signal_key(completion: str) -> str:
+    return f"{PREFIX}signal/{completion}"
+
+
+def _is_owed(command: Command) -> bool:
+    return command.stage is Stage.OWED or command.answer is Answer.NOT_RECEIVED
