@@ -107,6 +107,9 @@ CODES: Final[dict[str, str]] = {
     "F5060": "an operator's endpoint that is open to everybody",
     "F5061": "an operator's endpoint that cannot be served",
     "F5062": "a certificate that cannot be used",
+    "F5101": "the binding does not fit the net",
+    "F5102": "not an address that the device has",
+    "F5103": "unknown or unusable driver",
     # F6: evidence
     "F6001": "the evidence is damaged or malformed",
     "F6002": "the evidence does not show what it claims",

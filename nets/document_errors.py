@@ -91,12 +91,14 @@ def version_problem(source: Source, tree: Node, shape: Shape = NET) -> Diagnosti
     return None
 
 
-def document_problems(source: Source, tree: Node, error: ValidationError, shape: Shape = NET) -> list[Diagnostic]:
-    """The errors of a validation as diagnostics in the order of the text."""
+def document_problems(
+    source: Source, tree: Node, error: ValidationError, shape: Shape = NET, below: Path = ()
+) -> list[Diagnostic]:
+    """The errors of a validation as diagnostics in the order of the text; what was validated stands `below` a path."""
     problems: dict[tuple[int, int, str], Diagnostic] = {}
     for one in error.errors(include_url=False, include_input=False)[:ERRORS_MAX]:
         context = one.get("ctx", {})
-        problem = _problem(source, tree, shape, tuple(one["loc"]), one["type"], one["msg"], context)
+        problem = _problem(source, tree, shape, (*below, *one["loc"]), one["type"], one["msg"], context)
         span = problem.span
         if span is not None:
             problems.setdefault((span.line, span.column, problem.code), problem)
@@ -207,7 +209,11 @@ def _wanted(kind: str, context: dict[str, Any], node: Node, path: Path) -> str:
             return "a name or a list of names is expected: `name` or `[name, name]`"
         case "int_type" | "greater_than_equal":
             return "a whole number from 0 is expected"
-        case "bool_type":
+        case "int_parsing" | "float_parsing" | "greater_than" | "less_than_equal" | "finite_number":
+            bounds = {"gt": "over", "ge": "from", "le": "to"}
+            said = [f" {word} {context[key]:g}" for key, word in bounds.items() if key in context]
+            return f"a {'whole ' if kind == 'int_parsing' else ''}number{''.join(said)} is expected"
+        case "bool_type" | "bool_parsing":
             return "true or false is expected"
         case "literal_error":
             return f"{context.get('expected', 'another word')} is expected"

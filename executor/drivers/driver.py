@@ -1,20 +1,65 @@
-"""Drivers: from commands and signals of the net to machines, and back.
+"""Drivers: from commands and signals of the net to machines, and back. This file is the contract.
 
-A driver is told of each command that a place sends, and tells of each change of a signal. It *forms* the completion
-bits: a completion is 1 when the machine has acknowledged the command and, where a sensor sees the outcome, the sensor
-shows it; sending the next command that it completes clears it. What was acknowledged is named by signal and entry
-number, so that the answer to an earlier command is never taken for that to the present one.
+A driver holds the *process image*: for each signal its value, when that was read, and its quality. It tells each change
+to a listener without waiting, and is told of each command that a place sends. What every driver keeps:
 
-Drivers run as a task of their own, and hand over what they have to tell without waiting. `stop` drives the safe
-outputs. The alternative, polling a process image at a fixed period, adds half a period to every reaction; drivers of
-devices that can only be polled will do so inside, behind the same protocol.
+- It *forms* the completion bits: a completion is 1 when the machine has acknowledged the command and, where a sensor
+  sees the outcome, the sensor shows it; sending the next command that it completes clears it. What was acknowledged is
+  named by place and entry number, so that the answer to an earlier command is never taken for that to the present one.
+- A signal whose device is lost follows its *loss policy*: hold the value (quality uncertain), take a safe value, or be
+  a fault (quality bad both times). Nothing is told of a signal that has not been read yet.
+- The *safe outputs* are driven at start-up, before any command; at `stop`; and when this process crashes or freezes,
+  by the device itself: the driver gives it a heartbeat, and the device's own watchdog does the rest.
+- A connection that failed or timed out is never used again: the answer that comes too late would be taken for that to
+  the next question. There is a new one, after a pause that grows.
+- Edges that come faster than they are read are counted as *coalesced* in the image, never silently lost.
+- After a restart `ask` says what became of a command that was sent before.
+
+The alternative, polling a process image at a fixed period, adds half a period to every reaction; drivers of devices
+that can only be polled do so inside, behind this protocol. Real machines are reached by the driver of a binding,
+`bound.py`, which keeps all of the above once for all kinds of devices; a new kind brings a `Connection`, no `Driver`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
 from typing import Protocol
 
 from firable.nets.net import Place
+
+
+class Quality(StrEnum):
+    """How far a value may be believed: it was read; it was read, and may have changed since; it was not."""
+
+    GOOD = "good"
+    UNCERTAIN = "uncertain"
+    BAD = "bad"
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What the process image holds of one signal.
+
+    `value` is None as long as nothing was read; `at_seconds` is the time, by the run's clock, at which the value was
+    last seen to be so; `why` says why the quality is not good; `coalesced` counts the edges that were not told.
+    """
+
+    value: bool | None = None
+    at_seconds: float = 0.0
+    quality: Quality = Quality.BAD
+    why: str = "not read yet"
+    coalesced: int = 0
+
+
+class Answer(StrEnum):
+    """What became of a command that was sent before a restart."""
+
+    DONE = "done"
+    WORKING = "working"
+    NOT_RECEIVED = "not received"
+    UNKNOWN = "unknown"
 
 
 class Listener(Protocol):
@@ -26,6 +71,10 @@ class Listener(Protocol):
 
     def driver_fault(self, machine: str, message: str) -> None:
         """A machine or its link has failed."""
+        ...
+
+    def driver_note(self, machine: str, message: str) -> None:
+        """Something about a machine or its link that is no fault, for the trace: lost, found again, refused."""
         ...
 
     def moved(self) -> None:
@@ -53,12 +102,24 @@ class Driver(Protocol):
         """Whether nothing will happen any more unless a command is sent; False where the driver cannot know."""
         ...
 
+    def readings(self) -> Mapping[str, Reading]:
+        """The process image: each signal that is read, sensors and what completions are formed from."""
+        ...
+
     async def run(self, clock: Clock, listener: Listener) -> None:
-        """Serve the machines until cancelled."""
+        """Serve the machines until cancelled; on the way out the safe outputs are driven."""
         ...
 
     def send(self, place: Place, entry: int) -> None:
-        """Send the command of a place."""
+        """Send the command of a place; it waits for a link that is down."""
+        ...
+
+    async def ask(self, place: Place, entry: int) -> Answer:
+        """What became of a command that was sent before a restart, as the machine tells it.
+
+        The command is taken up again: after `WORKING`, and after `UNKNOWN` if it turns out well, its completion is told
+        as ever; after `DONE` it is not told. `UNKNOWN` too where the machine cannot be reached within its time.
+        """
         ...
 
     def stop(self) -> None:

@@ -1,26 +1,19 @@
 """The driver of the simulated cell: commands become commands of the plant, what the plant sees becomes signals.
 
 Each command goes out under a ticket of its own, which the plant gives back when the command is done, so that a late
-acknowledgement is never taken for that of a later command.
+acknowledgement is never taken for that of a later command. There is no link here that could be lost; a driver of points
+and connections that reaches a simulated cell through them is `in_process.py`.
 """
 
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 from firable.executor.cell.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
-from firable.executor.drivers.driver import Clock, Listener
+from firable.executor.drivers.completions import Completions
+from firable.executor.drivers.driver import Answer, Clock, Listener, Quality, Reading
 from firable.nets.net import Net, Place, SignalKind
-
-
-@dataclass(slots=True)
-class _Awaited:
-    """A completion that is being formed."""
-
-    signal: str
-    entry: int
-    acknowledged: bool = False
 
 
 class SimulatedDriver:
@@ -29,11 +22,12 @@ class SimulatedDriver:
     def __init__(self, plant: Plant, net: Net) -> None:
         self.plant = plant
         self.sensors = {signal.name for signal in net.signals if signal.kind is SignalKind.SENSOR}
-        self.shown = dict(plant.shown)
-        """What each sensor showed in the report told last; the plant may have gone on when a report is told."""
-        self.awaited: dict[str, _Awaited] = {}
-        """For each completion signal, the command that it will complete."""
-        self.tickets: dict[int, _Awaited] = {}
+        self.image = {name: Reading(value, 0.0, Quality.GOOD, "") for name, value in plant.shown.items()}
+        self.completions = Completions({name: plant.shown[name] for name in plant.shown if name not in self.sensors})
+        self.tickets: dict[int, tuple[Place, int]] = {}
+        """The commands that the plant is at, with their entry numbers."""
+        self.done: dict[str, int] = {}
+        """Of each place, the entry that was acknowledged last."""
         self.next_ticket = 0
         self.clock: Clock | None = None
         self.listener: Listener | None = None
@@ -43,6 +37,10 @@ class SimulatedDriver:
     def at_rest(self) -> bool:
         """Whether no event is scheduled in the plant."""
         return self.plant.next_seconds is None
+
+    def readings(self) -> Mapping[str, Reading]:
+        """What each sensor of the plant showed in the report told last."""
+        return self.image
 
     async def run(self, clock: Clock, listener: Listener) -> None:
         """Let the plant's events happen when they are due."""
@@ -66,10 +64,19 @@ class SimulatedDriver:
         ticket = self.next_ticket
         self.next_ticket += 1
         if place.completion is not None:
-            self.awaited[place.completion] = self.tickets[ticket] = _Awaited(place.completion, entry)
+            self.tickets[ticket] = (place, entry)
+            self.completions.commanded(place.completion, entry)
         now = self.clock.now_seconds()
         self._tell(self.plant.command(now, command.machine, command.command, dict(command.parameters), ticket))
         self.awake.set()
+
+    async def ask(self, place: Place, entry: int) -> Answer:
+        """What the plant knows of a command: nothing is ever lost on the way to it."""
+        if place.completion is None:
+            return Answer.UNKNOWN
+        if self.done.get(place.name) == entry:
+            return Answer.WORKING if place.completion in self.completions.awaited else Answer.DONE
+        return Answer.WORKING if (place, entry) in self.tickets.values() else Answer.NOT_RECEIVED
 
     def stop(self) -> None:
         """Stop every machine of the plant where it is."""
@@ -85,25 +92,24 @@ class SimulatedDriver:
                 case SensorChanged(signal, value):
                     self._sensor(signal, value)
                 case CommandDone(ticket):
-                    if (awaited := self.tickets.pop(ticket, None)) is not None:
-                        awaited.acknowledged = True
-                        self._form(awaited)
+                    if (sent := self.tickets.pop(ticket, None)) is not None:
+                        place, entry = sent
+                        self.done[place.name] = entry
+                        self._formed(str(place.completion), self.completions.acknowledged(str(place.completion), entry))
                 case PlantFault(machine, message):
                     self._listener.driver_fault(machine, message)
 
     def _sensor(self, signal: str, value: bool) -> None:
-        self.shown[signal] = value
+        at_seconds = self.clock.now_seconds() if self.clock is not None else 0.0
+        self.image[signal] = Reading(value, at_seconds, Quality.GOOD, "")
         if signal in self.sensors:
             self._listener.signal(signal, value, None)
-        elif (awaited := self.awaited.get(signal)) is not None:
-            self._form(awaited)
+        else:
+            self._formed(signal, self.completions.shows(signal, value))
 
-    def _form(self, awaited: _Awaited) -> None:
-        """Set the completion bit, if its command is acknowledged and its sensor, if it has one, agrees."""
-        shown = self.shown.get(awaited.signal, True)
-        if awaited.acknowledged and shown and self.awaited.get(awaited.signal) is awaited:
-            del self.awaited[awaited.signal]
-            self._listener.signal(awaited.signal, value=True, entry=awaited.entry)
+    def _formed(self, signal: str, entry: int | None) -> None:
+        if entry is not None:
+            self._listener.signal(signal, value=True, entry=entry)
 
     @property
     def _listener(self) -> Listener:

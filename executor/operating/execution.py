@@ -246,6 +246,10 @@ class Execution:
         """A machine has failed: nothing fires any more."""
         self._fail(f"{machine}: {message}" if machine else message)
 
+    def driver_note(self, machine: str, message: str) -> None:
+        """What a driver says of a machine or its link stands in the trace."""
+        self.recorder.note(self.now_seconds(), "driver", machine=machine, message=message)
+
     def moved(self) -> None:
         """Something happened in the cell; perhaps it has come to rest."""
         self._settle()

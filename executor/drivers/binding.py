@@ -1,0 +1,304 @@
+"""The binding, `*.bind.yaml`: at which address of which device each signal and command of a net is found.
+
+It is never part of what is proved: the same bundle runs on the simulated cell and, with another binding, on the floor,
+and both meet at `firable run BUNDLE --bind FILE`. So nothing here can change what a net does, only what it does it to,
+and everything here must be there: each signal and each command is bound once (`fitting.py`), in one file, to devices of
+as many kinds as the cell has. The alternative, addresses in the net file, would make a net of every rewiring.
+
+A device has *channels*, each for one machine. A command goes to its channel as some values and, last, its number; the
+device shows which number it has taken, done or failed at (`channels.py` says why by numbers).
+
+The file is read like a net file: bounded, without ambiguous YAML, each mistake with its line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from firable.executor.drivers.device import DeviceKind, Options, Point, Use, Value, Writes
+from firable.executor.drivers.kinds import kind_named
+from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
+from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
+from firable.nets.source import Source, quoted, read_source
+from firable.nets.yaml_tree import Data, Node, data, node_span, nodes_along, parse_tree
+from firable.nets.yaml_tree import Path as TreePath
+
+SIZE_BYTES_MAX: Final = 1024 * 1024
+
+ACKNOWLEDGED: Final = "acknowledged"
+"""How the binding writes of a completion that no sensor has a part in it."""
+
+
+Name = Annotated[str, Field(min_length=1)]
+Seconds = Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
+Grace = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
+Writing = Annotated[str, BeforeValidator(lambda value: str(value).lower() if isinstance(value, bool) else value)]
+"""A value as the file writes it; `writes` says what is meant."""
+
+
+class _Model(BaseModel):
+    # The tree of a file resolves no numbers: a text that is one is taken for it.
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class HeartbeatDocument(_Model):
+    """A point to which a growing number is written, so that the device stops its machines where none comes.
+
+    `tripped` is a point by which the device tells that its watchdog has done so.
+    """
+
+    write: Name
+    every_s: Seconds
+    tripped: Name | None = None
+
+
+class AliveDocument(_Model):
+    """A point that changes by itself, so that a device that is silent can be told from one that has nothing to tell."""
+
+    read: Name
+    within_s: Seconds
+
+
+class ChannelDocument(_Model):
+    """Where the commands of one machine go, and where it shows the numbers of what it has taken, done or failed at.
+
+    The number stands alone at `number`, behind what the command writes; or `command` takes a text with the number, the
+    command and its parameters as the net has them.
+    """
+
+    number: Name | None = None
+    command: Name | None = None
+    taken: Name | None = None
+    done: Name | None = None
+    failed: Name | None = None
+
+
+class DeviceDocument(_Model):
+    """One device: its kind, its channels, its safe outputs; the other keys are of its kind."""
+
+    model_config = ConfigDict(extra="allow")
+    driver: Name
+    channels: dict[Name, ChannelDocument] = {}
+    safe: dict[Name, Writing] = {}
+    heartbeat: HeartbeatDocument | None = None
+    alive: AliveDocument | None = None
+    timeout_s: Seconds = 1.0
+    start_s: Seconds = 5.0
+    grace_s: Grace = 0.0
+    retry_s: Seconds = 0.1
+    retry_max_s: Seconds = 5.0
+
+
+class SignalDocument(_Model):
+    """Where a signal is read; of a completion, the sensor that must agree with the acknowledgement."""
+
+    device: Name
+    read: Name
+    invert: bool = False
+    on_loss: Literal["fault", "hold", "0", "1"] = "fault"
+    edges: Name | None = None
+    force: bool = False
+
+
+class CommandDocument(_Model):
+    """What the command of a place writes, and the channel by which it goes."""
+
+    device: Name
+    channel: Name
+    write: dict[Name, Writing] = {}
+    force: bool = False
+
+
+def _signal(value: object) -> object:
+    return None if value == ACKNOWLEDGED else {} if value is None else value
+
+
+class BindingDocument(_Model):
+    """A whole binding."""
+
+    firable_bind: Annotated[Literal[1], BeforeValidator(lambda value: 1 if value == "1" else value)]
+    cell: Name
+    description: str = ""
+    devices: dict[Name, DeviceDocument]
+    signals: dict[Name, Annotated[SignalDocument | None, BeforeValidator(_signal)]] = {}
+    commands: dict[Name, CommandDocument] = {}
+
+
+SHAPE: Final = Shape(
+    "firable_bind",
+    "binding",
+    {
+        path: keys_of(model)
+        for path, model in (
+            ((), BindingDocument),
+            (("devices", "*"), DeviceDocument),
+            (("devices", "*", "heartbeat"), HeartbeatDocument),
+            (("devices", "*", "alive"), AliveDocument),
+            (("devices", "*", "channels", "*"), ChannelDocument),
+            (("signals", "*"), SignalDocument),
+            (("commands", "*"), CommandDocument),
+        )
+    },
+    {"devices": "device", "signals": "signal", "commands": "place"},
+)
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A binding that is right in itself: what it says, of which kind each device is, and where it stands."""
+
+    document: BindingDocument
+    kinds: Mapping[str, DeviceKind]
+    options: Mapping[str, Options]
+    source: Source
+    tree: Node
+
+    def problem(self, code: str, path: TreePath, message: str, hint: str = "") -> Diagnostic:
+        """A diagnostic at a path of the file."""
+        return _problem(self.source, self.tree, code, path, message, hint)
+
+
+def read_binding(path: Path | str) -> Binding:
+    """Read a binding; raises `InputError` F1001-F1011, F5101-F5103."""
+    return _parse(read_source(path, SIZE_BYTES_MAX))
+
+
+def parse_binding(text: str, file: str = "<binding>") -> Binding:
+    """Read a binding from text, as `read_binding` does."""
+    return _parse(Source(file, text))
+
+
+def _problem(source: Source, tree: Node, code: str, path: TreePath, message: str, hint: str) -> Diagnostic:
+    key, node = list(nodes_along(tree, path))[-1]
+    return Diagnostic(code, message, hint, tuple(map(str, path)), node_span(source, key or node))
+
+
+def _parse(source: Source) -> Binding:
+    tree = parse_tree(source)
+    if problem := version_problem(source, tree, SHAPE):
+        raise InputError([problem])
+    try:
+        document = BindingDocument.model_validate(data(tree))
+    except ValidationError as error:
+        raise InputError(document_problems(source, tree, error, SHAPE)) from None
+    reading = _Reading(source, tree, document)
+    reading.devices()
+    if not reading.problems:  # addresses of a device that is not understood cannot be judged
+        reading.points()
+    if reading.problems:
+        raise InputError(reading.problems)
+    return Binding(document, reading.kinds, reading.options, source, tree)
+
+
+class _Reading:
+    """The checks of a document that need no net."""
+
+    def __init__(self, source: Source, tree: Node, document: BindingDocument) -> None:
+        self.source = source
+        self.tree = tree
+        self.document = document
+        self.kinds: dict[str, DeviceKind] = {}
+        self.options: dict[str, Options] = {}
+        self.problems: list[Diagnostic] = []
+
+    def problem(self, code: str, path: TreePath, message: str, hint: str) -> None:
+        self.problems.append(_problem(self.source, self.tree, code, path, message, hint))
+
+    def devices(self) -> None:
+        """Find the kind of each device, and read the keys that are its own."""
+        for name, device in self.document.devices.items():
+            try:
+                kind = self.kinds[name] = kind_named(device.driver)
+            except InputError as error:
+                for one in error.diagnostics:
+                    self.problem(one.code, ("devices", name, "driver"), one.message, one.hint)
+                continue
+            own: dict[str, Data] = dict(device.model_extra or {})
+            try:
+                self.options[name] = kind.options.model_validate(own)
+            except ValidationError as error:
+                keys = (*keys_of(DeviceDocument), *keys_of(kind.options))
+                shape = Shape(SHAPE.version, SHAPE.file, {("devices", name): keys}, {})
+                self.problems += document_problems(self.source, self.tree, error, shape, ("devices", name))
+
+    def points(self) -> None:
+        """Judge every address by its kind, and every reference to a device or a channel."""
+        for name, device in self.document.devices.items():
+            for path, point, use in _device_points(device):
+                self.point(name, ("devices", name, *path), point, use)
+            for channel, body in device.channels.items():
+                if (body.number is None) == (body.command is None):
+                    self.problem(
+                        "F5101", ("devices", name, "channels", channel),
+                        f"'{channel}' takes commands in one way", "write `number: ADDRESS` or `command: ADDRESS`",
+                    )  # fmt: skip
+        for signal, bound in self.document.signals.items():
+            if bound is not None and self.device(("signals", signal), bound.device):
+                self.point(bound.device, ("signals", signal, "read"), bound.read, Use.READ)
+                if bound.edges is not None:
+                    self.point(bound.device, ("signals", signal, "edges"), bound.edges, Use.READ)
+                if bound.force:
+                    self.point(bound.device, ("signals", signal, "force"), bound.read, Use.WRITE)
+        for place, command in self.document.commands.items():
+            if not self.device(("commands", place), command.device):
+                continue
+            channels = self.document.devices[command.device].channels
+            if command.channel not in channels:
+                hint = did_you_mean(command.channel, list(channels)) + f"see `channels` of '{command.device}'"
+                message = f"'{command.device}' has no channel {quoted(command.channel)}"
+                self.problem("F5101", ("commands", place, "channel"), message, hint)
+            for point in command.write:
+                self.point(command.device, ("commands", place, "write", point), point, Use.WRITE)
+
+    def device(self, path: TreePath, name: str) -> bool:
+        if name in self.document.devices:
+            return True
+        hint = did_you_mean(name, list(self.document.devices)) + "see `devices`"
+        self.problem("F5101", (*path, "device"), f"there is no device {quoted(name)}", hint)
+        return False
+
+    def point(self, device: str, path: TreePath, point: Point, use: Use) -> None:
+        if problem := self.kinds[device].point_problem(point, use):
+            hint = f"the addresses of `driver: {self.document.devices[device].driver}` are described in docs/drivers.md"
+            self.problem("F5102", path, f"{quoted(point)} cannot be a point to {use}: {problem}", hint)
+
+
+def _device_points(device: DeviceDocument) -> Iterator[tuple[TreePath, Point, Use]]:
+    for point in device.safe:
+        yield ("safe", point), point, Use.WRITE
+    if device.heartbeat is not None:
+        yield ("heartbeat", "write"), device.heartbeat.write, Use.WRITE
+        if device.heartbeat.tripped is not None:
+            yield ("heartbeat", "tripped"), device.heartbeat.tripped, Use.READ
+    if device.alive is not None:
+        yield ("alive", "read"), device.alive.read, Use.READ
+    for name, channel in device.channels.items():
+        for key, use in (("number", Use.WRITE), ("command", Use.WRITE), ("taken", Use.READ), ("done", Use.READ)):
+            if (point := getattr(channel, key)) is not None:
+                yield ("channels", name, key), point, use
+        if channel.failed is not None:
+            yield ("channels", name, "failed"), channel.failed, Use.READ
+
+
+def writes(mapping: Mapping[Point, str]) -> Writes:
+    """The writes of a mapping of the file, in its order: truth values, numbers, texts.
+
+    >>> writes({"coil 1": "true", "holding 2": "7", "node": "RUN"})
+    (('coil 1', True), ('holding 2', 7), ('node', 'RUN'))
+    """
+    return tuple((point, _value(text)) for point, text in mapping.items())
+
+
+def _value(text: str) -> Value:
+    if text in {"true", "false"}:
+        return text == "true"
+    for kind in (int, float):
+        with suppress(ValueError):
+            return kind(text)
+    return text

@@ -1,0 +1,307 @@
+"""The driver of a binding: any number of devices of any kinds, as one driver of the net.
+
+What is common to all kinds of devices meets here: the process image of each (`image.py`), the channels of its machines
+(`channels.py`), the completions of the net (`completions.py`), the connection that is kept (`keeping.py`). Each of them
+is a machine of its own and can be tested alone; this file only carries what one says to the others.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Collection, Mapping, Sequence
+
+from firable.executor.drivers.binding import Binding, CommandDocument, SignalDocument, writes
+from firable.executor.drivers.channels import Channel
+from firable.executor.drivers.completions import Completions
+from firable.executor.drivers.device import Point, Value, Writes, as_bit
+from firable.executor.drivers.driver import Answer, Clock, Listener, Quality, Reading
+from firable.executor.drivers.fitting import misfits
+from firable.executor.drivers.image import Change, Image
+from firable.executor.drivers.keeping import Kept
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Net, Place, SignalKind
+
+
+def bound_driver(binding: Binding, net: Net) -> BoundDriver:
+    """The driver of a net's binding; raises `InputError` F5101 where they do not fit."""
+    if problems := misfits(binding, net):
+        raise InputError(problems)
+    completions = {signal.name for signal in net.signals if signal.kind is SignalKind.COMPLETION}
+    answered = frozenset(place.name for place in net.places if place.completion is not None)
+    return BoundDriver(binding, completions, answered)
+
+
+class BoundDriver:
+    """The driver of a binding. `completions` are the signals that it forms, `answered` the places that wait for one."""
+
+    def __init__(self, binding: Binding, completions: Collection[str], answered: frozenset[str]) -> None:
+        self.binding = binding
+        document = binding.document
+        sensed = [name for name, signal in document.signals.items() if name in completions and signal is not None]
+        self.completions = Completions(dict.fromkeys(sensed, False))
+        self.answered = answered
+        self.completing: dict[str, str] = {}
+        """The completion of each place that has been commanded or asked about."""
+        self.devices = {name: _Device(self, name) for name in document.devices}
+        self.clock: Clock | None = None
+        self.listener: Listener | None = None
+        self.is_stopped = False
+
+    @property
+    def at_rest(self) -> bool:
+        """Never: what machines and workpieces do next is not to be known."""
+        return False
+
+    def readings(self) -> Mapping[str, Reading]:
+        """The process image."""
+        return {name: reading for device in self.devices.values() for name, reading in device.image.readings.items()}
+
+    async def run(self, clock: Clock, listener: Listener) -> None:
+        """Serve the devices until cancelled; on the way out the safe outputs are driven."""
+        self.clock, self.listener = clock, listener
+        tasks = [asyncio.create_task(device.run(), name=name) for name, device in self.devices.items()]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_EXCEPTION)
+            for task in done:
+                task.result()
+        finally:
+            self.stop()
+            stopping = [asyncio.create_task(device.kept.stopped.wait()) for device in self.devices.values()]
+            longest = max((device.document.timeout_s for device in self.devices.values()), default=0.0)
+            await asyncio.wait(stopping, timeout=2 * longest)
+            for one in (*tasks, *stopping):
+                one.cancel()
+            await asyncio.gather(*tasks, *stopping, return_exceptions=True)
+
+    def send(self, place: Place, entry: int) -> None:
+        """Send the command of a place, or keep it until its device is connected."""
+        if place.command is None:
+            raise RuntimeError(f"'{place.name}' sends no command")
+        if self.is_stopped:
+            return
+        if place.completion is not None:
+            self.completing[place.name] = place.completion
+            self.completions.commanded(place.completion, entry)
+        command = self._command(place.name)
+        self.devices[command.device].send(command, place, entry)
+
+    async def ask(self, place: Place, entry: int) -> Answer:
+        """What became of a command that was sent before a restart; waits for its device as long as a start may take."""
+        command = self._command(place.name)
+        device = self.devices[command.device]
+        if place.completion is not None:
+            self.completing[place.name] = place.completion
+            self.completions.commanded(place.completion, entry)
+        channel = device.channels[command.channel]
+        try:
+            await asyncio.wait_for(device.is_ready.wait(), device.document.start_s)
+        except TimeoutError:
+            channel.expect(place.name, entry)
+            return Answer.UNKNOWN
+        stopped = bool(device.document.safe)
+        answer = channel.answer(place.name, entry, stopped=stopped)
+        if answer is not Answer.DONE or place.completion is None:
+            return answer
+        # Done, and seen to be done: the sensor, where there is one, has its say.
+        if self.completions.acknowledged(place.completion, entry) is None:
+            return Answer.UNKNOWN if stopped else Answer.WORKING
+        return answer
+
+    def force(self, signal: str, value: bool) -> None:
+        """Write a signal on its device; raises `ValueError` where the binding does not allow it."""
+        bound = self.binding.document.signals.get(signal)
+        if bound is None or not bound.force:
+            raise ValueError(f"the binding does not allow '{signal}' to be forced")
+        self.devices[bound.device].force(bound.read, value ^ bound.invert)
+
+    def stop(self) -> None:
+        """Drive the safe outputs of every device that can be reached; the others have their watchdogs."""
+        if not self.is_stopped:
+            self.is_stopped = True
+            for device in self.devices.values():
+                device.stop()
+
+    def close(self) -> None:
+        """Nothing: what comes into a real cell is not for its driver to say."""
+
+    def formed(self, completion: str, entry: int | None) -> None:
+        """Tell of a completion that has been formed, if any has."""
+        if entry is not None and self.listener is not None:
+            self.listener.signal(completion, value=True, entry=entry)
+
+    def _command(self, place: str) -> CommandDocument:
+        return self.binding.document.commands[place]
+
+
+class _Device:
+    """One device of a driver: what its connection is for (`keeping.Served`)."""
+
+    def __init__(self, driver: BoundDriver, name: str) -> None:
+        binding = driver.binding
+        self.driver = driver
+        self.name = name
+        self.document = binding.document.devices[name]
+        bound = {signal: one for signal, one in binding.document.signals.items() if one is not None}
+        signals: dict[str, SignalDocument] = {signal: one for signal, one in bound.items() if one.device == name}
+        self.image = Image(signals)
+        self.sensed = [signal for signal in signals if signal in driver.completions.shown]
+        """Signals from which completions are formed; the others are told as they are."""
+        commands = {place: one for place, one in binding.document.commands.items() if one.device == name}
+        self.channels = {
+            channel: Channel(
+                document, [place for place, one in commands.items() if one.channel == channel], driver.answered
+            )
+            for channel, document in self.document.channels.items()
+        }
+        self.replies: dict[Point, list[tuple[Channel, str]]] = {}
+        for channel in self.channels.values():
+            for point, key in channel.points().items():
+                self.replies.setdefault(point, []).append((channel, key))
+        heartbeat, alive = self.document.heartbeat, self.document.alive
+        self.tripped = None if heartbeat is None else heartbeat.tripped
+        self.has_tripped: bool | None = None
+        self.forced: deque[Writes] = deque()
+        self.writing: Channel | None = None
+        self.is_ready = asyncio.Event()
+        self.was_ready = False
+        self.alarm: asyncio.TimerHandle | None = None
+        self.noted = ""
+        self.garbage: dict[Point, Value] = {}
+        points = {*self.image.reads, *self.image.counters, *self.replies}
+        points |= {point for point in (self.tripped, None if alive is None else alive.read) if point is not None}
+        self.kept = Kept(self.document, binding.kinds[name], binding.options[name], frozenset(points), self)
+
+    async def run(self) -> None:
+        """Keep the device connected."""
+        self._alarm(self.document.start_s, "not reached since the start")
+        try:
+            await self.kept.run()
+        finally:
+            if self.alarm is not None:
+                self.alarm.cancel()
+
+    def send(self, command: CommandDocument, place: Place, entry: int) -> None:
+        """Send a command by its channel."""
+        self.channels[command.channel].send(place.name, entry, str(place.command), writes(command.write))
+        self.kept.awake.set()
+
+    def force(self, point: Point, value: bool) -> None:
+        """Write a point beside all else."""
+        self.forced.append(((point, value),))
+        self.kept.awake.set()
+
+    def stop(self) -> None:
+        """Drive the safe outputs, and say so where that cannot be."""
+        if not self.kept.is_connected and (self.document.safe or self.document.heartbeat is not None):
+            self.note("not connected: the safe outputs are left to its watchdog")
+        self.kept.stop()
+
+    # What the connection tells
+
+    def read(self, batch: Sequence[tuple[Point, Value]]) -> None:
+        """Values have come."""
+        now = self.driver.clock.now_seconds() if self.driver.clock is not None else 0.0
+        changes, faults = self.image.take(batch, now)
+        self._tell(changes, faults)
+        for point, value in batch:
+            for channel, key in self.replies.get(point, ()):
+                self._replied(channel, key, point, value)
+            if point == self.tripped:
+                self._watchdog(value)
+
+    def ready(self) -> None:
+        """A new connection has told what the device shows."""
+        if self.alarm is not None:
+            self.alarm.cancel()
+        self.note("connected again" if self.was_ready else "connected")
+        self.noted = ""
+        for channel in self.channels.values():
+            if (forgotten := channel.connected_again()) is not None:
+                self._fault(f"knows nothing any more of '{forgotten.text}' of '{forgotten.place}', which it had taken")
+        self.was_ready = True
+        self.is_ready.set()
+
+    def lost(self, why: str) -> None:
+        """There is no connection, or none any more."""
+        if self.is_ready.is_set():
+            self.is_ready.clear()
+            self._alarm(self.document.grace_s, why)
+        if why != self.noted and not self.driver.is_stopped:
+            self.noted = why
+            self.note(f"not connected: {why}")
+
+    def next_writes(self) -> Writes | None:
+        """What is to be written now."""
+        if self.forced:
+            self.writing = None
+            return self.forced.popleft()
+        for channel in self.channels.values():
+            if (some := channel.next_writes()) is not None:
+                self.writing = channel
+                return some
+        return None
+
+    def written(self) -> None:
+        """The device has confirmed that."""
+        if self.writing is not None:
+            self.writing.written()
+            self.writing = None
+
+    # What follows from it
+
+    def note(self, message: str) -> None:
+        """Tell the listener something of the device."""
+        if self.driver.listener is not None:
+            self.driver.listener.driver_note(self.name, message)
+
+    def _fault(self, message: str) -> None:
+        if self.driver.listener is not None and not self.driver.is_stopped:
+            self.driver.listener.driver_fault(self.name, message)
+
+    def _alarm(self, after_s: float, why: str) -> None:
+        if self.alarm is not None:
+            self.alarm.cancel()
+        if after_s:
+            self.alarm = asyncio.get_running_loop().call_later(after_s, self._give_up, why)
+        else:
+            self._give_up(why)
+
+    def _give_up(self, why: str) -> None:
+        """The device has been lost for longer than is waited: the loss policies hold."""
+        self._tell(*self.image.lost(why))
+
+    def _tell(self, changes: Sequence[Change], faults: Sequence[str]) -> None:
+        for signal in self.sensed:
+            reading = self.image.readings[signal]
+            shows = reading.quality is Quality.GOOD and bool(reading.value)
+            if shows != self.driver.completions.shown[signal]:
+                self.driver.formed(signal, self.driver.completions.shows(signal, shows))
+        if self.driver.listener is not None and not self.driver.is_stopped:
+            for change in changes:
+                if change.signal not in self.sensed:
+                    self.driver.listener.signal(change.signal, change.value, None)
+        if faults:
+            several = f"{faults[0]} and {len(faults) - 1} more" if len(faults) > 1 else faults[0]
+            self._fault(f"'{several}' cannot be read: {self.image.readings[faults[0]].why}")
+
+    def _replied(self, channel: Channel, key: str, point: Point, value: Value) -> None:
+        outcome = channel.shows(key, value)
+        if channel.shown[key] is None and value != self.garbage.get(point):
+            self.garbage[point] = value
+            self.note(f"'{point}' shows {value!r}, which is no number of a command")
+        if outcome is None:
+            return
+        order = outcome.order
+        if not outcome.done:
+            self._fault(f"has failed at the command of '{order.place}'{f', {order.text}' if order.text else ''}")
+        elif (completion := self.driver.completing.get(order.place)) is not None:
+            self.driver.formed(completion, self.driver.completions.acknowledged(completion, order.entry))
+
+    def _watchdog(self, value: Value) -> None:
+        tripped = as_bit(value)
+        if tripped and self.has_tripped is False:
+            self._fault("its watchdog has stopped its machines: it has had no heartbeat")
+        elif tripped and self.has_tripped is None:
+            self.note("its watchdog had stopped its machines when this run began")
+        self.has_tripped = tripped

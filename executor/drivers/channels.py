@@ -1,0 +1,188 @@
+"""Channels: how a command comes to a machine once, and how its answer is known to be its own.
+
+Every command goes out with a *number*, written behind all that it needs, and the device shows the number that it has
+*taken*, has *done* or has *failed* at. Numbers make the rest simple. An answer with another number is to another
+command, however late it comes. A device that is written the number it has already ignores it, so that a write whose
+confirmation was lost is repeated without harm. After a restart the numbers shown say what became of a command, because
+the number is computed from place and entry, which outlive the executor in its journal.
+
+Where the device already shows the number that is to be sent, as it may when a run begins without a journal, it is sent
+number 0 first, "no command", and the number goes out when it is shown no more. Rejected: bits for request and done,
+with their four edges for each command. They know no order, and say nothing after a restart; a device that has nothing
+else needs a few lines of its own program, as its watchdog does.
+
+A channel is for one machine, which does one thing at a time. A command that overtakes another, such as a stop, has no
+completion. Pure: a machine of calls and answers, without clock and connection.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Final
+
+from firable.executor.drivers.binding import ChannelDocument
+from firable.executor.drivers.device import Point, Value, Writes, as_number
+from firable.executor.drivers.driver import Answer
+
+NUMBER_MAX: Final = 65_535
+"""Numbers fit a register of 16 bits; 0 is no command."""
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """The command of a place, for one entry; a command without completion has no entry number of the controller's."""
+
+    place: str
+    entry: int
+    number: int
+    text: str
+    writes: Writes = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a machine says of an order."""
+
+    order: Order
+    done: bool
+
+
+class _Phase(Enum):
+    """How far the newest order has come."""
+
+    HELD = auto()
+    CLEARING = auto()
+    WRITING = auto()
+    WRITTEN = auto()
+
+
+class Channel:
+    """The commands of one machine, to which the commands of `places` go; `answered` are those with a completion."""
+
+    def __init__(self, document: ChannelDocument, places: Sequence[str], answered: frozenset[str]) -> None:
+        self.document = document
+        self.places = sorted(places)
+        self.answered = answered
+        self.shown: dict[str, int | None] = {}
+        """The numbers taken, done and failed at, as the device shows them; None for what is no number."""
+        self.waiting: deque[Order] = deque()
+        self.current: Order | None = None
+        self.phase = _Phase.WRITTEN
+        self.outstanding: dict[int, Order] = {}
+        """What was sent, by its number, and has had no outcome."""
+        self.is_taken = False
+        """Whether the device has shown the number of the newest order."""
+        self.unanswered = 0
+        """How many commands without a completion were sent."""
+
+    def number(self, place: str, entry: int) -> int:
+        """The number of a command: 1 + (entry * n + i) mod m, for place i of n and the largest m of whole rounds.
+
+        So two numbers of one channel are equal only for one place and entries that are thousands apart.
+        """
+        rounds = NUMBER_MAX // len(self.places)
+        return 1 + (entry % rounds) * len(self.places) + self.places.index(place)
+
+    def points(self) -> dict[Point, str]:
+        """The points that are read, and of what."""
+        keys = {"taken": self.document.taken, "done": self.document.done, "failed": self.document.failed}
+        return {point: key for key, point in keys.items() if point is not None}
+
+    def send(self, place: str, entry: int, text: str, writes: Writes) -> None:
+        """Send a command as soon as that can be; `text` is the command as the net has it."""
+        if place not in self.answered:
+            self.unanswered += 1
+            entry = self.unanswered
+            while self.number(place, entry) in self.shown.values():  # a machine that has this number would ignore it
+                self.unanswered += 1
+                entry = self.unanswered
+        self.waiting.append(Order(place, entry, self.number(place, entry), text, writes))
+
+    def next_writes(self) -> Writes | None:
+        """What is to be written now, if anything; `written` follows when the device has it."""
+        if self._delivered() and self.waiting:
+            self.current, self.phase, self.is_taken = self.waiting.popleft(), _Phase.HELD, False
+        order = self.current
+        if order is None or self.phase in {_Phase.WRITING, _Phase.WRITTEN}:
+            return None
+        if order.number in self.shown.values():
+            if self.phase is _Phase.CLEARING:
+                return None
+            self.phase = _Phase.CLEARING
+            return self._numbered(0, "")
+        self.phase = _Phase.WRITING
+        self.outstanding = {number: one for number, one in self.outstanding.items() if one.place != order.place}
+        self.outstanding[order.number] = order
+        return (*order.writes, *self._numbered(order.number, order.text))
+
+    def written(self) -> None:
+        """The device has confirmed what was to be written."""
+        if self.phase is _Phase.WRITING:
+            self.phase = _Phase.WRITTEN
+
+    def shows(self, key: str, value: Value) -> Outcome | None:
+        """The device shows a number; returns the outcome that it tells of."""
+        number = self.shown[key] = as_number(value)
+        if self.current is not None and number == self.current.number:
+            self.is_taken |= self.phase in {_Phase.WRITING, _Phase.WRITTEN}
+        if key == "taken" or number is None:
+            return None
+        order = self.outstanding.pop(number, None)
+        return None if order is None else Outcome(order, done=key == "done")
+
+    def connected_again(self) -> Order | None:
+        """A new connection shows its numbers; returns an order that the device had, and knows nothing of any more.
+
+        What the device may not have is written again, with its number: a device that has it ignores it.
+        """
+        order = self.current
+        if order is None or self.phase is _Phase.HELD:
+            return None
+        if order.number in self.shown.values() and self.phase is not _Phase.CLEARING:
+            self.phase = _Phase.WRITTEN
+        elif not self.is_taken:
+            self.phase = _Phase.HELD
+        elif self.document.taken is not None:
+            return self.outstanding.pop(order.number, None)
+        return None
+
+    def expect(self, place: str, entry: int) -> None:
+        """Take up a command that was sent before a restart, so that its outcome is told if it comes."""
+        number = self.number(place, entry)
+        self.outstanding[number] = Order(place, entry, number, "")
+
+    def answer(self, place: str, entry: int, *, stopped: bool) -> Answer:
+        """What became of a command that was sent before a restart; `stopped` where the safe outputs came in between.
+
+        The command is taken up again, so that its outcome is told if it comes.
+        """
+        number = self.number(place, entry)
+        if self.shown.get("done") == number:
+            return Answer.DONE
+        self.expect(place, entry)
+        if number in self.shown.values():
+            failed = self.shown.get("failed") == number
+            return Answer.UNKNOWN if failed or stopped else Answer.WORKING
+        taken = self.shown.get("taken")
+        if taken is None or not self._came_before(taken):
+            return Answer.UNKNOWN
+        del self.outstanding[number]
+        return Answer.NOT_RECEIVED
+
+    def _came_before(self, taken: int) -> bool:
+        """Whether the number shown is none, or of a command that was over when a later one was sent."""
+        return taken == 0 or self.places[(taken - 1) % len(self.places)] in self.answered
+
+    def _delivered(self) -> bool:
+        """Whether the next order may go out: the device has the newest, as far as it tells."""
+        if self.current is None:
+            return True
+        return self.phase is _Phase.WRITTEN and (self.is_taken or self.document.taken is None)
+
+    def _numbered(self, number: int, text: str) -> Writes:
+        if self.document.number is not None:
+            return ((self.document.number, number),)
+        return ((str(self.document.command), f"{number} {text}".strip()),)

@@ -1,0 +1,432 @@
+"""What every driver has to show: a class of tests, for firable's own kinds of devices and for those of others.
+
+A test module makes a subclass whose name begins with `Test`, and gives it one method: `far_end`, a server of points of
+the kind's own protocol (`firable.executor.drivers.far_side.end`), with the keys by which a binding reaches it and a
+point for each role of the machine behind it (`ROLES` in `firable.executor.drivers.far_side.machine`).
+
+    class TestMine(DriverConformance):
+        @asynccontextmanager
+        async def far_end(self):
+            end = MyServer()
+            yield Far(end, "driver: mine, address: 127.0.0.1", {"sensor": "in 1", "number": "out 2", ...})
+
+Nothing here waits for a time to pass: each test waits for what must happen, at most
+`PATIENCE_S` of `bench.py`. pytest is not
+imported, so that who runs a cell need not have it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from abc import abstractmethod
+from collections.abc import Callable, Coroutine
+from contextlib import AbstractAsyncContextManager
+from typing import Any
+
+from firable.executor.drivers.bench import Bench, Far, bench_net, until
+from firable.executor.drivers.driver import Answer, Quality
+from firable.executor.drivers.far_side.machine import Machine
+
+
+class DriverConformance:
+    """The tests; a subclass says how its kind is reached."""
+
+    @abstractmethod
+    def far_end(self) -> AbstractAsyncContextManager[Far]:
+        """A far end that is not started yet."""
+
+    def bench(self, test: Callable[[Bench], Coroutine[Any, Any, None]], **options: Any) -> None:
+        """Run a test on a bench."""
+
+        async def run() -> None:
+            async with self.far_end() as far:
+                machine = Machine(far.end, far.points)
+                await machine.start()
+                try:
+                    await test(Bench(machine, far, bench_net(), **options))
+                finally:
+                    await machine.stop()
+
+        asyncio.run(run())
+
+    def test_safe_outputs_come_before_anything_else_at_the_start(self) -> None:
+        """A machine that was left on is stopped before it is told anything."""
+
+        async def test(b: Bench) -> None:
+            b.driver.send(b.place("move"), 1)
+            async with b.connected():
+                await until(lambda: b.machine.orders, "the command arrives")
+            assert b.machine.events[0] == "output"
+            assert b.machine.outputs[0] is False
+
+        self.bench(test)
+
+    def test_a_command_is_taken_once_and_completed_with_its_entry(self) -> None:
+        """The number says to which entry the machine's answer belongs."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: b.machine.orders, "the command arrives")
+                assert b.heard_of("moved") == []
+                b.machine.finish()
+                await until(lambda: b.heard_of("moved"), "the completion")
+                b.driver.send(b.place("move"), 2)
+                await until(lambda: len(b.machine.orders) == 2, "the second command arrives")
+                b.machine.finish()
+                await until(lambda: len(b.heard_of("moved")) == 2, "the second completion")
+            assert b.heard_of("moved") == [(True, 1), (True, 2)]
+            assert len(b.machine.orders) == 2
+
+        self.bench(test)
+
+    def test_a_completion_needs_its_sensor_as_well(self) -> None:
+        """A machine that says it has gripped has gripped only when the sensor says so too."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("grip"), 1)
+                await until(lambda: b.machine.orders, "the command arrives")
+                b.machine.finish()
+                b.machine.show("sensor", value=True)
+                await until(lambda: b.heard_of("held")[-1:] == [(True, None)], "what comes later is read")
+                assert b.heard_of("closed") == []
+                b.machine.show("closed", value=True)
+                await until(lambda: b.heard_of("closed"), "the completion")
+            assert b.heard_of("closed") == [(True, 1)]
+
+        self.bench(test)
+
+    def test_the_answer_to_an_earlier_command_completes_nothing(self) -> None:
+        """An answer that comes late is known by its number."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: len(b.machine.orders) == 1, "the command arrives")
+                first = b.machine.orders[0].number
+                b.driver.send(b.place("move"), 2)
+                await until(lambda: len(b.machine.orders) == 2, "the second command arrives")
+                b.machine.finish(first)
+                b.machine.show("sensor", value=True)
+                await until(lambda: b.heard_of("held")[-1:] == [(True, None)], "what comes later is read")
+                assert b.heard_of("moved") == []
+                b.machine.finish()
+                await until(lambda: b.heard_of("moved"), "the completion")
+            assert b.heard_of("moved") == [(True, 2)]
+
+        self.bench(test)
+
+    def test_what_a_machine_still_shows_of_an_earlier_run_completes_nothing(self) -> None:
+        """Without a journal, entries begin again, and so do their numbers."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: b.machine.orders, "the command arrives")
+                b.machine.finish()
+                await until(lambda: b.heard_of("moved"), "the completion")
+            b.begin()  # without a journal: entries begin again at 1
+            async with b.connected():
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: len(b.machine.orders) == 2, "the command arrives")
+                b.machine.show("sensor", value=True)
+                await until(lambda: b.heard_of("held")[-1:] == [(True, None)], "what comes later is read")
+                assert b.heard_of("moved") == []
+                b.machine.finish()
+                await until(lambda: b.heard_of("moved"), "the completion")
+
+        self.bench(test)
+
+    def test_commands_without_a_completion_are_taken_each_time(self) -> None:
+        """A machine ignores a number that it has, so each of them needs another one."""
+
+        async def test(b: Bench) -> None:
+            for orders in (2, 4):
+                b.begin()
+                async with b.connected():
+                    b.driver.send(b.place("halt"), 0)
+                    b.driver.send(b.place("halt"), 0)
+                    await b.ordered(orders)
+
+        self.bench(test)
+
+    def test_a_failed_command_is_a_fault(self) -> None:
+        """A failure is told at once, and not when the command is overdue."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: b.machine.orders, "the command arrives")
+                b.machine.fail()
+                await until(lambda: b.heard.faults, "the fault")
+            assert "D: has failed at the command of 'M.move', M MOVE to=A" in b.heard.faults[0]
+
+        self.bench(test)
+
+    def test_signals_are_told_when_they_are_first_read_and_when_they_change(self) -> None:
+        """Nothing is known of a signal before it has been read."""
+
+        async def test(b: Bench) -> None:
+            assert b.quality("held") == (None, Quality.BAD)
+            async with b.connected():
+                await until(lambda: b.heard_of("held") == [(False, None)], "the first value")
+                b.machine.show("sensor", value=True)
+                await until(lambda: b.heard_of("held")[1:] == [(True, None)], "the change")
+                assert b.quality("held") == (True, Quality.GOOD)
+
+        self.bench(test)
+
+    def test_a_lost_device_follows_the_policy_of_each_signal_and_comes_back_by_a_new_connection(self) -> None:
+        """Hold, safe value, and the way back."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                await until(lambda: b.heard_of("one") == [(False, None)], "the first value")
+                b.machine.show("sensor", value=True)
+                await until(lambda: len(b.heard_of("zero")) == 2, "the change")
+                await b.far.end.cut()
+                await until(lambda: b.quality("held")[1] is not Quality.GOOD, "the loss")
+                assert b.quality("held") == (True, Quality.UNCERTAIN)
+                assert b.quality("zero") == (False, Quality.BAD)
+                assert b.quality("one") == (True, Quality.BAD)
+                assert b.driver.readings()["M.held"].why
+                assert b.heard_of("zero")[-1] == (False, None)
+                assert len(b.heard_of("held")) == 2
+                b.machine.show("sensor", value=False)
+                await b.far.end.mend()
+                await until(lambda: b.quality("held") == (False, Quality.GOOD), "the return")
+                await until(lambda: b.heard_of("one")[-1] == (False, None), "the value")
+                assert b.driver.devices["D"].kept.connections >= 2
+                assert any("not connected" in note for note in b.heard.notes)
+                assert "D: connected again" in b.heard.notes
+            assert b.heard.faults == []
+
+        self.bench(test)
+
+    def test_a_lost_signal_that_is_needed_is_a_fault(self) -> None:
+        """The default policy."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                await b.far.end.cut()
+                await until(lambda: b.heard.faults, "the fault")
+            assert "D: 'M.needed' cannot be read: " in b.heard.faults[0]
+
+        self.bench(test, needed="fault")
+
+    def test_a_device_that_is_never_reached_is_a_fault_of_what_is_needed(self) -> None:
+        """A run does not wait for ever for a device that is not there."""
+
+        async def test(b: Bench) -> None:
+            await b.far.end.cut()
+            async with b.running():
+                await until(lambda: b.heard.faults, "the fault")
+            assert "M.needed" in b.heard.faults[0]
+
+        self.bench(test, needed="fault", start_s=0.05)
+
+    def test_a_command_that_is_sent_while_the_line_is_down_arrives_once_when_it_is_up(self) -> None:
+        """What is sent into a line that is down is neither lost nor doubled."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                await b.far.end.cut()
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: not b.driver.devices["D"].is_ready.is_set(), "the loss")
+                await b.far.end.mend()
+                await until(lambda: b.machine.orders, "the command arrives")
+                b.machine.finish()
+                await until(lambda: b.heard_of("moved"), "the completion")
+            assert b.heard_of("moved") == [(True, 1)]
+            assert len(b.machine.orders) == 1
+            assert b.heard.faults == []
+
+        self.bench(test)
+
+    def test_a_command_under_way_is_completed_after_the_line_was_down(self) -> None:
+        """The machine goes on while the line is down, and says so afterwards."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: b.machine.orders, "the command arrives")
+                await b.far.end.cut()
+                await until(lambda: not b.driver.devices["D"].is_ready.is_set(), "the loss")
+                b.machine.finish()
+                await b.far.end.mend()
+                await until(lambda: b.heard_of("moved"), "the completion")
+            assert len(b.machine.orders) == 1
+
+        self.bench(test)
+
+    def test_a_silent_device_is_lost_and_its_late_answers_are_no_answers(self) -> None:
+        """A connection that has timed out may still bring its answer: nobody must be listening."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                await until(lambda: b.quality("held") == (False, Quality.GOOD), "the first value")
+                b.far.end.faults.silent = True
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: b.quality("held")[1] is not Quality.GOOD, "the loss")
+                b.machine.show("sensor", value=True)
+                b.far.end.faults.silent = False
+                await until(lambda: b.quality("held") == (True, Quality.GOOD), "the return")
+                await until(lambda: b.machine.orders, "the command arrives")
+                b.machine.finish()
+                await until(lambda: b.heard_of("moved"), "the completion")
+            assert b.heard_of("moved") == [(True, 1)]
+            assert len(b.machine.orders) == 1
+
+        self.bench(test)
+
+    def test_a_slow_device_is_waited_for_within_its_time(self) -> None:
+        """Slow is not lost."""
+
+        async def test(b: Bench) -> None:
+            b.far.end.faults.delay_s = 0.05
+            async with b.connected():
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: b.machine.orders, "the command arrives")
+                b.machine.finish()
+                await until(lambda: b.heard_of("moved"), "the completion")
+                assert b.driver.devices["D"].kept.connections == 1
+
+        self.bench(test, timeout_s=10)
+
+    def test_garbage_is_no_value_and_no_answer(self) -> None:
+        """What cannot be read is not believed, and does not last."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: b.machine.orders, "the command arrives")
+                b.far.end.faults.garbage = True
+                b.machine.finish()
+                b.machine.show("sensor", value=True)
+                await until(lambda: b.quality("held")[1] is not Quality.GOOD, "the garbage is noticed")
+                assert b.heard_of("moved") == []
+                assert (True, None) not in b.heard_of("held")
+                b.far.end.faults.garbage = False
+                b.machine.finish()
+                b.machine.show("sensor", value=False)
+                b.machine.show("sensor", value=True)
+                await until(lambda: b.quality("held") == (True, Quality.GOOD), "the return")
+                await until(lambda: b.heard_of("moved"), "the completion")
+            assert b.heard.faults == []
+
+        self.bench(test)
+
+    def test_safe_outputs_are_the_last_thing_at_the_end_and_nothing_is_sent_after_a_stop(self) -> None:
+        """A stop is the end of what is sent."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: b.machine.orders, "the command arrives")
+                b.driver.stop()
+                b.driver.send(b.place("move"), 2)
+                await until(lambda: len(b.machine.outputs) == 2, "the safe outputs")
+            assert b.machine.events[-1] == "output"
+            assert b.machine.outputs == [False, False]
+            assert len(b.machine.orders) == 1
+
+        self.bench(test)
+
+    def test_a_driver_that_is_cancelled_drives_the_safe_outputs_on_its_way_out(self) -> None:
+        """However a run ends, its machines are stopped."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                pass
+            assert b.machine.outputs == [False, False]
+
+        self.bench(test)
+
+    def test_the_watchdog_of_the_device_acts_when_the_driver_freezes(self) -> None:
+        """A process that hangs cannot stop its machines; the device misses its heartbeat and does."""
+
+        async def test(b: Bench) -> None:
+            b.machine.watchdog_s = 1.0
+            thawed = threading.Event()
+            loop = asyncio.new_event_loop()
+            thread = threading.Thread(target=loop.run_forever)
+            thread.start()
+            running = asyncio.run_coroutine_threadsafe(b.driver.run(b.heard, b.heard), loop)
+            try:
+                await until(lambda: b.machine.beats > 3, "heartbeats")
+                assert b.machine.outputs == [False]
+                loop.call_soon_threadsafe(thawed.wait)  # sockets stay open, nothing moves: a frozen process
+                await until(lambda: len(b.machine.outputs) == 2, "the watchdog")
+                assert b.machine.outputs[-1] is False
+                thawed.set()
+                await until(lambda: b.heard.faults, "the driver is told")
+                assert "watchdog" in b.heard.faults[0]
+            finally:
+                thawed.set()
+                running.cancel()
+                await until(lambda: running.done() and not asyncio.all_tasks(loop), "the end")
+                loop.call_soon_threadsafe(loop.stop)
+                await asyncio.to_thread(thread.join)
+                loop.close()
+
+        self.bench(test)
+
+    def test_after_a_restart_the_machine_says_what_became_of_a_command(self) -> None:
+        """The numbers that the machine shows say it."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("move"), 7)
+                await until(lambda: b.machine.orders, "the command arrives")
+            b.begin()
+            async with b.connected():
+                # The safe outputs of the start have come between: whether it will be done nobody knows.
+                assert await b.driver.ask(b.place("move"), 7) is Answer.UNKNOWN
+                assert await b.driver.ask(b.place("move"), 8) is Answer.NOT_RECEIVED
+                assert b.heard_of("moved") == []
+                b.machine.finish()
+                await until(lambda: b.driver.devices["D"].channels["M"].shown["done"], "the answer is read")
+            b.begin()
+            async with b.connected():
+                assert await b.driver.ask(b.place("move"), 7) is Answer.DONE
+                assert await b.driver.ask(b.place("move"), 8) is Answer.NOT_RECEIVED
+                assert await b.driver.ask(b.place("grip"), 1) is Answer.NOT_RECEIVED
+                b.driver.send(b.place("move"), 8)
+                await until(lambda: len(b.machine.orders) == 2, "the command arrives")
+                b.machine.finish()
+                await until(lambda: b.heard_of("moved"), "the completion")
+            assert b.heard_of("moved") == [(True, 8)]
+
+        self.bench(test)
+
+    def test_a_machine_that_cannot_be_reached_leaves_it_unknown(self) -> None:
+        """An answer is not made up."""
+
+        async def test(b: Bench) -> None:
+            await b.far.end.cut()
+            async with b.running():
+                assert await b.driver.ask(b.place("move"), 1) is Answer.UNKNOWN
+
+        self.bench(test, start_s=0.05)
+
+    def test_edges_that_are_not_told_are_counted(self) -> None:
+        """What was told and what was counted are together what happened."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                await until(lambda: b.heard_of("held"), "the first value")
+                for _ in range(100):
+                    b.machine.show("sensor", value=True)
+                    b.machine.show("sensor", value=False)
+                b.machine.show("sensor", value=True)
+                await until(lambda: b.quality("held")[0], "the last value")
+                told = len(b.heard_of("held")) - 1
+                counted = b.driver.readings()["M.held"].coalesced
+                assert self.counts_edges is False or told + counted == 201
+
+        self.bench(test)
+
+    counts_edges: bool = True
+    """Whether the protocol carries every change; one that is polled sees what is there when it looks."""

@@ -1,0 +1,120 @@
+"""What a new kind of device brings: points that are read and written over one connection.
+
+A device is a set of *points*, each with an address in the device's own language: a coil, a node, a topic, a word on a
+line. Everything that makes a good driver out of that (process image, completions, loss policies, safe outputs,
+heartbeat, new connections) is written once above it, in `keeping.py` and `bound.py`, so that a kind of device is one
+short file that knows its protocol and nothing else. Third parties name theirs as an entry point `firable.drivers`, an
+object of the protocol `DeviceKind`, and hold it to `firable.executor.drivers.conformance`.
+
+Rejected: one interface of commands and answers for each kind of device. It would put the handshake, which is where the
+mistakes are, into every one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Protocol
+
+from pydantic import BaseModel, ConfigDict
+
+Point = str
+"""The address of something that a device shows or takes, as the binding writes it."""
+
+Value = bool | int | float | str
+"""What a point holds. A text that means a number or a truth value counts as that (`as_bit`, `as_number`)."""
+
+Writes = Sequence[tuple[Point, Value]]
+"""Values for points; a device takes them in this order."""
+
+
+class LinkError(Exception):
+    """A connection cannot be made, has failed, has timed out, or brought what nobody can read."""
+
+
+class Options(BaseModel):
+    """The keys of a device in a binding that its kind knows, beside those that all kinds have."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Use(StrEnum):
+    """What a point is to be used for."""
+
+    READ = "read"
+    WRITE = "write"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a connection is for: the points to be read, and how long an answer may take."""
+
+    read: Collection[Point]
+    timeout_s: float
+
+
+class Connection(Protocol):
+    """One connection to a device. `read` and `write` are each called by one task; the two at the same time.
+
+    Any of them raises `LinkError` or `OSError` when the connection has failed; then it is closed, and never used again.
+    """
+
+    async def read(self) -> Sequence[tuple[Point, Value]]:
+        """Wait until there is something, and return all that has come, in its order.
+
+        The first answer is what the device shows now, as far as it tells that by itself. A device that is polled
+        answers each time with all of its points.
+        """
+        ...
+
+    async def write(self, writes: Writes) -> None:
+        """Write values in their order, and return when the device, or who stands for it, has confirmed them."""
+        ...
+
+    async def close(self) -> None:
+        """End the connection, also one that has failed; it does not fail itself."""
+        ...
+
+
+class DeviceKind(Protocol):
+    """A kind of device: how its options and addresses are written, and how one connects to it."""
+
+    @property
+    def options(self) -> type[Options]:
+        """The model of its own keys in a binding."""
+        ...
+
+    def point_problem(self, point: Point, use: Use) -> str:
+        """What is wrong with an address for a use, as a sentence without its end; empty where nothing is."""
+        ...
+
+    async def connect(self, options: Any, wanted: Wanted) -> Connection:
+        """Make a new connection; raises `LinkError` or `OSError`, and `ModuleNotFoundError` for a missing library."""
+        ...
+
+
+def as_bit(value: Value) -> bool | None:
+    """The truth value that a point shows, or None where it shows none.
+
+    >>> [as_bit(value) for value in (True, 0, "1", "false", 2, "open")]
+    [True, False, True, False, None, None]
+    """
+    if isinstance(value, str):
+        return {"1": True, "true": True, "0": False, "false": False}.get(value.strip().lower())
+    return bool(value) if value in {0, 1} else None
+
+
+def as_number(value: Value) -> int | None:
+    """The whole number that a point shows, or None where it shows none.
+
+    >>> [as_number(value) for value in (7, "7", 7.0, True, "x", 7.5)]
+    [7, 7, 7, None, None, None]
+    """
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, str):
+        return int(value) if value.strip().isascii() and value.strip().isdigit() else None
+    if isinstance(value, float):
+        return int(value) if value.is_integer() else None
+    return value

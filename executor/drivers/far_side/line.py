@@ -1,0 +1,53 @@
+"""A serial line without wires: two pseudo-terminals, with bytes carried between them by the event loop.
+
+The ends are named by paths, as serial ports are, so that the code under test opens them as it would open a port. What
+goes in while the line is cut is lost.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import tty
+from contextlib import suppress
+
+
+class PseudoLine:
+    """A line with the ports `near` and `far`, once it is open."""
+
+    def __init__(self) -> None:
+        self.near = ""
+        self.far = ""
+        self.passes = True
+        self.masters: tuple[int, ...] = ()
+        self.slaves: tuple[int, ...] = ()
+        """Held open, so that a port that is closed and opened again finds the line as it was."""
+
+    def open(self) -> None:
+        """Make the line, if it is not there yet; must be called while the event loop runs that carries the bytes."""
+        if self.masters:
+            return
+        near_master, near_slave = os.openpty()
+        far_master, far_slave = os.openpty()
+        self.masters, self.slaves = (near_master, far_master), (near_slave, far_slave)
+        for descriptor in self.slaves:
+            tty.setraw(descriptor)
+        self.near, self.far = os.ttyname(near_slave), os.ttyname(far_slave)
+        loop = asyncio.get_running_loop()
+        for source, target in ((near_master, far_master), (far_master, near_master)):
+            os.set_blocking(source, False)
+            loop.add_reader(source, self._carry, source, target)
+
+    def close(self) -> None:
+        """Take the line away."""
+        for descriptor in self.masters:
+            asyncio.get_running_loop().remove_reader(descriptor)
+        for descriptor in (*self.masters, *self.slaves):
+            os.close(descriptor)
+        self.masters = self.slaves = ()
+
+    def _carry(self, source: int, target: int) -> None:
+        with suppress(BlockingIOError):
+            some = os.read(source, 4096)
+            if self.passes:
+                os.write(target, some)

@@ -1,0 +1,117 @@
+"""The machine behind an end for which drivers are tested: it does what a device has to, and only when it is told.
+
+It keeps the rules of a channel: a number that it has is ignored, another one is taken; number 0 clears what it shows.
+Its watchdog, when it has been given one, sets the output to its safe value and fails the command under way; that it
+has done so is shown until the output is written anew.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from firable.executor.drivers.device import Point, Value, as_number
+from firable.executor.drivers.far_side.end import FarEnd
+
+ROLES: Final = ("sensor", "closed", "beat", "tripped", "output", "taken", "done", "failed")
+"""What an end must have a point for; besides `number` and `code`, or `command`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """A command as the machine got it: its number, and what was written before it or with it."""
+
+    number: int
+    code: Value
+
+
+class Machine:
+    """A machine with one channel, two sensors, an output and a watchdog."""
+
+    def __init__(self, end: FarEnd, points: Mapping[str, Point]) -> None:
+        self.end = end
+        self.points = points
+        self.roles = {point: role for role, point in points.items()}
+        self.orders: list[Order] = []
+        self.outputs: list[bool] = []
+        """All that was written to the output."""
+        self.events: list[str] = []
+        """The roles that were written, in order."""
+        self.number = 0
+        self.code: Value = 0
+        self.beats = 0
+        self.finishes_at_once = False
+        self.watchdog_s = 0.0
+        self.watching: asyncio.TimerHandle | None = None
+
+    async def start(self) -> None:
+        """Begin to serve, with everything at 0."""
+        await self.end.start(self.written)
+        for role in ("taken", "done", "failed"):
+            self.show(role, 0)
+        for role in ("sensor", "closed", "tripped"):
+            self.show(role, value=False)
+
+    async def stop(self) -> None:
+        """End."""
+        if self.watching is not None:
+            self.watching.cancel()
+        await self.end.stop()
+
+    def show(self, role: str, value: Value) -> None:
+        """Show a value at the point of a role."""
+        self.end.show(self.points[role], value)
+
+    def finish(self, number: int | None = None) -> None:
+        """Show that the newest command, or the one of a number, is done."""
+        self.show("done", self.number if number is None else number)
+
+    def fail(self) -> None:
+        """Show that the newest command has failed."""
+        self.show("failed", self.number)
+
+    def written(self, point: Point, value: Value) -> None:
+        """Take what a client writes."""
+        role = self.roles.get(point)
+        if role is None:
+            return
+        self.events.append(role)
+        match role:
+            case "number":
+                self._ordered(as_number(value), self.code)
+            case "command":
+                number, _, text = str(value).partition(" ")
+                self._ordered(as_number(number), text)
+            case "code":
+                self.code = value
+            case "output":
+                self.show("tripped", value=False)
+                self.outputs.append(bool(as_number(value) if isinstance(value, str) else value))
+            case "beat":
+                self._beaten()
+
+    def _ordered(self, number: int | None, code: Value) -> None:
+        if number == 0:
+            self.number = 0
+            for role in ("taken", "done", "failed"):
+                self.show(role, 0)
+        elif number is not None and number != self.number:
+            self.number = number
+            self.orders.append(Order(number, code))
+            self.show("taken", number)
+            if self.finishes_at_once:
+                self.finish()
+
+    def _beaten(self) -> None:
+        self.beats += 1
+        if self.watching is not None:
+            self.watching.cancel()
+        if self.watchdog_s:
+            self.watching = asyncio.get_running_loop().call_later(self.watchdog_s, self._trip)
+
+    def _trip(self) -> None:
+        self.outputs.append(False)
+        self.show("tripped", value=True)
+        self.fail()

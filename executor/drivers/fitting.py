@@ -1,0 +1,64 @@
+"""Whether a binding fits a net: every signal and every command bound once, and nothing else.
+
+A signal that is not bound would never change, and a command that is not bound would never be sent: either would look
+like a machine that is slow. So both are refused before anything is connected, all together, with their lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from firable.executor.drivers.binding import ACKNOWLEDGED, Binding
+from firable.nets.diagnostics import Diagnostic, did_you_mean
+from firable.nets.net import Net, Place, SignalKind
+
+
+def misfits(binding: Binding, net: Net) -> tuple[Diagnostic, ...]:
+    """Where a binding does not fit a net (F5101)."""
+    return tuple(_misfits(binding, net))
+
+
+def _misfits(binding: Binding, net: Net) -> Iterator[Diagnostic]:
+    document = binding.document
+    if document.cell != net.name:
+        message = f"this binding is for the cell '{document.cell}', and the net is '{net.name}'"
+        yield binding.problem("F5101", ("cell",), message, "name the cell, when you have looked at all that is bound")
+    signals = {signal.name: signal for signal in net.signals}
+    for name in document.signals:
+        if name not in signals:
+            hint = did_you_mean(name, list(signals)) + "take it out, or correct its name"
+            yield binding.problem("F5101", ("signals", name), f"the net has no signal '{name}'", hint)
+    for name, signal in signals.items():
+        if name not in document.signals:
+            read = "{device: ..., read: ...}"
+            ways = f"`{name}: {read}`"
+            if signal.kind is SignalKind.COMPLETION:
+                ways = f"`{name}: {ACKNOWLEDGED}`, or {ways} where a sensor must agree"
+            yield binding.problem("F5101", ("signals",), f"the signal '{name}' is not bound", f"write {ways}")
+        elif document.signals[name] is None and signal.kind is SignalKind.SENSOR:
+            message = f"'{name}' is a sensor, and no command acknowledges it"
+            yield binding.problem("F5101", ("signals", name), message, "write `{device: ..., read: ...}`")
+    places = {place.name: place for place in net.places if place.command is not None}
+    for name in document.commands:
+        if name not in places:
+            what = "has no place" if name not in net.place_index else "sends no command on entry to"
+            hint = did_you_mean(name, list(places)) + "take it out, or correct its name"
+            yield binding.problem("F5101", ("commands", name), f"the net {what} '{name}'", hint)
+    for name, place in places.items():
+        if name not in document.commands:
+            hint = f"write `{name}: {{device: ..., channel: ...}}`"
+            yield binding.problem(
+                "F5101", ("commands",), f"the command of '{name}', {place.command}, is not bound", hint
+            )
+        else:
+            yield from _unanswered(binding, place)
+
+
+def _unanswered(binding: Binding, place: Place) -> Iterator[Diagnostic]:
+    """A command whose completion is awaited goes by a channel that shows what is done."""
+    command = binding.document.commands[place.name]
+    channel = binding.document.devices[command.device].channels[command.channel]
+    if place.completion is not None and channel.done is None:
+        message = f"'{place.name}' waits for its completion, and '{command.channel}' does not show what is done"
+        hint = f"give the channel `done: ADDRESS`, where '{command.device}' shows the number of what it has done"
+        yield binding.problem("F5101", ("commands", place.name, "channel"), message, hint)

@@ -1,0 +1,106 @@
+"""The process image: what the signals show, how far that may be believed, and what happens when their device is lost.
+
+Values come in batches, in their order; what is told to the controllers is where the signal stands at the end of a
+batch, because a net sees levels and not edges. The edges in between are counted as coalesced. A device that is polled
+shows nothing of what happened between two polls; one that counts edges itself can be asked for its count (`edges` in
+the binding), and then those are counted too. The alternative, telling every edge of a batch, lets one chattering
+contact fill the mailbox of a controller faster than it is read.
+
+Pure: the time comes with each call.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from firable.executor.drivers.binding import SignalDocument
+from firable.executor.drivers.device import Point, Value, as_bit, as_number
+from firable.executor.drivers.driver import Quality, Reading
+
+COUNTER_MODULUS = 1 << 16
+"""Counters of edges begin again at this number or at a multiple of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A signal shows something else."""
+
+    signal: str
+    value: bool
+
+
+class Image:
+    """The signals of one device."""
+
+    def __init__(self, signals: Mapping[str, SignalDocument]) -> None:
+        self.signals = signals
+        self.readings = {name: Reading() for name in signals}
+        self.reads: dict[Point, list[str]] = {}
+        self.counters: dict[Point, list[str]] = {}
+        self.counted: dict[str, int] = {}
+        """The number that the edge counter of a signal showed last."""
+        for name, signal in signals.items():
+            self.reads.setdefault(signal.read, []).append(name)
+            if signal.edges is not None:
+                self.counters.setdefault(signal.edges, []).append(name)
+
+    def take(self, batch: Iterable[tuple[Point, Value]], now_seconds: float) -> tuple[list[Change], list[str]]:
+        """Take what was read; returns what has changed by it, and which signals are faults by their loss policy."""
+        before: dict[str, bool | None] = {}
+        edges: dict[str, int] = {}
+        counts: dict[str, int] = {}
+        faults: list[str] = []
+        for point, value in batch:
+            for name in self.reads.get(point, ()):
+                reading = self.readings[name]
+                before.setdefault(name, reading.value)
+                bit = as_bit(value)
+                if bit is None:
+                    faults += self._lose(name, f"'{point}' shows {value!r}, which is neither 0 nor 1")
+                    continue
+                bit ^= self.signals[name].invert
+                if reading.value is not None and bit != reading.value:
+                    edges[name] = edges.get(name, 0) + 1
+                self.readings[name] = Reading(bit, now_seconds, Quality.GOOD, "", reading.coalesced)
+            for name in self.counters.get(point, ()):
+                if (number := as_number(value)) is not None:
+                    counts[name] = number
+        changes = list(self._changes(before))
+        told = {change.signal for change in changes}
+        for name in {*edges, *counts}:
+            passed = edges.get(name, 0)
+            if name in counts:
+                passed = max(passed, (counts[name] - self.counted.get(name, counts[name])) % COUNTER_MODULUS)
+                self.counted[name] = counts[name]
+            if (untold := passed - (name in told)) > 0:
+                reading = self.readings[name]
+                self.readings[name] = replace(reading, coalesced=reading.coalesced + untold)
+        return changes, faults
+
+    def lost(self, why: str) -> tuple[list[Change], list[str]]:
+        """The device is lost: follow the policy of each signal; returns what changes, and which are faults."""
+        before = {name: reading.value for name, reading in self.readings.items()}
+        faults = [fault for name in self.signals for fault in self._lose(name, why)]
+        self.counted.clear()  # the device may count anew
+        return list(self._changes(before)), faults
+
+    def _changes(self, before: Mapping[str, bool | None]) -> Iterator[Change]:
+        for name, was in before.items():
+            shows = self.readings[name].value
+            if shows is not None and shows != was:
+                yield Change(name, shows)
+
+    def _lose(self, name: str, why: str) -> list[str]:
+        """Follow the loss policy of a signal; returns its name if that makes a fault, once for each loss."""
+        reading, policy = self.readings[name], self.signals[name].on_loss
+        match policy:
+            case "hold":
+                quality = Quality.BAD if reading.value is None else Quality.UNCERTAIN
+                self.readings[name] = replace(reading, quality=quality, why=why)
+            case "fault":
+                self.readings[name] = replace(reading, quality=Quality.BAD, why=why)
+                return [name]
+            case "0" | "1":
+                self.readings[name] = replace(reading, value=policy == "1", quality=Quality.BAD, why=why)
+        return []

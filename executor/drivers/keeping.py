@@ -1,0 +1,187 @@
+"""Keeping a device: a connection as long as it lasts, then a new one; the heartbeat; the safe outputs at both ends.
+
+One task reads, one writes. All that is written goes through the one that writes, so that the order is the one that was
+meant: safe outputs before anything else on the first connection, then heartbeats and commands, then safe outputs as
+the last thing. A connection that has failed in any way is closed and never asked again; the next one is made after a
+pause that doubles up to a bound, and is read before it is written, because what the device shows then decides what is
+still to be sent.
+
+The safe outputs are not driven on a *later* connection. What the machines do while the line is down is for the device's
+own watchdog, which knows of it in time; a driver that is back after a second would stop a machine that did its work.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine, Sequence
+from contextlib import suppress
+from typing import Any, Final, Protocol
+
+from firable.executor.drivers.binding import DeviceDocument, writes
+from firable.executor.drivers.device import Connection, DeviceKind, LinkError, Options, Point, Value, Wanted, Writes
+
+BEATS: Final = 65_536
+"""Heartbeats are numbers from 0, one more each time, and again from 0."""
+
+_FAILURES: Final = (LinkError, OSError, TimeoutError)
+
+
+class Served(Protocol):
+    """What the connection of a device is for."""
+
+    def read(self, batch: Sequence[tuple[Point, Value]]) -> None:
+        """Values have come."""
+        ...
+
+    def ready(self) -> None:
+        """A new connection has told what the device shows, and may be written to."""
+        ...
+
+    def lost(self, why: str) -> None:
+        """There is no connection, or none any more."""
+        ...
+
+    def next_writes(self) -> Writes | None:
+        """What is to be written now, if anything."""
+        ...
+
+    def written(self) -> None:
+        """The device has confirmed that."""
+        ...
+
+
+class Kept:
+    """A device that is kept connected until it is stopped."""
+
+    def __init__(
+        self, document: DeviceDocument, kind: DeviceKind, options: Options, points: frozenset[Point], served: Served
+    ) -> None:
+        self.document = document
+        self.kind = kind
+        self.options = options
+        self.wanted = Wanted(tuple(sorted(points)), document.timeout_s)
+        self.served = served
+        self.safe = writes(document.safe)
+        self.awake = asyncio.Event()
+        self.connections = 0
+        """How many connections there have been."""
+        self.is_connected = False
+        self.started = False
+        """Whether the safe outputs of the start-up have been written."""
+        self.stopping = False
+        self.stopped = asyncio.Event()
+        """The safe outputs have been written for the last time, or cannot be."""
+        self.beat = 0
+        self.alive_seconds = 0.0
+        self.alive_value: Value | None = None
+
+    async def run(self) -> None:
+        """Keep the device connected; ends when it is stopped."""
+        pause_s = self.document.retry_s
+        while not self.stopping:
+            before = self.connections
+            try:
+                await self._connected()
+            except _FAILURES as error:
+                self.served.lost(str(error) or "no answer in time")
+            if self.connections > before:
+                pause_s = self.document.retry_s
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._asked_to_stop(), pause_s)
+            pause_s = min(2 * pause_s, self.document.retry_max_s)
+        self.stopped.set()
+
+    def stop(self) -> None:
+        """Write the safe outputs and nothing afterwards."""
+        self.stopping = True
+        self.awake.set()
+        if not self.is_connected:
+            self.stopped.set()
+
+    async def _asked_to_stop(self) -> None:
+        while not self.stopping:
+            self.awake.clear()
+            await self.awake.wait()
+
+    async def _connected(self) -> None:
+        """One connection, from its making to its failure or to the stop."""
+        connecting = self.kind.connect(self.options, self.wanted)
+        connection = await asyncio.wait_for(connecting, 2 * self.document.timeout_s)
+        try:
+            self.is_connected = True
+            await self._first_of(self._serve(connection), self._watch())
+        finally:
+            self.is_connected = False
+            if self.stopping:
+                self.stopped.set()
+            await connection.close()
+
+    async def _serve(self, connection: Connection) -> None:
+        self._take(await connection.read())
+        if not self.started and not self.stopping:
+            await connection.write(self.safe)
+            self.started = True
+        self.connections += 1
+        self.served.ready()
+        await self._first_of(self._read(connection), self._write(connection))
+
+    async def _first_of(self, *work: Coroutine[Any, Any, None]) -> None:
+        """Do several things until one ends or fails."""
+        tasks = [asyncio.create_task(one) for one in work]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _take(self, batch: Sequence[tuple[Point, Value]]) -> None:
+        if self.document.alive is not None:
+            for point, value in batch:
+                if point == self.document.alive.read and value != self.alive_value:
+                    self.alive_value = value
+                    self.alive_seconds = asyncio.get_running_loop().time()
+        self.served.read(batch)
+
+    async def _read(self, connection: Connection) -> None:
+        while True:
+            self._take(await connection.read())
+            self.awake.set()
+
+    async def _write(self, connection: Connection) -> None:
+        loop = asyncio.get_running_loop()
+        heartbeat = self.document.heartbeat
+        due = loop.time()
+        beaten = False
+        while not self.stopping:
+            self.awake.clear()
+            is_due = heartbeat is not None and loop.time() >= due
+            # They take turns where a device is so slow that there is always a heartbeat to be sent.
+            if not (is_due and not beaten) and (some := self.served.next_writes()) is not None:
+                beaten = False
+                await connection.write(some)
+                self.served.written()
+            elif is_due and heartbeat is not None:
+                beaten, due = True, loop.time() + heartbeat.every_s
+                await connection.write(((heartbeat.write, self.beat),))
+                self.beat = (self.beat + 1) % BEATS
+            else:
+                timer = None if heartbeat is None else loop.call_later(due - loop.time(), self.awake.set)
+                await self.awake.wait()
+                if timer is not None:
+                    timer.cancel()
+        await connection.write(self.safe)
+
+    async def _watch(self) -> None:
+        """End the connection when the device has not changed its sign of life in time."""
+        loop = asyncio.get_running_loop()
+        alive = self.document.alive
+        if alive is None:
+            await loop.create_future()
+            return
+        self.alive_seconds = loop.time()
+        while (silent_s := loop.time() - self.alive_seconds) < alive.within_s:
+            await asyncio.sleep(alive.within_s - silent_s)
+        raise LinkError(f"silent: '{alive.read}' has not changed within {alive.within_s:g} s")

@@ -1,0 +1,191 @@
+"""Bindings: what they say, and everything that can be wrong with one, at its place."""
+
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import pytest
+
+from firable.executor.drivers import kinds
+from firable.executor.drivers.binding import parse_binding, read_binding
+from firable.executor.drivers.bound import bound_driver
+from firable.nets.diagnostics import InputError
+from firable.nets.text import parse_net
+
+NET = parse_net(
+    """
+firable: 1
+cell: c
+controllers:
+  M:
+    start: idle
+    inputs: there
+    places: {idle: , move: {send: {machine: M, command: MOVE}, until: moved}, stop: {send: {machine: M, command: STOP}}}
+transitions:
+  t1: {from: M.idle, to: M.move, if: M.there}
+  t2: {from: M.move, to: M.stop}
+  t3: {from: M.stop, to: M.idle}
+"""
+)
+
+GOOD = """firable_bind: 1
+cell: c
+devices:
+  plc:
+    driver: modbus-tcp
+    host: 10.0.0.1
+    heartbeat: {write: holding 0, every_s: 0.2, tripped: discrete 9}
+    alive: {read: input 0, within_s: 1}
+    safe: {coil 1: false}
+    channels:
+      M: {number: holding 1, taken: input 1, done: input 2}
+      N: {number: holding 5}
+signals:
+  M.there: {device: plc, read: discrete 0, on_loss: hold, edges: input 7, invert: true}
+  M.moved: acknowledged
+commands:
+  M.move: {device: plc, channel: M, write: {holding 2: 7}}
+  M.stop: {device: plc, channel: M, write: {holding 2: 8}}
+"""
+
+
+def refusal(text: str, *, fit: bool = False) -> list[tuple[str, str]]:
+    """The codes of what is wrong with a binding, or with it and the net, each with its line and what stands there."""
+    right = parse_binding(text, "c.bind.yaml") if fit else None
+    with pytest.raises(InputError) as refused:
+        bound_driver(right, NET) if right is not None else parse_binding(text, "c.bind.yaml")
+    assert all(problem.hint for problem in refused.value.diagnostics)
+    found = []
+    for one in refused.value.diagnostics:
+        assert one.span is not None
+        start = one.span.column - 1
+        found.append((one.code, f"{one.span.line}: {one.span.excerpt[start : start + one.span.length]}"))
+    return found
+
+
+def edited(old: str, new: str) -> str:
+    assert GOOD.count(old) == 1
+    return GOOD.replace(old, new)
+
+
+def test_a_right_binding_is_read_and_fits(tmp_path: Path) -> None:
+    path = tmp_path / "c.bind.yaml"
+    path.write_text(GOOD, encoding="utf-8")
+    binding = read_binding(path)
+    driver = bound_driver(binding, NET)
+    assert set(driver.readings()) == {"M.there"}
+    assert binding.document.devices["plc"].timeout_s == 1.0
+    assert driver.devices["plc"].kept.wanted.read == (
+        "discrete 0",
+        "discrete 9",
+        "input 0",
+        "input 1",
+        "input 2",
+        "input 7",
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "found"),
+    [
+        ("firable_bind: 1", "firable_bind: 2", ("F1011", "1: 2")),
+        ("cell: c", "cel: c", ("F1008", "2: cel")),
+        ("    host: 10.0.0.1\n", "", ("F1009", "4: plc")),
+        ("host: 10.0.0.1", "hots: 10.0.0.1", ("F1008", "6: hots")),
+        ("every_s: 0.2", "every_s: soon", ("F1010", "7: soon")),
+        ("every_s: 0.2", "every_s: 0", ("F1010", "7: 0")),
+        ("within_s: 1", "within_s: 1, extra: 2", ("F1008", "8: extra")),
+        ("host: 10.0.0.1", "host: 10.0.0.1\n    port: 70000", ("F1010", "7: 70000")),
+        ("on_loss: hold", "on_loss: forget", ("F1010", "14: forget")),
+        ("read: discrete 0, ", "", ("F1009", "14: M.there")),
+        ("invert: true", "invert: 2", ("F1010", "14: 2")),
+    ],
+)
+def test_what_is_no_binding_is_refused_where_it_stands(old: str, new: str, found: tuple[str, str]) -> None:
+    assert found in refusal(edited(old, new))
+
+
+def test_an_unknown_key_of_a_device_is_told_with_the_keys_of_its_driver() -> None:
+    with pytest.raises(InputError) as refused:
+        parse_binding(edited("host: 10.0.0.1", "host: 10.0.0.1\n    prot: 502"))
+    problem = refused.value.diagnostics[0]
+    assert problem.hint.startswith("did you mean 'port'? ")
+    assert problem.span is not None
+    assert problem.span.line == 7
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("driver: modbus-tcp", "driver: modbustcp", "5: driver"),
+        ("driver: modbus-tcp", "driver: unheard", "5: driver"),
+    ],
+)
+def test_an_unknown_driver_is_refused(old: str, new: str, place: str) -> None:
+    assert refusal(edited(old, new)) == [("F5103", place)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("read: discrete 0", "read: discret 0", "14: read"),
+        ("read: discrete 0", "read: discrete 70000", "14: read"),
+        ("read: discrete 0", "read: discrete 0.1", "14: read"),
+        ("read: discrete 0", "read: input 0.16", "14: read"),
+        ("write: {holding 2: 7}", "write: {input 2: 7}", "17: input 2"),
+        ("safe: {coil 1: false}", "safe: {discrete 1: false}", "9: discrete 1"),
+        ("number: holding 5", "number: register 5", "12: number"),
+        ("invert: true", "force: true", "14: force"),
+    ],
+)
+def test_what_is_no_address_of_the_device_for_its_use_is_refused(old: str, new: str, place: str) -> None:
+    assert refusal(edited(old, new)) == [("F5102", place)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("N: {number: holding 5}", "N: {number: holding 5, command: holding 6}", "12: N"),
+        ("N: {number: holding 5}", "N: {taken: input 5}", "12: N"),
+        ("{device: plc, read: discrete 0,", "{device: pcl, read: discrete 0,", "14: device"),
+        ("{device: plc, channel: M, write: {holding 2: 7}}", "{device: pcl, channel: M}", "17: device"),
+        ("{device: plc, channel: M, write: {holding 2: 7}}", "{device: plc, channel: O}", "17: channel"),
+    ],
+)
+def test_what_refers_to_nothing_is_refused(old: str, new: str, place: str) -> None:
+    assert refusal(edited(old, new)) == [("F5101", place)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("cell: c", "cell: d", "2: cell"),
+        ("  M.moved: acknowledged\n", "", "13: signals"),
+        ("M.moved: acknowledged", "M.moved: acknowledged\n  M.mooved: acknowledged", "16: M.mooved"),
+        ("{device: plc, read: discrete 0, on_loss: hold, edges: input 7, invert: true}", "acknowledged", "14: M.there"),
+        ("  M.stop: {device: plc, channel: M, write: {holding 2: 8}}\n", "", "16: commands"),
+        ("M.stop: {device: plc, channel: M, write: {holding 2: 8}}", "M.idle: {device: plc, channel: M}", "18: M.idle"),
+        ("M.move: {device: plc, channel: M", "M.move: {device: plc, channel: N", "17: channel"),
+    ],
+)
+def test_a_binding_that_does_not_fit_the_net_is_refused(old: str, new: str, place: str) -> None:
+    assert ("F5101", place) in refusal(edited(old, new), fit=True)
+
+
+def test_a_driver_of_others_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    def entries(**_: str) -> list[EntryPoint]:
+        return [
+            EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP),
+            EntryPoint("broken", "support.no_such_module:KIND", kinds.GROUP),
+            EntryPoint("double", "support.third_party_driver:KIND", kinds.GROUP),
+            EntryPoint("double", "support.third_party_driver:OTHER", kinds.GROUP),
+        ]
+
+    monkeypatch.setattr(kinds, "entry_points", entries)
+    text = edited("driver: modbus-tcp\n    host: 10.0.0.1", "driver: theirs\n    memory: m")
+    assert bound_driver(parse_binding(text), NET).readings()
+    assert "theirs" in kinds.kind_names()
+    for name in ("broken", "double", "theri"):
+        assert refusal(text.replace("driver: theirs", f"driver: {name}")) == [("F5103", "5: driver")]
+    # What is firable's own cannot be taken over.
+    monkeypatch.setattr(kinds, "entry_points", lambda **_: [EntryPoint("modbus-tcp", "os:path", kinds.GROUP)])
+    assert kinds.kind_named("modbus-tcp") is not None

@@ -1,0 +1,194 @@
+"""The parts of a driver, each alone: process image, completions, channels, and the simulated driver."""
+
+import asyncio
+from collections.abc import Iterable
+
+import pytest
+from support.cells import decomposition_of, plant_of
+
+from firable.executor.cell.plant import Plant
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.bench import Heard
+from firable.executor.drivers.binding import ChannelDocument, SignalDocument
+from firable.executor.drivers.channels import NUMBER_MAX, Channel
+from firable.executor.drivers.completions import Completions
+from firable.executor.drivers.device import Value, Writes
+from firable.executor.drivers.driver import Answer, Quality
+from firable.executor.drivers.image import Image
+from firable.executor.drivers.simulated import SimulatedDriver
+
+
+def image(**options: object) -> Image:
+    return Image({"s": SignalDocument.model_validate({"device": "d", "read": "p", **options})})
+
+
+def test_image_tells_where_a_signal_stands_at_the_end_of_a_batch_and_counts_the_rest() -> None:
+    one = image()
+    assert [change.value for change in one.take([("p", 0)], 1.0)[0]] == [False]
+    assert one.take([("p", 1), ("p", 0), ("p", 1), ("q", 1)], 2.0)[0][0].value is True
+    assert one.readings["s"].coalesced == 2
+    assert one.take([("p", 0), ("p", 1)], 3.0) == ([], [])
+    assert (one.readings["s"].coalesced, one.readings["s"].at_seconds) == (4, 3.0)
+
+
+def test_image_counts_edges_that_only_the_device_saw() -> None:
+    one = image(edges="n")
+    one.take([("p", 0), ("n", 65_530)], 1.0)
+    one.take([("p", 1), ("n", 65_531)], 2.0)
+    assert one.readings["s"].coalesced == 0
+    one.take([("p", 1), ("n", 3)], 3.0)  # round the end of its register
+    assert one.readings["s"].coalesced == 8
+    one.lost("gone")
+    one.take([("p", 1), ("n", 500)], 4.0)  # the device may have begun anew
+    assert one.readings["s"].coalesced == 8
+
+
+def test_image_inverts_a_signal_that_is_wired_so() -> None:
+    assert image(invert=True).take([("p", False)], 0.0)[0][0].value is True
+
+
+@pytest.mark.parametrize(
+    ("policy", "value", "quality", "faults"),
+    [
+        ("hold", True, Quality.UNCERTAIN, []),
+        ("0", False, Quality.BAD, []),
+        ("1", True, Quality.BAD, []),
+        ("fault", True, Quality.BAD, ["s"]),
+    ],
+)
+def test_what_is_neither_0_nor_1_is_lost_by_the_policy_of_its_signal(
+    policy: str, value: bool, quality: Quality, faults: list[str]
+) -> None:
+    one = image(on_loss=policy)
+    one.take([("p", 1)], 1.0)
+    changes, found = one.take([("p", 7)], 2.0)
+    assert found == faults
+    assert [change.value for change in changes] == ([value] if value is False else [])
+    assert (one.readings["s"].value, one.readings["s"].quality) == (value, quality)
+    assert "'p' shows 7" in one.readings["s"].why
+    assert one.readings["s"].at_seconds == 1.0
+
+
+def test_completion_needs_the_acknowledgement_of_its_own_entry_and_its_sensor() -> None:
+    formed = Completions({"seen": False})
+    formed.commanded("seen", 1)
+    assert formed.shows("seen", value=True) is None
+    assert formed.acknowledged("seen", 2) is None
+    formed.commanded("seen", 2)  # the sensor still shows the outcome of the command before
+    assert formed.acknowledged("seen", 1) is None
+    assert formed.acknowledged("seen", 2) == 2
+    assert formed.acknowledged("seen", 2) is None
+    formed.commanded("blind", 1)
+    assert formed.acknowledged("blind", 1) == 1
+
+
+def channel(*places: str, answered: Iterable[str] = (), taken: bool = True) -> Channel:
+    document = ChannelDocument.model_validate({"number": "n", "done": "d", **({"taken": "t"} if taken else {})})
+    return Channel(document, places, frozenset(answered))
+
+
+def test_numbers_of_a_channel_differ_by_place_and_entry_and_fit_a_register() -> None:
+    three = channel("a", "b", "c")
+    numbers = [three.number(place, entry) for place in "abc" for entry in range(1, 10_000)]
+    assert len(set(numbers)) == len(numbers)
+    assert all(0 < three.number(place, entry) <= NUMBER_MAX for place in "abc" for entry in (21_844, 21_845, 10**9))
+
+
+def after(one: Channel, **shown: Value) -> Writes | None:
+    """What the channel writes once the device shows something."""
+    for key, value in shown.items():
+        one.shows(key, value)
+    return one.next_writes()
+
+
+def test_next_command_waits_until_the_device_has_the_one_before() -> None:
+    one = channel("a", "b", answered="ab")
+    first, second = one.number("a", 1), one.number("b", 1)
+    one.send("a", 1, "", (("x", 5),))
+    one.send("b", 1, "", ())
+    assert after(one, taken=0, done=0) == (("x", 5), ("n", first))
+    assert one.next_writes() is None
+    one.written()
+    assert one.next_writes() is None
+    assert after(one, taken=first) == (("n", second),)
+
+
+def test_number_that_the_device_shows_already_is_cleared_before_it_is_sent() -> None:
+    one = channel("a", answered="a")
+    number = one.number("a", 1)
+    one.send("a", 1, "", ())
+    assert after(one, taken=number, done=number) == (("n", 0),)
+    one.written()
+    assert after(one, taken=0, done=number) is None
+    assert after(one, taken=0, done=0) == (("n", number),)
+    outcome = one.shows("done", number)
+    assert outcome is not None
+    assert outcome.order.entry == 1
+
+
+def test_write_that_failed_is_repeated_with_its_number_unless_the_device_has_it() -> None:
+    for is_there in (False, True):
+        one = channel("a", answered="a")
+        number = one.number("a", 1)
+        one.send("a", 1, "", ())
+        assert after(one, taken=0, done=0) == (("n", number),)
+        one.shows("taken", number if is_there else 0)
+        assert one.connected_again() is None
+        assert one.next_writes() == (None if is_there else (("n", number),))
+
+
+def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:
+    one = channel("a", answered="a")
+    number = one.number("a", 1)
+    one.send("a", 1, "RUN", ())
+    after(one, taken=0, done=0)
+    one.written()
+    one.shows("taken", number)
+    one.shows("taken", 0)  # it has been switched off and on
+    forgotten = one.connected_again()
+    assert forgotten is not None
+    assert forgotten.place == "a"
+    assert one.next_writes() is None
+
+
+def test_answer_after_a_restart_is_made_of_the_numbers_shown() -> None:
+    def answer(taken: Value | None, done: Value = 0, *, stopped: bool = False, place: str = "a") -> Answer:
+        one = channel("a", "b", "stop", answered="ab", taken=taken is not None)
+        if taken is not None:
+            one.shows("taken", taken)
+        one.shows("done", done)
+        return one.answer(place, 3, stopped=stopped)
+
+    one = channel("a", "b", "stop", answered="ab")
+    this, earlier, other, stop = (
+        one.number("a", 3), one.number("a", 2), one.number("b", 9), one.number("stop", 1)
+    )  # fmt: skip
+    assert answer(this, this) is Answer.DONE
+    assert answer(this) is Answer.WORKING
+    assert answer(this, stopped=True) is Answer.UNKNOWN
+    assert answer(0) is answer(earlier, earlier) is answer(other, other) is Answer.NOT_RECEIVED
+    # A stop may have come after it, and says nothing of what it has overtaken.
+    assert answer(stop) is Answer.UNKNOWN
+    assert answer("?") is answer(None) is Answer.UNKNOWN
+
+
+def test_simulated_driver_shows_its_image_and_says_what_became_of_a_command() -> None:
+    async def main() -> list[Answer]:
+        net = decomposition_of("one_robot").net
+        driver = SimulatedDriver(Plant(plant_of("one_robot"), workpieces=1), net)
+        heard = Heard()
+        task = asyncio.create_task(driver.run(heard, heard))
+        await asyncio.sleep(5)
+        assert driver.readings()["conveyor.part_at_entry"].value is True
+        place = net.place("conveyor.cv1_run")
+        answers = [await driver.ask(place, 1)]
+        driver.send(place, 1)
+        answers.append(await driver.ask(place, 1))
+        await asyncio.sleep(10)
+        answers += [await driver.ask(place, 1), await driver.ask(place, 2)]
+        assert ("conveyor.part_at_end", True, 1) in heard.signals
+        task.cancel()
+        return answers
+
+    answers = run_in_virtual_time(main())
+    assert answers == [Answer.NOT_RECEIVED, Answer.WORKING, Answer.DONE, Answer.NOT_RECEIVED]
