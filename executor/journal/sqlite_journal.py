@@ -1,0 +1,232 @@
+"""The journal in a file: SQLite in WAL mode, synchronous, each row with a check value, and a witness of the last sync.
+
+SQLite makes a transaction atomic and durable (its write-ahead log is synced at each commit), is part of Python, and its
+file can be looked at with any tool. What it does not promise is to notice *damage*: a flipped byte in a row is
+read as it is, and a flipped byte in the log makes SQLite take the log's valid beginning for all of it and go back in
+time without a word; the cell would then be commanded again what it has done. So:
+
+- each row carries a check value over its machine, key and value, and the header one over all rows together, their sum,
+  so that also a row that is missing, or an old one in the place of a new one, is noticed;
+- each sync counts up the *generation*, in the transaction and, after it, in a small file beside the journal. That file
+  is written and not synced: it can only be behind, and a journal that is behind it has lost what was durable.
+
+A journal is of one bundle and of certain machines, which its header names; another one's is refused (F5031), as is a
+damaged one (F5032), one that another process has open (F5033), and one that cannot be written (F5034). The file is
+locked as long as it is open, and the lock ends with the process, however it ends.
+
+Rejected: a log file of our own. It would be short, and its recovery, rotation, locking and syncing would be the least
+tested code on the way of every command.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final, NoReturn
+from zlib import crc32
+
+from firable.executor.protocol.messages import Effect, Keep, Stored
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.source import printable
+
+FORMAT: Final = 1
+
+_SCHEMA: Final = """
+    create table header (format integer, digest text, machines text, generation integer, total integer);
+    create table kept (machine text, key text, value text, checked integer, primary key (machine, key)) without rowid;
+"""
+
+_Row = tuple[str, str]
+
+
+class SqliteJournal:
+    """The journal in the file `path`, of the machines `machines` of the bundle with this digest; made if there is none.
+
+    Raises `InputError` F5031 for the journal of another bundle or of other machines, F5032 for a damaged one, F5033 for
+    one in use, F5034 where the file cannot be read or written.
+    """
+
+    def __init__(self, path: Path | str, digest: str, machines: Iterable[str]) -> None:
+        self.path = Path(path)
+        self.machines = tuple(sorted(machines))
+        self.witness = self.path.with_name(self.path.name + ".generation")
+        self.rows: dict[_Row, Stored] = {}
+        self.changed: dict[_Row, None] = {}
+        """The rows written since the last sync, in any number of acts."""
+        self.checks: dict[_Row, int] = {}
+        """The check value of each row in the file."""
+        self.total = 0
+        self.generation = 0
+        with self._failures("opened"):
+            self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None)
+        try:
+            with self._failures("opened"):
+                self._open(digest)
+        except BaseException:
+            self.connection.close()
+            raise
+
+    def kept(self, machine: str) -> Mapping[str, Stored]:
+        """What a machine has kept, up to the last act written."""
+        return {key: value for (of, key), value in self.rows.items() if of == machine}
+
+    def write(self, machine: str, effects: Iterable[Effect]) -> None:
+        """Take the writes of one act of a machine."""
+        for effect in effects:
+            if isinstance(effect, Keep):
+                row = (machine, effect.key)
+                self.changed[row] = None
+                if effect.value is None:
+                    self.rows.pop(row, None)
+                else:
+                    self.rows[row] = effect.value
+
+    def sync(self) -> None:
+        """Make all acts written until now durable; raises `InputError` F5034, and then the process has to end."""
+        if not self.changed:
+            return
+        written = []
+        for row in self.changed:
+            self.total -= self.checks.pop(row, 0)
+            if row in self.rows:
+                value = json.dumps(self.rows[row])
+                self.checks[row] = check = _check(*row, value)
+                self.total += check
+                written.append((*row, value, check))
+        deleted = [row for row in self.changed if row not in self.rows]
+        self.generation += 1
+        with self._failures("written"):
+            run = self.connection.execute
+            run("begin immediate")
+            self.connection.executemany("insert or replace into kept values (?, ?, ?, ?)", written)
+            self.connection.executemany("delete from kept where machine = ? and key = ?", deleted)
+            run("update header set generation = ?, total = ?", (self.generation, self.total))
+            run("commit")
+            self._bear_witness()
+        self.changed.clear()
+
+    def close(self) -> None:
+        """Let go of the file; what is not synced is lost."""
+        self.connection.close()
+        with suppress(OSError):
+            os.close(self.witness_descriptor)
+
+    def _open(self, digest: str) -> None:
+        run = self.connection.execute
+        run("pragma locking_mode = exclusive")  # held from the first reading until the process is gone
+        run("pragma journal_mode = wal")
+        run("pragma synchronous = full")
+        run("begin exclusive")
+        tables = {name for (name,) in run("select name from sqlite_master where type = 'table'")}
+        if not tables and not self.witness.exists():
+            for statement in filter(str.strip, _SCHEMA.split(";")):
+                run(statement)
+            header = (FORMAT, digest, json.dumps(self.machines), 0, 0)
+            run("insert into header values (?, ?, ?, ?, ?)", header)
+            run("commit")
+        else:
+            run("commit")
+            self._read(digest)
+        self.witness_descriptor = os.open(self.witness, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        self._bear_witness()
+        os.fsync(self.witness_descriptor)  # once, so that a power cut leaves an older number there, and not none
+        _sync_folder(self.path.parent)
+
+    def _read(self, digest: str) -> None:
+        run = self.connection.execute
+        problems = [str(problem) for (problem,) in run("pragma integrity_check") if problem != "ok"]
+        if problems:
+            self._damaged(problems[0])
+        headers = run("select format, digest, machines, generation, total from header").fetchall()
+        if len(headers) != 1 or not isinstance(headers[0][3], int):
+            self._damaged("its header is missing")
+        its_format, its_digest, machines, self.generation, total = headers[0]
+        if (its_format, its_digest, machines) != (FORMAT, digest, json.dumps(self.machines)):
+            self._foreign(its_format, its_digest, str(machines), digest)
+        for machine, key, value, check in run("select machine, key, value, checked from kept"):
+            is_text = isinstance(machine, str) and isinstance(key, str) and isinstance(value, str)
+            if not is_text or check != _check(machine, key, value):
+                self._damaged(f"what '{printable(str(machine))}' kept under '{printable(str(key))}' has changed")
+            self.rows[machine, key] = json.loads(value)
+            self.checks[machine, key] = check
+        self.total = sum(self.checks.values())
+        if self.total != total:
+            self._damaged("rows are missing, or are older than the others")
+        # Before the first sync the witness may not be there yet.
+        durable = (
+            self.witness.read_text("ascii", "replace").strip() if self.generation or self.witness.exists() else "0"
+        )
+        if not durable.isdigit():
+            self._damaged(f"{printable(self.witness.name)} beside it is no number")
+        if int(durable) > self.generation:
+            self._damaged(f"it has lost what was stored: it is at sync {self.generation}, and {int(durable)} were done")
+
+    def _bear_witness(self) -> None:
+        os.pwrite(self.witness_descriptor, f"{self.generation:020}\n".encode(), 0)
+
+    def _damaged(self, what: str) -> NoReturn:
+        message = f"{printable(str(self.path))}: the journal is damaged: {what}"
+        hint = (
+            "what the cell did last is not known from it: look at the machines and bring the cell to its initial "
+            "marking, then move this folder away and start anew"
+        )
+        raise InputError([Diagnostic("F5032", message, hint)])
+
+    def _foreign(self, its_format: Any, its_digest: Any, machines: str, digest: str) -> NoReturn:
+        path = printable(str(self.path))
+        if its_format != FORMAT:
+            message = f"{path}: the journal has format {its_format}, and this firable writes {FORMAT}"
+        elif its_digest != digest:
+            message = f"{path}: the journal is of the bundle {str(its_digest)[:12]}, and this one is {digest[:12]}"
+        else:
+            message = f"{path}: the journal is of {printable(machines)}, and not of {', '.join(self.machines)}"
+        hint = "name another folder, or run the bundle that the journal belongs to"
+        raise InputError([Diagnostic("F5031", message, hint)])
+
+    @contextmanager
+    def _failures(self, done: str) -> Iterator[None]:
+        path = printable(str(self.path))
+        try:
+            yield
+        except (sqlite3.Error, OSError, ValueError) as error:  # ValueError: a path with a NUL in it, a row that is none
+            name = getattr(error, "sqlite_errorname", "")
+            if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
+                message = f"{path}: the journal is in use by another process"
+                hint = "one process at a time runs these machines: stop that one first, or name another folder"
+                raise InputError([Diagnostic("F5033", message, hint)]) from None
+            if name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB", "SQLITE_ERROR")) or not (
+                name or isinstance(error, OSError)
+            ):
+                self._damaged(str(error))
+            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            if name.startswith("SQLITE_CANTOPEN"):
+                reason = _why_not_opened(self.path) or reason
+            message = f"{path}: the journal cannot be {done}: {reason}"
+            hint = "name a folder on a disk with room, that you may write to"
+            raise InputError([Diagnostic("F5034", message, hint)]) from None
+
+
+def _check(machine: str, key: str, value: str) -> int:
+    return crc32("\0".join((machine, key, value)).encode()) + 1  # never 0: an empty row counts
+
+
+def _why_not_opened(path: Path) -> str:
+    """Why a file cannot be opened, in the words of the system, which SQLite keeps to itself."""
+    try:
+        os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
+    except OSError as error:
+        return error.strerror or ""
+    return ""
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make a file that was made in a folder outlive a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

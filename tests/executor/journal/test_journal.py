@@ -1,0 +1,276 @@
+"""Journals: what is written is there after a crash, all of a group or nothing, and nothing else is taken for it."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.examples import examples
+
+from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.journal.sqlite_journal import SqliteJournal
+from firable.executor.protocol.messages import Firing, Keep, Stored
+from firable.nets.diagnostics import InputError
+
+MACHINES = ("a", "b")
+Opener = Callable[[], Journal]
+
+
+def sqlite(folder: Path, digest: str = "d1", machines: tuple[str, ...] = MACHINES) -> SqliteJournal:
+    return SqliteJournal(folder / "cell.journal", digest, machines)
+
+
+def crashed(journal: SqliteJournal, to: Path) -> Path:
+    """What a process that is killed now leaves behind."""
+    to.mkdir(exist_ok=True)
+    for path in journal.path.parent.iterdir():
+        if path.is_file():
+            shutil.copy(path, to)
+    return to
+
+
+def refused(open_: Callable[[], object]) -> tuple[str, str]:
+    with pytest.raises(InputError) as caught:
+        open_()
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.hint
+    return diagnostic.code, diagnostic.message
+
+
+def filled(folder: Path) -> SqliteJournal:
+    journal = sqlite(folder)
+    for i in range(30):
+        journal.write("a", [Keep("word", f"{i:x}"), Firing("t"), Keep(f"promise/{i}", ["G", "H"])])
+        journal.write("b", [Keep("word", f"{-i:x}"), Keep(f"promise/{i - 3}", None)])
+        journal.write("a", [Keep(f"promise/{i - 3}", None)])
+        journal.sync()
+    return journal
+
+
+@pytest.fixture(params=["memory", "sqlite"])
+def opener(request: pytest.FixtureRequest, tmp_path: Path) -> Opener:
+    memory = MemoryJournal()
+    return lambda: memory if request.param == "memory" else sqlite(tmp_path)
+
+
+WRITES = st.lists(
+    st.tuples(
+        st.sampled_from(MACHINES),
+        st.sampled_from(["word", "closed", "promise/1", "\0ü"]),
+        st.none() | st.integers(-(2**70), 2**70) | st.text(max_size=5) | st.lists(st.integers(), max_size=3),
+    ),
+    max_size=8,
+)
+
+
+@examples(40)
+@given(st.lists(WRITES, max_size=6))
+@pytest.mark.parametrize("kind", ["memory", "sqlite"])
+def test_what_is_synced_is_kept_as_a_dictionary_would(
+    kind: str, tmp_path_factory: pytest.TempPathFactory, groups: list[list[tuple[str, str, Stored | None]]]
+) -> None:
+    folder = tmp_path_factory.mktemp("journal")
+    journal: Journal = MemoryJournal() if kind == "memory" else sqlite(folder)
+    expected: dict[str, dict[str, Stored]] = {machine: {} for machine in MACHINES}
+    for group in groups:
+        for machine, key, value in group:
+            journal.write(machine, [Keep(key, value)])
+            expected[machine].pop(key, None)
+            if value is not None:
+                expected[machine][key] = value
+        journal.sync()
+    assert {machine: journal.kept(machine) for machine in MACHINES} == expected
+    journal.close()
+    again = journal if kind == "memory" else sqlite(folder)
+    assert {machine: again.kept(machine) for machine in MACHINES} == expected
+    again.close()
+
+
+def test_fresh_journal_has_kept_nothing(opener: Opener) -> None:
+    assert opener().kept("a") == {}
+
+
+def test_group_that_is_not_synced_is_lost_whole_and_the_groups_before_are_there(tmp_path: Path) -> None:
+    journal = filled(tmp_path)
+    before = {machine: journal.kept(machine) for machine in MACHINES}
+    journal.write("a", [Keep("word", "lost"), Keep("new", 1)])
+    journal.write("b", [Keep("word", "lost")])
+    again = sqlite(crashed(journal, tmp_path / "left"))
+    assert {machine: again.kept(machine) for machine in MACHINES} == before
+
+
+def test_journal_of_another_bundle_is_refused(tmp_path: Path) -> None:
+    filled(tmp_path).close()
+    assert refused(lambda: sqlite(tmp_path, "d2")) == (
+        "F5031",
+        f"{tmp_path}/cell.journal: the journal is of the bundle d1, and this one is d2",
+    )
+
+
+def test_journal_of_other_machines_is_refused(tmp_path: Path) -> None:
+    filled(tmp_path).close()
+    code, message = refused(lambda: sqlite(tmp_path, machines=("a", "c")))
+    assert code == "F5031"
+    assert "not of a, c" in message
+
+
+def test_journal_of_a_later_format_is_refused(tmp_path: Path) -> None:
+    journal = filled(tmp_path)
+    journal.connection.execute("update header set format = 99")
+    journal.close()
+    code, message = refused(lambda: sqlite(tmp_path))
+    assert code == "F5031"
+    assert "has format 99" in message
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("update kept set value = '\"1c\"' where machine = 'a' and key = 'word'", "what 'a' kept under 'word'"),
+        ("update kept set value = x'00' where machine = 'a' and key = 'word'", "what 'a' kept under 'word'"),
+        ("delete from kept where machine = 'a' and key = 'word'", "rows are missing"),
+        ("delete from header", "its header is missing"),
+        ("drop table kept", "no such table"),
+        ("update header set generation = 12", "it is at sync 12, and 30 were done"),
+    ],
+)
+def test_change_of_a_row_by_another_program_is_noticed(tmp_path: Path, change: str, says: str) -> None:
+    journal = filled(tmp_path)
+    journal.connection.execute(change)
+    journal.close()
+    code, message = refused(lambda: sqlite(tmp_path))
+    assert code == "F5032"
+    assert says in message
+
+
+def opened_or_refused(folder: Path) -> dict[str, object] | None:
+    try:
+        journal = sqlite(folder)
+    except InputError as error:
+        if error.diagnostics[0].code not in {"F5031", "F5032"}:
+            raise
+        return None
+    kept = {machine: journal.kept(machine) for machine in MACHINES}
+    journal.close()
+    return dict(kept)
+
+
+@pytest.mark.parametrize("name", ["cell.journal", "cell.journal-wal", "cell.journal.generation"])
+def test_flipped_byte_is_refused_or_changes_nothing(tmp_path: Path, name: str) -> None:
+    (tmp_path / "made").mkdir()
+    journal = filled(tmp_path / "made")
+    if name == "cell.journal":
+        journal.connection.execute("pragma wal_checkpoint(truncate)")
+    left = crashed(journal, tmp_path / "left")
+    expected = {machine: journal.kept(machine) for machine in MACHINES}
+    data = (left / name).read_bytes()
+    refusals = 0
+    for at in range(0, len(data), max(1, len(data) // 150)):
+        damaged = tmp_path / "damaged"
+        shutil.copytree(left, damaged)
+        (damaged / name).write_bytes(data[:at] + bytes([data[at] ^ 0x41]) + data[at + 1 :])
+        opened = opened_or_refused(damaged)
+        assert opened in (None, expected)
+        refusals += opened is None
+        shutil.rmtree(damaged)
+    assert refusals > 0
+
+
+@pytest.mark.parametrize("name", ["cell.journal", "cell.journal-wal", "cell.journal.generation"])
+def test_truncated_file_is_refused_or_changes_nothing(tmp_path: Path, name: str) -> None:
+    (tmp_path / "made").mkdir()
+    journal = filled(tmp_path / "made")
+    if name == "cell.journal":
+        journal.connection.execute("pragma wal_checkpoint(truncate)")
+    left = crashed(journal, tmp_path / "left")
+    expected = {machine: journal.kept(machine) for machine in MACHINES}
+    data = (left / name).read_bytes()
+    refusals = 0
+    for length in {0, 1, *range(0, len(data), max(1, len(data) // 30)), len(data) - 1}:
+        damaged = tmp_path / "damaged"
+        shutil.copytree(left, damaged)
+        (damaged / name).write_bytes(data[:length])
+        opened = opened_or_refused(damaged)
+        assert opened in (None, expected), length
+        refusals += opened is None
+        shutil.rmtree(damaged)
+    assert refusals > (0 if name.endswith("generation") else 20)
+
+
+def test_file_that_is_no_journal_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "cell.journal").write_text("dear diary, " * 1000)
+    assert refused(lambda: sqlite(tmp_path)) == (
+        "F5032",
+        f"{tmp_path}/cell.journal: the journal is damaged: file is not a database",
+    )
+
+
+def test_folder_that_is_not_there_is_told_in_the_words_of_the_system(tmp_path: Path) -> None:
+    assert refused(lambda: sqlite(tmp_path / "no")) == (
+        "F5034",
+        f"{tmp_path}/no/cell.journal: the journal cannot be opened: No such file or directory",
+    )
+
+
+def test_path_with_a_nul_is_refused(tmp_path: Path) -> None:
+    code, message = refused(lambda: sqlite(tmp_path / "a\0b"))
+    assert code in {"F5032", "F5034"}
+    assert "\0" not in message
+
+
+def test_file_that_is_a_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "cell.journal").mkdir()
+    code, message = refused(lambda: sqlite(tmp_path))
+    assert code == "F5034"
+    assert "Is a directory" in message
+
+
+def test_write_that_fails_ends_the_journal(tmp_path: Path) -> None:
+    journal = filled(tmp_path)
+    journal.connection.execute("pragma max_page_count = 1")
+    journal.write("a", [Keep("word", "x" * 100_000)])
+    code, message = refused(journal.sync)
+    assert code == "F5034"
+    assert "full" in message
+
+
+def test_journal_without_the_file_beside_it_is_refused(tmp_path: Path) -> None:
+    filled(tmp_path).close()
+    (tmp_path / "cell.journal.generation").unlink()
+    code, message = refused(lambda: sqlite(tmp_path))
+    assert code == "F5032"
+    assert message.endswith("cell.journal.generation beside it is missing")
+
+
+HOLDER = """
+import sys, time
+from firable.executor.journal.sqlite_journal import SqliteJournal
+from firable.executor.protocol.messages import Keep
+journal = SqliteJournal(sys.argv[1], "d1", ("a", "b"))
+journal.write("a", [Keep("word", "7")])
+journal.sync()
+journal.write("a", [Keep("word", "8")])
+print("open", flush=True)
+time.sleep(60)
+"""
+
+
+def test_journal_is_locked_by_its_process_until_that_is_killed(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", HOLDER, str(tmp_path / "cell.journal")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
+        try:
+            assert holder.stdout is not None
+            assert holder.stdout.readline() == "open\n"
+            assert refused(lambda: sqlite(tmp_path)) == (
+                "F5033",
+                f"{tmp_path}/cell.journal: the journal is in use by another process",
+            )
+        finally:
+            os.kill(holder.pid, signal.SIGKILL)
+    assert sqlite(tmp_path).kept("a") == {"word": "7"}
