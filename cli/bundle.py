@@ -23,21 +23,27 @@ from firable.cli.report import Report
 @click.command(short_help="Check and prove a net, and seal it in a bundle that may run.")
 @net_argument
 @click.option("-o", "--output", metavar="FILE", required=True, help="The bundle to write.")
+@click.option("--faults", is_flag=True, help="The same under lost and doubled messages, crashes and restarts.")
+@click.option("--protocol", is_flag=True, help="Hold the proof on the voting protocol of this very net, too.")
 @analysis_options
 @page_option
 @format_option
-def bundle(net: str, output: str, page: str | None, format_: str, **limits: Any) -> int:
+def bundle(
+    net: str, output: str, page: str | None, format_: str, *, protocol: bool, faults: bool, **limits: Any
+) -> int:
     """Check NET, split it, prove the split, and write subnets, table, verdicts and evidence as one sealed file.
 
     Nothing is written unless everything that the net must prove is proved, and evidence on it was found. `firable run`
-    refuses a bundle of which any byte was changed.
+    refuses a bundle of which any byte was changed. Each bundle holds the proof on the protocol for nets of any size;
+    with --protocol and --faults it also holds one on the protocol of NET itself, step by step.
     """
     if output == "-":
         raise click.UsageError("a bundle cannot go to standard output, where the report goes: name a file")
-    return answer("bundle", format_, with_page(lambda: _report(net, output, limits), page), _show)
+    more = {"protocol": protocol, "faults": faults}
+    return answer("bundle", format_, with_page(lambda: _report(net, output, limits, more), page), _show)
 
 
-def _report(argument: str, output: str, limits: dict[str, Any]) -> Report:
+def _report(argument: str, output: str, limits: dict[str, Any], more: dict[str, bool]) -> Report:
     from firable.analysis.check import check
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
@@ -53,7 +59,7 @@ def _report(argument: str, output: str, limits: dict[str, Any]) -> Report:
         return Report("bundle", argument, net, found.verdicts, figures=found.figures.to_json(), notes=loaded.notes)
     seconds = SECONDS if allowed.seconds is None else allowed.seconds
     with loaded.placing():
-        made = make_bundle(found, Limits(Deadline.after(seconds), allowed.memory_bytes))
+        made = make_bundle(found, Limits(Deadline.after(seconds), allowed.memory_bytes), **more)
     write_bundle(output, made)
     return Report(
         "bundle",

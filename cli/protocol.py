@@ -47,7 +47,7 @@ class Answered:
 
     verdicts: tuple[Verdict, ...] = ()
     protocols: Mapping[str, ProtocolNet] = field(default_factory=dict)
-    files: Mapping[str, bytes] = field(default_factory=dict)
+    files: Mapping[str, str | bytes] = field(default_factory=dict)
     outages: tuple[Outage, ...] = ()
     refutations: tuple[Refutation, ...] = ()
 
@@ -79,9 +79,10 @@ def ask(decomposition: Decomposition, asked: Asked, seconds: float, *, evidence:
 
     verdicts: tuple[Verdict, ...] = ()
     protocols: dict[str, ProtocolNet] = {}
-    files: dict[str, bytes] = {}
+    files: dict[str, str | bytes] = {}
     if asked.protocol or asked.faults:
-        found = protocol_verdicts(decomposition, limits, faults=asked.faults)
+        timeout_ms = max(1, round(seconds * 1000))
+        found = protocol_verdicts(decomposition, limits, faults=asked.faults, timeout_ms=timeout_ms)
         verdicts, protocols = found.verdicts, found.protocols
         files = found.evidence() if evidence else {}
     dead = tuple(outages(decomposition, limits)) if asked.faults else ()

@@ -19,6 +19,7 @@ from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
 from firable.decompose.proofs.proving import TIMEOUT_MS, prove
+from firable.decompose.protocol.shown import proved_without_exploring
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import persistence
 from firable.nets.bundle import Bundle
@@ -32,11 +33,19 @@ SECONDS: Final = 30.0
 """How long evidence for the verdicts on the net is looked for, unless somebody says otherwise."""
 
 
-def make_bundle(report: CheckReport, limits: Limits | None = None, *, timeout_ms: int = TIMEOUT_MS) -> Bundle:
+def make_bundle(
+    report: CheckReport,
+    limits: Limits | None = None,
+    *,
+    timeout_ms: int = TIMEOUT_MS,
+    protocol: bool = False,
+    faults: bool = False,
+) -> Bundle:
     """Split the net of a report, prove the decomposition and bundle both with all verdicts and their evidence.
 
     `limits` are for the evidence on the verdicts of the report: what it cannot show in that time is only claimed.
-    `firable verify` will say so of a warning; a verdict that is required is no reason to run without evidence.
+    `firable verify` will say so of a warning; a verdict that is required is no reason to run without evidence. With
+    `protocol` and `faults` the bundle holds the verdicts on the protocol of this very net, too, proved by an invariant.
 
     Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the report is not that of exploring
     this net by interleaving, which is how it will be executed, and for everything that must be proved and is not, or
@@ -54,8 +63,10 @@ def make_bundle(report: CheckReport, limits: Limits | None = None, *, timeout_ms
     document = evidence_of_report(report, (), limits or Limits(Deadline.after(SECONDS)))
     named = {record.name for record in document.records if not record.lacking}
     on_the_net = (replace(v, evidence=(*v.evidence, EVIDENCE)) if v.name in named else v for v in report.verdicts)
-    verdicts = (*on_the_net, *proof.verdicts, *voted)
-    files = {EVIDENCE: document.to_text(), **proof.files, **shown}
+    families = ["explored"] * (protocol or faults) + ["faults"] * faults
+    run, obligations = proved_without_exploring(decomposition, families, timeout_ms)
+    verdicts = (*on_the_net, *proof.verdicts, *run, *voted)
+    files = {EVIDENCE: document.to_text(), **proof.files, **obligations, **shown}
     bundle = Bundle(decomposition, verdicts, files)
     if problems := unproved(bundle):
         lacking = {record.name: record.lacking for record in document.records if record.proved and record.lacking}

@@ -18,19 +18,21 @@ is as good on one cell and fails on most.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 from firable.decompose.protocol.bare import ORDER, add_bare
-from firable.decompose.protocol.draft import ASTRAY, CHANNELS, Draft, Step, at, central, late
+from firable.decompose.protocol.draft import ASTRAY, CHANNELS, Draft, Step, at, central, down, late
 from firable.decompose.protocol.faulty import add_faults, declare_faults, is_numbered
 from firable.decompose.protocol.parts import Part, Parts
 from firable.decompose.protocol.rounds import add_rounds, asked, committed, copy, decided
 from firable.decompose.protocol.variant import NO_FAULTS, PROTOCOL, Faults, Variant, Votes
 from firable.decompose.splitting.persistence import nonpersistent
 from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import And, Formula, Holds, Not, Or
 from firable.nets.net import Net, Property, PropertyKind, Transition
 
@@ -134,7 +136,7 @@ def protocol_net(decomposition: Decomposition, variant: Variant = PROTOCOL, faul
 
     Its size is linear in that of the central net and its parts, where no two parts of one controller disturb each
     other; else each such pair is an inhibitor gate more. What obeys blindly (every variant but the true one) takes two
-    to the power of the places of each part.
+    to the power of the places of each part. Raises `InputError` F2001 where two names of the net would make one place.
 
     >>> from firable.decompose.splitting.cut import split
     >>> from firable.nets.catalogue import catalogue_net
@@ -143,6 +145,7 @@ def protocol_net(decomposition: Decomposition, variant: Variant = PROTOCOL, faul
     (298, True, 'G2 is decided')
     """
     parts = Parts(decomposition, variant)
+    _require_distinct(parts)
     draft = Draft(decomposition.net, onward=not variant.is_true)
     channels = _channels(parts)
     _declare(draft, parts, faults)
@@ -162,6 +165,21 @@ def protocol_net(decomposition: Decomposition, variant: Variant = PROTOCOL, faul
 def _channels(parts: Parts) -> tuple[str, ...]:
     """The kinds of messages that there are."""
     return CHANNELS if parts.variant.acknowledged else (ORDER,)
+
+
+def _require_distinct(parts: Parts) -> None:
+    """Refuse names that make one place of two, as those of the parts of `a/b` at `c` and of `a` at `b/c`."""
+    own, part_of = [place.name for place in parts.net.places], parts.coordinated.items()
+    made = [*own, *map(central, own), ASTRAY, *(down(subnet.name) for subnet in parts.decomposition.subnets)]
+    made += [name(t) for t in parts.coordinated for name in (asked, committed)]
+    made += [decided(parts, group[0]) for group in parts.groups]
+    made += [at(kind, part) for _, its in part_of for part in its for kind in _MEMORY]
+    for place, times in Counter(made).items():
+        if times > 1:
+            message = f"two names of the net make one place of the net of its protocol, '{place}'"
+            raise InputError(
+                [Diagnostic("F2001", message, "rename one of them; names without `/` and `+` never do so")]
+            )
 
 
 def _gathered(parts: Parts) -> Iterator[Transition]:

@@ -33,7 +33,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, Final
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.goal import Limits
@@ -50,6 +50,8 @@ from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.player import Player
 
 COORDINATOR = "coordinator"
+WHILE_FAULTS: Final = "while messages are lost and doubled, and controllers and the coordinator crash and restart"
+RESUMES: Final = "when faults have ceased, whatever the central net may fire next, the protocol can fire next"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,15 +84,15 @@ def fault_exploration(decomposition: Decomposition, limits: Limits | None = None
 
 def fault_verdicts(found: Exploration) -> tuple[Verdict, ...]:
     """The verdicts on faults that pass: safe while they last, and nothing lost when they have ceased."""
-    faults = "while messages are lost and doubled, and controllers and the coordinator crash and restart"
     safe = [
         replace(
-            verdict, name=f"faults.{verdict.name.removeprefix('explored.')}", statement=f"{verdict.statement}, {faults}"
+            verdict,
+            name=f"faults.{verdict.name.removeprefix('explored.')}",
+            statement=f"{verdict.statement}, {WHILE_FAULTS}",
         )
         for verdict in found.safety
     ]
-    resumes = "when faults have ceased, whatever the central net may fire next, the protocol can fire next"
-    return (*safe, replace(found.complete, name="faults.resumes", statement=resumes))
+    return (*safe, replace(found.complete, name="faults.resumes", statement=RESUMES))
 
 
 def outages(decomposition: Decomposition, limits: Callable[[], Limits] = Limits) -> Iterator[Outage]:

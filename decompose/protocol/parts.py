@@ -2,7 +2,7 @@
 
 A part is what one controller has of a coordinated transition: a transition of its subnet. Two parts *disturb* each
 other if firing one could change what the other reads (O1). What can never fire (no valuation opens its external gates,
-or a place is both its input and its output) takes no part in anything and is left out.
+or Eq. (1) wants a place both full and empty) takes no part in anything and is left out.
 
 The variants that break the split itself are made here, so that the steps need not know of them: with copies of gates,
 who owns only gates takes no part, and one of the others reads a copy; without arbitration, the local members of a
@@ -63,8 +63,12 @@ class Parts:
 
     @cached_property
     def transitions(self) -> tuple[Transition, ...]:
-        """The transitions that can fire at all, by openable gates and no self-loop."""
-        return tuple(t for t in self.net.transitions if t.openable and not t.self_loops)
+        """The transitions that can fire at all: their gates can open, and no place has to be full and empty at once."""
+        return tuple(
+            t
+            for t in self.net.transitions
+            if t.openable and {*t.inputs, *t.permissive}.isdisjoint((*t.outputs, *t.inhibitive))
+        )
 
     @cached_property
     def copies(self) -> tuple[tuple[str, str], ...]:

@@ -11,7 +11,8 @@ import pytest
 from firable.analysis._engine import BudgetExceeded
 from firable.cli.main import main
 from firable.cli.prove import show_obligations
-from firable.decompose.protocol import exploring
+from firable.decompose.protocol import exploring, verdicts
+from firable.decompose.protocol.inductive_script import Proof
 from firable.nets.verdict import Status, Verdict
 
 NET = """\
@@ -77,10 +78,20 @@ def test_what_is_not_decided_in_time_is_told_with_the_option_for_more(
 ) -> None:
     monkeypatch.setattr(exploring, "FIRST_MARKINGS", 50)
     monkeypatch.setattr(exploring, "explore_symbolically", _given_up)
+    monkeypatch.setattr(verdicts, "prove_inductively", lambda *_: Proof("", frozenset({"starts", "divergence"})))
     assert main(["prove", net, "--protocol", "--timeout", "0.001"]) == 3
     told = capsys.readouterr().out
     assert "give each exploration more time (--timeout)" in told
     assert "no decision diagram: the budget of time is used up after" in told
+
+
+def test_what_exploring_leaves_open_is_decided_by_the_invariant(
+    capsys: pytest.CaptureFixture[str], net: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exploring, "FIRST_MARKINGS", 50)
+    monkeypatch.setattr(exploring, "explore_symbolically", _given_up)
+    assert main(["prove", net, "--protocol"]) == 0
+    assert "✓ proved    explored.complete" in capsys.readouterr().out
 
 
 def test_obligations_that_are_unknown_are_no_violations(capsys: pytest.CaptureFixture[str]) -> None:

@@ -182,4 +182,4 @@ def test_evidence_for_the_protocol_is_checked_by_who_knows_nothing_of_protocols(
 
 def test_evidence_is_a_file_for_each_exploration() -> None:
     found = protocol_verdicts(split(load_net("local_gate")))
-    assert list(found.evidence()) == ["protocol.evidence.json"]
+    assert list(found.evidence()) == ["explored.smt2", "protocol.evidence.json"]

@@ -1,0 +1,321 @@
+"""What must be proved of the voting protocol of one net, stated anew: the whole file, byte for byte.
+
+The second text of `firable.decompose.protocol.inductive`: the invariant and what is still to be done as tables of
+words, which mean the places that `voting` gives them, and each obligation as docs/protocol.md has it. There is one such
+file for a net. Whether the invariant is a good one needs no second opinion, since the solver is asked whether the steps
+keep it. What has to be right here is that these are the steps of this net's protocol, and that these are the questions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+from firable.decompose.verification.formulas import spelled
+from firable.decompose.verification.voting import ASTRAY, GO_ON, HOME, REPEATS, Part, Step, Voting, central
+from firable.nets.source import printable
+
+KINDS: Final = {
+    "starts": "the invariant holds at the start",
+    "keeps": "the step keeps the invariant",
+    "follows": "whatever fires, the central net can fire",
+    "agrees": "where no order is on its way, the controllers hold the central marking",
+    "orders-fit": "an order finds its part firable",
+    "one-token": "the step would fill a full place only where the central net has contact",
+    "home": "without faults, a step homeward can be taken, or all is at rest",
+    "homeward": "the step leaves less to be done",
+    "way": "from rest, what the central net can fire is fired by these steps",
+    "divergence": "every step that fires nothing, but for asking, ordering and giving up, lowers the weighted sum",
+}
+"""The kinds of obligations, and what each says."""
+
+_ALWAYS: Final = """
+    request > asked; vote > asked; promised > asked; obeyed > asked; abort-order > asked; obeyed > decided;
+    abort-order > decided; acknowledgement > obeyed; noted > obeyed; vote > promised obeyed; heard > promised;
+    heard > -committed; promised > -obeyed; committed > promised obeyed; commit-order > committed;
+    abort-order > -committed; abort-order > -heard
+"""
+"""Of each part: where the first is, one of the others is; with a minus, is not."""
+
+_TO_DO: Final = """
+    request; vote; asked -noted; asked -noted -acknowledgement;
+    asked -noted -acknowledgement -commit-order -abort-order;
+    asked -noted, asked commit-order, asked abort-order, asked acknowledgement;
+    asked -noted, asked commit-order, asked abort-order;
+    asked -noted, asked commit-order acknowledgement, asked abort-order acknowledgement
+"""
+"""Of each part, what is still to be done: one of these, of which all is so."""
+
+_WEIGHTS: Final = {"request": 4, "commit-order": 4, "abort-order": 4, "vote": 2, "acknowledgement": 2} | dict.fromkeys(
+    ("heard", "promised", "noted", "obeyed"), 1
+)
+
+INVARIANT: Final = "|the invariant|"
+OPEN: Final = "|something is open|"
+
+Literals = frozenset[tuple[str, bool]]
+Sentence = frozenset[Literals]
+
+
+def _any(literals: Iterable[tuple[str, bool]]) -> Sentence:
+    return frozenset(frozenset([literal]) for literal in literals)
+
+
+def _conjunction(texts: Iterable[str]) -> str:
+    found = sorted(set(texts))
+    return found[0] if len(found) == 1 else f"(and {' '.join(found)})" if found else "true"
+
+
+def _disjunction(texts: Iterable[str]) -> str:
+    found = sorted(set(texts))
+    return found[0] if len(found) == 1 else f"(or {' '.join(found)})" if found else "false"
+
+
+def _symbol(place: str) -> str:
+    return f"|{spelled(place)}|"
+
+
+def _literal(place: str, full: bool) -> str:
+    return _symbol(place) if full else f"(not {_symbol(place)})"
+
+
+def _all(literals: Iterable[tuple[str, bool]]) -> str:
+    return _conjunction(_literal(*one) for one in literals)
+
+
+def _text(sentence: Sentence) -> str:
+    return _disjunction(map(_all, sentence))
+
+
+def _demanded(step: Step) -> list[tuple[str, bool]]:
+    return [(place, wanted) for place, values in step.demands.items() for wanted in values]
+
+
+def _changes(step: Step) -> dict[str, bool]:
+    return dict.fromkeys(step.takes, False) | dict.fromkeys(step.puts, True)
+
+
+def _then(step: Step, text: str) -> str:
+    changes = " ".join(sorted(f"({_symbol(p)} {'true' if full else 'false'})" for p, full in _changes(step).items()))
+    return f"(let ({changes}) {text})" if changes else text
+
+
+@dataclass(frozen=True)
+class Obligations:
+    """The file on the protocol of a net."""
+
+    voting: Voting
+
+    @property
+    def family(self) -> str:
+        """The family of the verdicts that it shows, and the name of the file."""
+        return "faults" if self.voting.faults else "explored"
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The name of each obligation, in their order."""
+        return tuple(name for name, _ in self._blocks)
+
+    @cached_property
+    def text(self) -> str:
+        """The file."""
+        start, *others = (
+            f'\n; {KINDS[name.partition(".")[0]]}\n(push 1)\n(echo "{spelled(name)}")\n'
+            + "".join(f"(assert {one})\n" for one in asserted)
+            + "(check-sat)\n(pop 1)\n"
+            for name, asserted in self._blocks
+        )
+        return "".join((self._head(), start, f"\n(assert {INVARIANT})\n", *others))
+
+    def _head(self) -> str:
+        net, under = self.voting.cut.net.name, ", under faults" if self.voting.faults else ""
+        comments = (
+            f"{self.family} of the protocol of '{net}'{under}: it does what the central net does",
+            "Each block asserts that its sentence does not hold, so the answer `unsat` proves it.",
+            "The constants: a place of the protocol's net holds a token; `let` says what a step changes.",
+            "To check it with another solver: cvc5 --incremental FILE, or z3 FILE; every name is followed by `unsat`.",
+        )
+        lines = [*(f"; {printable(comment)}" for comment in comments), "(set-logic QF_LIA)"]
+        lines += [f"(declare-const {_symbol(place)} Bool)" for place in sorted(self.voting.places)]
+        defined = {INVARIANT: _conjunction(map(_text, self._invariant)), OPEN: self._open}
+        defined |= {symbol: _text(fact) for fact, symbol in self._facts.items()}
+        lines += [f"(define-fun {symbol} () Bool {text})" for symbol, text in defined.items()]
+        return "".join(f"{line}\n" for line in lines)
+
+    @cached_property
+    def _blocks(self) -> tuple[tuple[str, list[str]], ...]:
+        return (
+            ("starts", [_all(self.voting.places.items()), f"(not {INVARIANT})"]),
+            *self._keeping(),
+            *self._safe(),
+            *(() if self.voting.faults else self._tokens()),
+            *self._home(),
+            *self._ways(),
+            *(() if self.voting.faults else [("divergence", [f"(not {_conjunction(self._falling())})"])]),
+        )
+
+    # --- The invariant, and what is still to be done
+
+    def _literals(self, part: Part, words: str) -> Literals:
+        of = {"asked": f"asked/{part.whole}", "committed": f"committed/{part.whole}"}
+        of["decided"] = self.voting.decided(part.whole)
+        bare = ((word.removeprefix("-"), not word.startswith("-")) for word in words.split())
+        return frozenset((of.get(word, part.at(word)), full) for word, full in bare)
+
+    @cached_property
+    def _invariant(self) -> tuple[Sentence, ...]:
+        return tuple({*self._of_rounds(), *self._of_parts(), *self._of_markings()})
+
+    def _of_rounds(self) -> Iterator[Sentence]:
+        yield _any([(ASTRAY, False)])
+        for group in self.voting.groups:
+            over = self.voting.decided(group[0])
+            for t in group:
+                yield _any([(f"committed/{t}", False), (f"asked/{t}", True)])
+                yield _any([(f"committed/{t}", False), (over, True)])
+                yield from (_any([(f"committed/{t}", False), (f"committed/{u}", False)]) for u in group if u != t)
+            if len(group) == 1:
+                yield _any([(over, False), (f"asked/{group[0]}", True)])
+
+    def _of_parts(self) -> Iterator[Sentence]:
+        for part in self.voting.all_parts:
+            for rule in _ALWAYS.split(";"):
+                given, then = (self._literals(part, words) for words in rule.split(">"))
+                yield _any([*((place, not full) for place, full in given), *then])
+            promised, own = (part.at("promised"), False), part.own
+            needs = [(p, True) for p in (*own.inputs, *own.permissive)]
+            for need in (*needs, *((p, False) for p in (*own.outputs, *own.inhibitive))):
+                yield _any([promised, (self.voting.decided(part.whole), True), need])
+                yield _any([promised, (f"committed/{part.whole}", False), need])
+            yield from (_any([promised, (other, False)]) for other in self.voting.others(part))
+
+    def _of_markings(self) -> Iterator[Sentence]:
+        movers: dict[tuple[str, bool], list[Literals]] = {}
+        for part in self.voting.all_parts:
+            underway = self._literals(part, "committed -obeyed")
+            for moved in part.writes:
+                taken = moved in part.own.inputs  # then it holds a token that the central net has not any more
+                movers.setdefault((moved, taken), []).append(underway)
+                yield _any([*((p, not full) for p, full in underway), (central(moved), not taken)])
+        for place in self.voting.cut.net.places:
+            for full in (True, False):
+                name = place.name
+                same = _any([(name, not full), (central(name), full)])
+                yield same | frozenset(movers.get((name, full), ()))
+
+    @cached_property
+    def _facts(self) -> dict[Sentence, str]:
+        return {fact: f"|to do {i}|" for i, fact in enumerate(sorted(set(self._to_do()), key=_text), 1)}
+
+    def _to_do(self) -> Iterator[Sentence]:
+        for group in self.voting.groups:
+            over = self.voting.decided(group[0])
+            yield _any([(over, True), *((f"asked/{t}", True) for t in group)])
+            yield from (_any([(f"asked/{t}", True)]) for t in group)
+            yield from (frozenset([frozenset([(f"asked/{t}", True), (over, False)])]) for t in group)
+        for part in self.voting.all_parts:
+            for fact in _TO_DO.split(";"):
+                yield frozenset(self._literals(part, words) for words in fact.split(","))
+        if self.voting.faults:
+            yield from (_any([(place, True)]) for place in self._faulty())
+
+    def _faulty(self) -> Iterator[str]:
+        yield from ("coordinator-down", "late-copy-of-old-round")
+        yield from (f"down/{subnet.name}" for subnet in self.voting.cut.subnets)
+
+    # --- The obligations
+
+    def _keeping(self) -> Iterator[tuple[str, list[str]]]:
+        written: dict[tuple[str, bool], list[str]] = {}
+        for sentence in self._invariant:
+            text = _text(sentence)
+            for literal in {literal for term in sentence for literal in term}:
+                written.setdefault(literal, []).append(text)
+        for name, step in self.voting.steps.items():
+            broken = (text for place, full in _changes(step).items() for text in written.get((place, not full), ()))
+            yield f"keeps.{name}", [_all(_demanded(step)), f"(not {_then(step, _conjunction(broken))})"]
+
+    def _safe(self) -> Iterator[tuple[str, list[str]]]:
+        yield "follows", [_symbol(ASTRAY)]
+        yield "agrees", [_all((self.voting.decided(group[0]), False) for group in self.voting.groups), self._differs]
+        cases = []
+        for part in self.voting.all_parts:
+            own = part.own
+            missing = [(place, False) for place in (*own.inputs, *own.permissive)]
+            in_the_way = [(place, True) for place in (*own.outputs, *own.inhibitive)]
+            there = _symbol(part.at("commit-order")), _symbol(part.at("promised"))
+            cases.append(_conjunction([*there, _disjunction(_literal(*one) for one in (*missing, *in_the_way))]))
+        if cases:
+            yield "orders-fit", [_disjunction(cases)]
+
+    @cached_property
+    def _differs(self) -> str:
+        pairs = ((_symbol(place.name), _symbol(central(place.name))) for place in self.voting.cut.net.places)
+        return _disjunction(f"(not (= {here} {there}))" for here, there in pairs)
+
+    @cached_property
+    def _open(self) -> str:
+        net = {name for place in self.voting.cut.net.places for name in (place.name, central(place.name))}
+        return _disjunction([*(_symbol(p) for p in self.voting.places if p not in net and p != GO_ON), self._differs])
+
+    def _tokens(self) -> Iterator[tuple[str, list[str]]]:
+        for name, step in self.voting.steps.items():
+            given = [*((p, True) for p in step.takes | step.full), *((p, False) for p in step.empty)]
+            texts = [_literal(*one) for one in given]
+            if step.fires:
+                t = self.voting.cut.net.transition(step.fires)
+                around = [*((p, True) for p in (*t.inputs, *t.permissive)), *((p, False) for p in t.inhibitive)]
+                contact = [_literal(central(p), full) for p, full in around]
+                contact.append(_disjunction(_symbol(central(p)) for p in t.outputs))
+                texts.append(f"(not {_conjunction(contact)})")
+            if step.puts:
+                yield f"one-token.{name}", [_conjunction(texts), _disjunction(map(_symbol, step.puts))]
+
+    @property
+    def _ceased(self) -> list[str]:
+        return [f"(not {_symbol(GO_ON)})"] if self.voting.faults else []
+
+    def _home(self) -> Iterator[tuple[str, list[str]]]:
+        ways = {}
+        for name, step in self.voting.steps.items():
+            if HOME in step.kind:
+                orders = (p.split("/", 1) for p in step.puts if p.startswith(("commit-order/", "abort-order/")))
+                ways[name] = _all([*_demanded(step), *((f"acknowledgement/{part}", False) for _, part in orders)])
+        yield "home", [*self._ceased, OPEN, f"(not {_disjunction(ways.values())})"]
+        at: dict[tuple[str, bool], set[Sentence]] = {}
+        for fact in self._facts:
+            for literal in {literal for term in fact for literal in term}:
+                at.setdefault(literal, set()).add(fact)
+        for name, way in ways.items():
+            changes = _changes(self.voting.steps[name])
+            up = {fact for place, full in changes.items() for fact in at.get((place, full), ())}
+            down = {fact for place, full in changes.items() for fact in at.get((place, not full), ())}
+            no_more = [f"(or {self._facts[fact]} (not {_text(fact)}))" for fact in up]
+            one_less = _disjunction(f"(and {self._facts[fact]} (not {_text(fact)}))" for fact in down)
+            less = _then(self.voting.steps[name], _conjunction([*no_more, one_less]))
+            yield f"homeward.{name}", [way, f"(not {less})"]
+
+    def _ways(self) -> Iterator[tuple[str, list[str]]]:
+        for t in sorted(self.voting.transitions, key=lambda t: t.name):
+            text = "true"
+            for step in reversed(self.voting.way(t.name)):
+                text = _conjunction([*(_literal(*one) for one in _demanded(step)), _then(step, text)])
+            can = [(central(p), True) for p in (*t.inputs, *t.permissive)]
+            can += [(central(p), False) for p in (*t.outputs, *t.inhibitive)]
+            yield f"way.{t.name}", [*self._ceased, _all(can), f"(not {OPEN})", f"(not {text})"]
+
+    def _falling(self) -> Iterator[str]:
+        weights = {part.at(kind): weight for part in self.voting.all_parts for kind, weight in _WEIGHTS.items()}
+        for t in self.voting.parts:
+            weights |= {f"asked/{t}": -1, f"committed/{t}": 1, self.voting.decided(t): 1}
+        for step in self.voting.steps.values():
+            if not step.fires and REPEATS not in step.kind:
+                yield f"(< {_sum(weights, step.puts)} {_sum(weights, step.takes)})"
+
+
+def _sum(weights: Mapping[str, int], places: Iterable[str]) -> str:
+    some = [weights[place] for place in sorted(places) if place in weights]
+    texts = [str(weight) if weight >= 0 else f"(- {-weight})" for weight in some]
+    return texts[0] if len(texts) == 1 else f"(+ {' '.join(texts)})" if texts else "0"
