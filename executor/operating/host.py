@@ -1,0 +1,484 @@
+"""A host: one process with some machines of a cell, its driver, its journal, and the link to the other hosts.
+
+Machines are pure, and so are their acts: a message, a signal, or the next local firing goes in, effects come out. This
+file is the edge around them. All acts of one turn of the event loop are one *group*: what a machine says to another one
+in the same process is its next act, since a crash loses both or none; then the journal is synced, once; then what
+leaves the host leaves it, in the order of the acts: lines of the trace, commands, messages (`journal.py` says why that
+is right). Nothing waits inside an act, and no act waits for the disk of another group.
+
+*Repeats*: what is unanswered is repeated every `resend_seconds`, and at once when a lost peer is back. *Watching*: a
+peer that is lost, or refused, is told, and what waits for it is named (`waits`); nothing else changes, because a
+controller that has promised waits for the decision whoever is gone (O6), and one that has not goes on alone as far as
+its own transitions go. A driver's fault or an overdue command ends the host: its outputs are made safe, and the others
+see it lost.
+
+*Stop*: nothing more is asked, promised or fired, and the host waits, for a while, until what was decided is applied and
+acknowledged. Only then its trace has a last line; one without says honestly that something was open.
+
+After a restart the controllers are held, and the driver is asked after every command that was under way; `resume` is
+the operator's. Rejected: one process for each of driver, controller and link. Their crashes would be independent, and
+every pair of them would need a protocol like the one between hosts.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from typing import Final, assert_never
+
+from firable.executor.drivers.driver import Driver
+from firable.executor.journal.journal import Journal
+from firable.executor.links.link import COORDINATOR, Link, called
+from firable.executor.operating.execution import FIRINGS_AT_ONCE_MAX, RunClock
+from firable.executor.operating.host_trace import TRACE, HostTrace
+from firable.executor.operating.situation import Blocked, Situation, State, blocked
+from firable.executor.protocol.commands import Answer
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.messages import (
+    Acknowledgement,
+    Decision,
+    Effect,
+    Firing,
+    Hello,
+    Keep,
+    Message,
+    ProtocolError,
+    Report,
+    Sending,
+    Taken,
+    ToController,
+    ToCoordinator,
+    Vote,
+    VoteRequest,
+)
+from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import Diagnostic
+
+RESEND_SECONDS: Final = 0.2
+SETTLE_SECONDS: Final = 2.0
+ACTS_AT_ONCE_MAX: Final = 1000
+"""So many acts are one group at most; then they become durable, and the link and the driver have their turn."""
+
+
+@dataclass(frozen=True, slots=True)
+class SignalRead:
+    """A driver's word to a controller: a new value of one of its signals."""
+
+    signal: str
+    value: bool
+    entry: int | None
+
+
+Told = Callable[[str, str], None]
+"""Who is told what happens to the host: the kind (`connected`, `lost`, `refused`, `held`, ...), and a sentence."""
+
+
+class Host:
+    """Some machines of a decomposition; `main` runs them until they are stopped or fail."""
+
+    def __init__(
+        self,
+        decomposition: Decomposition,
+        machines: Collection[str],
+        driver: Driver,
+        link: Link,
+        trace: HostTrace,
+        journal: Journal,
+        *,
+        overdue_seconds: float = 120.0,
+        resend_seconds: float = RESEND_SECONDS,
+        settle_seconds: float = SETTLE_SECONDS,
+        tell: Told | None = None,
+    ) -> None:
+        self.net = decomposition.net
+        self.driver = driver
+        self.link = link
+        self.trace = trace
+        self.journal = journal
+        self.overdue_seconds = overdue_seconds
+        self.resend_seconds = resend_seconds
+        self.settle_seconds = settle_seconds
+        self.tell = tell
+        self.coordinator: Coordinator | None = None
+        if COORDINATOR in machines:
+            self.coordinator = Coordinator.restored(decomposition, journal.kept(COORDINATOR))
+        self.controllers = {
+            subnet.name: LocalController.restored(decomposition, subnet.name, journal.kept(subnet.name))
+            for subnet in decomposition.subnets
+            if subnet.name in machines
+        }
+        self.owner_of = {
+            signal.name: name for name in self.controllers for signal in decomposition.subnet(name).signals
+        }
+        self.peers = {COORDINATOR, *(subnet.name for subnet in decomposition.subnets)} - set(machines)
+        """The machines of other hosts."""
+        self.connected_to: set[str] = set()
+        self.posted: deque[tuple[str, Message | SignalRead | None]] = deque()
+        """What the machines here are given next; None is their turn to fire."""
+        self.leaving: list[Effect] = []
+        """What leaves the host when this group is durable."""
+        self.unsynced = False
+        self.working = False
+        self.firing = dict.fromkeys(self.controllers, 0)
+        """How often each has fired without anything from outside."""
+        self.stopping = False
+        self.fault = ""
+        self.messages = 0
+        self.repeats = 0
+        self.overdue: dict[str, asyncio.TimerHandle] = {}
+        """For each completion signal, the alarm of the command that it completes."""
+        self.outcome: asyncio.Future[Situation] | None = None
+
+    # The run
+
+    async def main(self) -> Situation:
+        """Run until stopped, by `stop` or by cancelling, or until something fails; returns how it ended.
+
+        Raises `InputError` where the link, the journal or the trace fails; the safe outputs are driven before.
+        """
+        loop = asyncio.get_running_loop()
+        self.outcome = loop.create_future()
+        clock = RunClock(loop, loop.time(), 1.0)
+        self.trace.run_by(loop.time)
+        tasks = [
+            asyncio.create_task(self.link.run(self), name="link"),
+            asyncio.create_task(self.driver.run(clock, self), name="driver"),
+            asyncio.create_task(self._repeat(), name="repeats"),
+            asyncio.create_task(self._ask(), name="questions"),
+        ]
+        for task in tasks:
+            task.add_done_callback(self._task_ended)
+        try:
+            if self.coordinator is not None:
+                self._act(COORDINATOR, self.coordinator.start())
+            for name, controller in self.controllers.items():
+                self._act(name, controller.start())
+                self._post(name, None)
+            return await asyncio.shield(self.outcome)
+        except asyncio.CancelledError:
+            self.stop()  # Ctrl-C, or a request to terminate: the host ends in order
+            return await self.outcome
+        finally:
+            self.driver.stop()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            for alarm in self.overdue.values():
+                alarm.cancel()
+
+    def situation(self) -> Situation:
+        """What the host is doing, and what waits for what, as far as its machines know."""
+        found: list[Blocked] = []
+        for controller in self.controllers.values():
+            found += blocked(controller.player, controller.word)
+        message = self.fault or "; ".join(self.waits())
+        state = State.FAULT if self.fault else State.STOPPED if self.stopping else State.WAITING
+        return Situation(state, self.marking, tuple(found), message)
+
+    @property
+    def marking(self) -> tuple[str, ...]:
+        """The places of the machines here that hold a token."""
+        return tuple(p for c in self.controllers.values() for p in c.subnet.names(c.marking))
+
+    def waits(self) -> Iterator[str]:
+        """What waits for another machine, in a sentence each."""
+        if self.coordinator is not None:
+            for opened in self.coordinator.rounds.values():
+                what = opened.committed or " or ".join(opened.transitions)
+                for name in opened.participants:
+                    if opened.decided and name not in opened.acknowledged:
+                        yield f"{what} has fired, and waits for {self._called(name)} to apply it"
+                    elif not opened.decided and name not in opened.votes:
+                        yield f"{what} waits for the vote of {self._called(name)}"
+        for name, controller in self.controllers.items():
+            for promise in controller.promises.values():
+                if promise.promised:
+                    what = " or ".join(sorted(promise.promised))
+                    yield f"{called(name)} has promised {what}, and waits for {self._called(COORDINATOR)} to decide"
+            if controller.held:
+                yield f"{called(name)} is held after a restart, until it is resumed"
+
+    # What the operator may do
+
+    def stop(self) -> None:
+        """Let nothing more fire, and end when nothing is open, or after `settle_seconds`."""
+        if not self.stopping:
+            self.stopping = True
+            self.trace.note("stopped by the operator")
+            if self.coordinator is not None:
+                self._act(COORDINATOR, self.coordinator.permit(0))
+            asyncio.get_running_loop().call_later(self.settle_seconds, self._end)
+            self._wake()
+
+    def resume(self) -> bool:
+        """End the hold of the controllers after a restart; those with a command that nobody knows of stay held."""
+        for name, controller in self.controllers.items():
+            if controller.held and not controller.commands.questions:
+                self.trace.note("resumed", controller=name)
+                self._act(name, controller.resume())
+                self._post(name, None)
+        return not any(controller.held for controller in self.controllers.values())
+
+    def answer(self, controller: str, place: str, entry: int, answer: Answer) -> None:
+        """Say what became of a command that was under way when the host was restarted."""
+        self._act(controller, self.controllers[controller].answer(place, entry, answer))
+
+    # What the driver tells
+
+    def signal(self, name: str, value: bool, entry: int | None) -> None:
+        """A signal has a new value."""
+        if entry is not None and (alarm := self.overdue.pop(name, None)) is not None:
+            alarm.cancel()
+        self._post(self.owner_of[name], SignalRead(name, value, entry))
+
+    def driver_fault(self, machine: str, message: str) -> None:
+        """A machine has failed."""
+        self._fail(f"{machine}: {message}" if machine else message)
+
+    def driver_note(self, machine: str, message: str) -> None:
+        """What a driver says of a machine or its link stands in the trace."""
+        self._told("driver", f"{machine}: {message}")
+
+    def moved(self) -> None:
+        """Nothing: a host does not end because its machines rest."""
+
+    # What the link tells
+
+    def arrived(self, sender: str, receiver: str, message: Message) -> None:
+        """A message of another host; what its sender may not say is dropped."""
+        is_order = isinstance(message, ToController)
+        if (sender, receiver) != ((COORDINATOR, message.controller) if is_order else (message.controller, COORDINATOR)):
+            self._told("dropped", f"{called(sender)} sent a {type(message).__name__} that is not its to send")
+            return
+        self._post(receiver, message)
+
+    def connected(self, peer: str) -> None:
+        """A peer can be reached: what it has missed is said again."""
+        if peer in self.peers:
+            self.connected_to.add(peer)
+            self._told("connected", f"{called(peer)} is connected")
+            self._say_again()
+
+    def lost(self, peer: str) -> None:
+        """A peer can no longer be reached."""
+        if peer in self.peers:
+            self.connected_to.discard(peer)
+            waiting = [sentence for sentence in self.waits() if self._called(peer) in sentence]
+            self._told("lost", "; ".join([f"{called(peer)} is lost", *waiting]))
+
+    def refused(self, peer: str, problem: Diagnostic) -> None:
+        """A host was refused."""
+        self._told("refused", f"{called(peer)} is refused: {problem.message}; {problem.hint}")
+
+    # Acts
+
+    def _post(self, machine: str, item: Message | SignalRead | None) -> None:
+        self.posted.append((machine, item))
+        self._wake()
+
+    def _wake(self) -> None:
+        if not self.working and self.outcome is not None and not self.outcome.done():
+            self.working = True
+            asyncio.get_running_loop().call_soon(self._work)
+
+    def _work(self) -> None:
+        """One group: acts until nothing is posted, then the journal, then what leaves."""
+        self.working = False
+        try:
+            for _ in range(min(len(self.posted) + ACTS_AT_ONCE_MAX, ACTS_AT_ONCE_MAX)):
+                if not self.posted:
+                    break
+                self._give(*self.posted.popleft())
+            self._leave()
+        except Exception as error:  # a callback has no caller: it must end the run, as an error in a task does
+            self._broken(error)
+            return
+        if self.posted:
+            self._wake()
+        elif self.stopping and self._is_settled() and (self.coordinator is None or self.coordinator.idle):
+            self._end()
+
+    def _give(self, machine: str, item: Message | SignalRead | None) -> None:
+        """One act of one machine, and its turn to fire and to report."""
+        if isinstance(item, ToCoordinator):
+            if self.coordinator is None:
+                raise ProtocolError(f"there is no coordinator here for {item!r}")
+            self._act(COORDINATOR, self.coordinator.receive(item))
+            return
+        controller = self.controllers[machine]
+        match item:
+            case VoteRequest() if self.stopping:
+                return  # as if it had been lost
+            case Decision():
+                promised = item.round in controller.promises and item.committed in controller.parts
+                effects = controller.receive(item)
+                if promised:
+                    self.trace.applied(machine, item.round)
+                self._act(machine, effects)
+            case VoteRequest() | Hello():
+                known = item.round in controller.promises if isinstance(item, VoteRequest) else True
+                effects = controller.receive(item)
+                if not known and isinstance(item, VoteRequest) and (given := controller.promises.get(item.round)):
+                    self.trace.voted(machine, item.round, given.promised)
+                self._act(machine, effects)
+            case SignalRead(signal, value, entry):
+                self._act(machine, controller.read(signal, value, entry))
+        self.firing[machine] = self.firing[machine] + 1 if item is None else 0
+        if self.firing[machine] > FIRINGS_AT_ONCE_MAX:
+            self._fail(f"'{machine}' fires without end, and no gate ever holds it")
+        if not self.stopping and (fired := controller.fire()):
+            self._act(machine, fired)
+            self.posted.append((machine, None))
+        self._act(machine, controller.report())
+
+    def _act(self, machine: str, effects: list[Effect]) -> None:
+        """Take the effects of one act: writes to the journal, messages to machines here, the rest to those who wait."""
+        if not effects:
+            return
+        self.journal.write(machine, effects)
+        rounds = {effect.committed: effect.round for effect in effects if isinstance(effect, Decision)}
+        for effect in effects:
+            match effect:
+                case Keep():
+                    self.unsynced = True
+                case Firing(transition):
+                    self.trace.fired(transition, rounds.get(transition) if machine == COORDINATOR else None)
+                case Taken(signal, value):
+                    self.trace.signal(signal, value)
+                case Sending(place, _, again):
+                    if again:
+                        self.trace.note("sent again", place=place)  # it stands in the trace as sent
+                    else:
+                        self.trace.sent(place)
+                    self.leaving.append(effect)
+                case VoteRequest() | Decision() | Hello():
+                    self._say(effect.controller, effect)
+                case Report() | Vote() | Acknowledgement():
+                    self._say(COORDINATOR, effect)
+                case _:
+                    assert_never(effect)
+        self._wake()
+
+    def _say(self, receiver: str, message: Message) -> None:
+        self.messages += 1
+        if (receiver == COORDINATOR and self.coordinator is not None) or receiver in self.controllers:
+            self.posted.append((receiver, message))
+        else:
+            self.leaving.append(message)
+
+    def _leave(self) -> None:
+        """Make the group durable, then let go of what leaves the host."""
+        if self.unsynced:
+            self.journal.write(TRACE, self.trace.keep())
+            self.journal.sync()
+            self.unsynced = False
+        self.trace.flush()
+        leaving, self.leaving = self.leaving, []
+        for effect in leaving:
+            match effect:
+                case Sending(place, entry):
+                    self._send(place, entry)
+                case VoteRequest() | Decision() | Hello():
+                    self.link.send(COORDINATOR, effect.controller, effect)
+                case Report() | Vote() | Acknowledgement():
+                    self.link.send(effect.controller, COORDINATOR, effect)
+
+    def _send(self, place: str, entry: int) -> None:
+        sender = self.net.place(place)
+        if sender.completion is not None:
+            if (earlier := self.overdue.pop(sender.completion, None)) is not None:
+                earlier.cancel()
+            self.overdue[sender.completion] = asyncio.get_running_loop().call_later(
+                self.overdue_seconds, self._overdue, place
+            )
+        self.driver.send(sender, entry)
+        owner = str(sender.owner)
+        self._act(owner, self.controllers[owner].sent(place, entry))
+
+    # Time
+
+    async def _repeat(self) -> None:
+        while True:
+            await asyncio.sleep(self.resend_seconds)
+            self._say_again()
+
+    def _say_again(self) -> None:
+        """Repeat what is unanswered."""
+        before = self.messages
+        if self.coordinator is not None:
+            self._act(COORDINATOR, self.coordinator.resend())
+        for name, controller in self.controllers.items():
+            self._act(name, controller.resend())
+        self.repeats += self.messages - before
+
+    async def _ask(self) -> None:
+        """Ask the driver what became of the commands that were under way at a crash."""
+        for name, controller in self.controllers.items():
+            for place, entry in controller.commands.questions:
+                said = await self.driver.ask(self.net.place(place), entry)
+                self.answer(name, place, entry, Answer(said.value))
+                if said.value == Answer.UNKNOWN:
+                    self._told("held", f"nobody knows what became of the command of '{place}'")
+            if controller.held:
+                self._told("held", f"{called(name)} is held after a restart, until it is resumed")
+        await asyncio.get_running_loop().create_future()
+
+    def _overdue(self, place: str) -> None:
+        sender = self.net.place(place)
+        self.overdue.pop(str(sender.completion), None)
+        self._fail(
+            f"'{sender.command}' of '{place}' is overdue: "
+            f"'{sender.completion}' has not come within {self.overdue_seconds:g} s"
+        )
+
+    # The end
+
+    def _fail(self, message: str) -> None:
+        if not self.fault:
+            self.fault = message
+            self.stopping = True
+            self.driver.stop()
+            self._told("fault", message)
+            asyncio.get_running_loop().call_soon(self._end)
+
+    def _is_settled(self) -> bool:
+        """Whether nothing is open: whatever was decided is applied, and no part is promised."""
+        rounds = self.coordinator.rounds.values() if self.coordinator is not None else ()
+        return all(opened.decided and opened.committed is None for opened in rounds) and not any(
+            promise.promised for controller in self.controllers.values() for promise in controller.promises.values()
+        )
+
+    def _end(self) -> None:
+        if self.outcome is None or self.outcome.done():
+            return
+        try:
+            self._leave()
+            ended = self.situation()
+            if self._is_settled() and not self.posted:
+                self.trace.end(self.marking, ended.state.value)
+        except Exception as error:  # a timer has no caller
+            self._broken(error)
+        else:
+            self.outcome.set_result(ended)
+
+    def _task_ended(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._broken(error)
+
+    def _broken(self, error: BaseException) -> None:
+        """End the run by an error; the machines are stopped on the way out."""
+        if self.outcome is not None and not self.outcome.done():
+            self.outcome.set_exception(error)
+
+    def _told(self, kind: str, sentence: str) -> None:
+        self.trace.note(kind, message=sentence)
+        if self.tell is not None:
+            self.tell(kind, sentence)
+        self._wake()
+
+    def _called(self, name: str) -> str:
+        lost = name in self.peers and name not in self.connected_to
+        return f"{called(name)}, which is not connected" if lost else called(name)

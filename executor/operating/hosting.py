@@ -1,0 +1,146 @@
+"""Starting a host of a cell: from a bundle and a few words on its link to a `Host` that runs.
+
+The coordinator runs beside the controller that the net calls its coordinator; where the net names none, one host is
+told to hold it. Each host checks for itself that the bundle may run and, if that is demanded, who has signed it; at
+connection the hosts compare what they hold.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from firable.executor.drivers.driver import Driver
+from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.links.link import COORDINATOR, Greeting, Link
+from firable.executor.operating.host import Host, Told
+from firable.executor.operating.host_trace import TRACE, HostTrace
+from firable.executor.operating.situation import Situation
+from firable.nets.bundle import Bundle
+from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
+from firable.nets.net import Net
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """How a host reaches the others over Zenoh: where it listens, whom it joins, and its certificates, if any."""
+
+    listen: tuple[str, ...] = ()
+    join: tuple[str, ...] = ()
+    certificates: tuple[str, str, str] | None = None
+    """The files of the authority, of the certificate and of its key."""
+    lease_seconds: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class SerialLine:
+    """How a host reaches the others over a serial line."""
+
+    port: str
+    baud: int = 115_200
+    lease_seconds: float = 1.0
+
+
+def machines_of(net: Net, controllers: Sequence[str], *, coordinator: bool) -> tuple[str, ...]:
+    """The machines of a host that runs these controllers; raises `InputError` F2005 for one that the net has not.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> machines_of(catalogue_net("one_robot"), ["system", "mc"], coordinator=False)
+    ('system', 'mc', '')
+    """
+    known = [controller.name for controller in net.controllers]
+    if unknown := [name for name in controllers if name not in known]:
+        message = f"'{net.name}' has no controller '{unknown[0]}'"
+        hint = f"{did_you_mean(unknown[0], known)}it has: {', '.join(known)}"
+        raise InputError([Diagnostic("F2005", message, hint)])
+    names = tuple(dict.fromkeys(controllers))
+    holds = coordinator or (net.coordinator is not None and net.coordinator.name in names)
+    return (*names, *((COORDINATOR,) if holds else ()))
+
+
+def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLine) -> Link:
+    """The link of a host; raises `ModuleNotFoundError` where the extra `zenoh` or `serial` is not installed."""
+    greeting = Greeting(bundle.digest, machines)
+    if isinstance(way, SerialLine):
+        from firable.executor.links.serial_line import MASTER, SerialLink, addresses_on_a_line
+
+        addresses = addresses_on_a_line((COORDINATOR,), tuple(c.name for c in bundle.net.controllers))
+        own = MASTER if COORDINATOR in machines else min(addresses[name] for name in machines)
+        return SerialLink(greeting, way.port, addresses, own, baud=way.baud, lease_seconds=way.lease_seconds)
+    from firable.executor.links.zenoh_link import Certificates, ZenohLink
+
+    certificates = None if way.certificates is None else Certificates(*way.certificates)
+    return ZenohLink(
+        greeting, listen=way.listen, join=way.join, certificates=certificates, lease_seconds=way.lease_seconds
+    )
+
+
+def own_net(decomposition: Decomposition, machines: Sequence[str]) -> Net:
+    """The places and signals of some machines: what their driver has to serve."""
+    subnets = [subnet for subnet in decomposition.subnets if subnet.name in machines]
+    controllers = tuple(c for c in decomposition.net.controllers if c.name in machines)
+    places = tuple(place for subnet in subnets for place in subnet.places)
+    signals = tuple(signal for subnet in subnets for signal in subnet.signals)
+    return Net(decomposition.net.name, places, (), signals=signals, controllers=controllers)
+
+
+def run_host(
+    bundle: Bundle,
+    machines: tuple[str, ...],
+    driver: Driver,
+    link: Link,
+    *,
+    trace_path: Path | str | None = None,
+    journal_path: Path | str | None = None,
+    resume: bool = False,
+    overdue_seconds: float = 120.0,
+    tell: Told | None = None,
+    started: Callable[[Host], None] | None = None,
+) -> Situation:
+    """Run a host until it is stopped (Ctrl-C, SIGTERM) or fails; `resume` ends the hold after a restart by itself.
+
+    Raises `InputError` as link, journal and trace do.
+    """
+    journal = _journal(bundle, machines, journal_path)
+    try:
+        trace = HostTrace(bundle.net, machines, trace_path, journal.kept(TRACE))
+        host = Host(
+            bundle.decomposition, machines, driver, link, trace, journal, overdue_seconds=overdue_seconds, tell=tell
+        )
+        if started is not None:
+            started(host)
+        return asyncio.run(_terminable(host, resume=resume))
+    finally:
+        journal.close()
+
+
+def _journal(bundle: Bundle, machines: tuple[str, ...], path: Path | str | None) -> Journal:
+    if path is None:
+        return MemoryJournal()
+    from firable.executor.journal.sqlite_journal import SqliteJournal
+
+    return SqliteJournal(path, bundle.digest, machines)
+
+
+async def _terminable(host: Host, *, resume: bool) -> Situation:
+    task = asyncio.current_task()
+    if task is not None:
+        with suppress(NotImplementedError, RuntimeError, ValueError):
+            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
+    resuming = asyncio.create_task(_resume(host)) if resume else None
+    try:
+        return await host.main()
+    finally:
+        if resuming is not None:
+            resuming.cancel()
+
+
+async def _resume(host: Host) -> None:
+    """End the hold as soon as every question has its answer."""
+    while not host.resume():
+        await asyncio.sleep(0.1)

@@ -1,0 +1,176 @@
+"""The hosts of a cell: alone, together, cut off, killed and started anew; their traces join to one of the net."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from support.hosts import ALL_IN_ONE, ONE_EACH, TOGETHER, Cell
+
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.links.link import COORDINATOR
+from firable.executor.operating.situation import State
+from firable.executor.protocol.commands import Answer
+from firable.executor.protocol.messages import Decision, Vote
+from firable.semantics.trace import Noted, read_trace
+
+CENTRE = (COORDINATOR,)
+ROBOT = ("robot",)
+
+
+@pytest.mark.parametrize("of", [ONE_EACH, TOGETHER, ALL_IN_ONE], ids=["one each", "together", "all in one"])
+def test_hosts_run_a_cell_and_their_traces_join_to_one_of_the_net(
+    of: tuple[tuple[str, ...], ...], tmp_path: Path
+) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path, of)
+        await asyncio.sleep(60)
+        ended = await cell.stop()
+        assert {situation.state for situation in ended.values()} == {State.STOPPED}
+        assert cell.replayed().firings == cell.firings() > 50
+
+    run_in_virtual_time(main())
+
+
+def test_a_run_over_the_in_process_link_is_a_function_of_its_cell(tmp_path: Path) -> None:
+    async def main(folder: Path) -> int:
+        folder.mkdir()
+        cell = Cell(folder)
+        await asyncio.sleep(60)
+        await cell.stop()
+        return cell.replayed().firings
+
+    assert run_in_virtual_time(main(tmp_path / "a")) == run_in_virtual_time(main(tmp_path / "b")) > 50
+
+
+@pytest.mark.parametrize("cut", ONE_EACH, ids=lambda machines: machines[0] or "coordinator")
+def test_a_host_that_is_cut_off_is_told_and_the_cell_goes_on_when_the_line_is_back(
+    cut: tuple[str, ...], tmp_path: Path
+) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(7.3)
+        cell.exchange.cut(cell.links[cut])
+        await asyncio.sleep(30)
+        stood = cell.firings()
+        assert [kind for kind, _ in cell.told].count("lost") == 8
+        await asyncio.sleep(30)
+        assert cell.firings() == stood  # nobody goes on without the machine that is cut off
+        waiting = [sentence for host in cell.hosts.values() for sentence in host.waits()]
+        cell.exchange.mend(cell.links[cut])
+        await asyncio.sleep(60)
+        await cell.stop()
+        assert cell.replayed().firings > stood + 30
+        assert waiting or cut != ROBOT
+
+    run_in_virtual_time(main())
+
+
+@pytest.mark.parametrize("after", [3.0, 3.999, 4.0, 5.1, 6.0, 8.2])
+@pytest.mark.parametrize("dies", ONE_EACH, ids=lambda machines: machines[0] or "coordinator")
+def test_a_host_that_is_killed_and_started_anew_loses_and_doubles_nothing(
+    dies: tuple[str, ...], after: float, tmp_path: Path
+) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(after)
+        await cell.kill(dies)
+        await asyncio.sleep(5)
+        cell.start(dies)
+        await asyncio.sleep(5)
+        held = [name for name, controller in cell.hosts[dies].controllers.items() if controller.held]
+        assert held == [name for name in dies if name]
+        stood = cell.firings()
+        assert cell.hosts[dies].resume()
+        await asyncio.sleep(60)
+        await cell.stop()
+        assert cell.replayed().firings > stood + 30
+
+    run_in_virtual_time(main())
+
+
+def test_while_held_nothing_that_needs_the_machine_fires(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(5.1)
+        await cell.kill(ROBOT)
+        cell.start(ROBOT)
+        await asyncio.sleep(30)
+        stood = cell.firings()
+        await asyncio.sleep(30)
+        assert cell.firings() == stood
+        assert any("held after a restart" in sentence for sentence in cell.hosts[ROBOT].waits())
+        assert ("held", "'robot' is held after a restart, until it is resumed") in cell.told
+        await cell.stop()
+        cell.replayed()
+
+    run_in_virtual_time(main())
+
+
+def test_what_a_host_may_not_say_is_dropped(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(0.5)
+        centre, robot = cell.hosts[CENTRE], cell.hosts[ROBOT]
+        before = centre.coordinator and dict(centre.coordinator.seen)
+        centre.arrived("mc", COORDINATOR, Vote("robot", 0, frozenset({"G2"}), robot.controllers["robot"].readiness))
+        robot.arrived("mc", "robot", Decision("robot", 0, "G2", 0, 0))
+        robot.arrived(COORDINATOR, "robot", Decision("mc", 0, "G2", 0, 0))
+        assert [kind for kind, _ in cell.told].count("dropped") == 3
+        assert not centre.posted
+        assert not robot.posted
+        assert before is not None
+        await cell.stop()
+        cell.replayed()
+
+    run_in_virtual_time(main())
+
+
+def test_an_overdue_command_ends_its_host_and_the_others_see_it_lost(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        host = cell.hosts[ROBOT]
+        host.overdue_seconds = 0.5
+        situation = await cell.tasks[ROBOT]
+        assert situation.state is State.FAULT
+        assert "is overdue" in situation.message
+        await asyncio.sleep(1)
+        assert any(kind == "lost" and sentence.startswith("'robot' is lost") for kind, sentence in cell.told)
+
+    run_in_virtual_time(main())
+
+
+def test_commands_without_an_answer_keep_the_host_held_until_somebody_knows(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(2.5)
+        await cell.kill(ROBOT)
+        cell.start(ROBOT)
+        host = cell.hosts[ROBOT]
+        questions = host.controllers["robot"].commands.questions
+        assert questions
+        assert not host.resume()  # the driver has not been asked yet
+        for place, entry in questions:
+            host.answer("robot", place, entry, Answer.NOT_RECEIVED)
+        assert host.resume()
+        await asyncio.sleep(20)
+        await cell.stop()
+        assert cell.replayed().firings > 10
+
+    run_in_virtual_time(main())
+
+
+def test_a_trace_says_who_was_lost_and_who_came_back(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(2)
+        cell.exchange.cut(cell.links[ROBOT])
+        await asyncio.sleep(2)
+        cell.exchange.mend(cell.links[ROBOT])
+        await asyncio.sleep(2)
+        await cell.stop()
+
+    run_in_virtual_time(main())
+    notes = [e.note for e in read_trace(tmp_path / "robot.trace").events if isinstance(e, Noted)]
+    assert [note for note in notes if note in {"connected", "lost"}] == 4 * ["connected"] + 4 * ["lost"] + 4 * [
+        "connected"
+    ]

@@ -1,0 +1,88 @@
+"""The hosts of a cell in one process, over the in-process link, in virtual time."""
+
+import asyncio
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from firable.decompose import split
+from firable.executor.drivers.rehearsal import RehearsalDriver
+from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.links.in_process import Exchange, InProcessLink
+from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.operating.host import Host
+from firable.executor.operating.host_trace import TRACE, HostTrace
+from firable.executor.operating.situation import Situation
+from firable.nets.catalogue import catalogue_net
+from firable.semantics.joining import join
+from firable.semantics.replaying import Replay, replay
+from firable.semantics.trace import read_trace
+
+ONE_EACH = ((COORDINATOR,), ("system",), ("robot",), ("mc",), ("conveyor",))
+TOGETHER = (("system", COORDINATOR), ("robot", "mc"), ("conveyor",))
+ALL_IN_ONE = ((COORDINATOR, "system", "robot", "mc", "conveyor"),)
+
+
+class Cell:
+    """The hosts of the one-robot cell; `of` says which machines each runs."""
+
+    def __init__(self, folder: Path, of: tuple[tuple[str, ...], ...] = ONE_EACH, name: str = "one_robot") -> None:
+        self.decomposition = split(catalogue_net(name))
+        self.net = self.decomposition.net
+        self.folder = folder
+        self.exchange = Exchange()
+        self.journals: dict[tuple[str, ...], Journal] = {machines: MemoryJournal() for machines in of}
+        self.hosts: dict[tuple[str, ...], Host] = {}
+        self.links: dict[tuple[str, ...], InProcessLink] = {}
+        self.tasks: dict[tuple[str, ...], asyncio.Task[Situation]] = {}
+        self.told: list[tuple[str, str]] = []
+        for machines in of:
+            self.start(machines)
+
+    def path(self, machines: tuple[str, ...]) -> Path:
+        """The trace of a host."""
+        return self.folder / f"{machines[0] or 'coordinator'}.trace"
+
+    def start(self, machines: tuple[str, ...], shown: Mapping[str, bool] | None = None) -> None:
+        """Start a host, or start it anew."""
+        journal = self.journals[machines]
+        trace = HostTrace(self.net, machines, self.path(machines), journal.kept(TRACE))
+        subnets = [subnet for subnet in self.decomposition.subnets if subnet.name in machines]
+        link = self.links[machines] = InProcessLink(self.exchange, Greeting("d", machines))
+        host = self.hosts[machines] = Host(
+            self.decomposition,
+            machines,
+            RehearsalDriver(subnets, 1.0, shown),
+            link,
+            trace,
+            journal,
+            tell=lambda kind, sentence: self.told.append((kind, sentence)),
+        )
+        self.tasks[machines] = asyncio.create_task(host.main())
+
+    async def kill(self, machines: tuple[str, ...]) -> None:
+        """End a host at once, as a crash does: nothing more is written or sent."""
+        host, task = self.hosts[machines], self.tasks[machines]
+        assert host.outcome is not None
+        host.outcome.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+
+    async def stop(self) -> dict[tuple[str, ...], Situation]:
+        """Stop all hosts in order; how each ended."""
+        for task in self.tasks.values():
+            task.cancel()
+        ended = await asyncio.gather(*self.tasks.values())
+        return dict(zip(self.tasks, ended, strict=True))
+
+    def replayed(self) -> Replay:
+        """What the joined trace did, as the reference player judges it; it must be whole."""
+        joined = join(self.net, [read_trace(self.path(machines)) for machines in self.hosts])
+        done = replay(self.net, joined)
+        assert done.complete
+        return done
+
+    def firings(self) -> int:
+        """How many transitions have fired until now, as the traces show."""
+        lines = (line for machines in self.hosts for line in self.path(machines).read_text().splitlines())
+        return sum('"fired"' in line for line in lines)
