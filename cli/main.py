@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import click
 
 from firable import __version__
-from firable.cli import bundle, check, convert, draw, prove, refine, replay, run, schema, sign, split, verify
+from firable.cli import bundle, check, convert, draw, prove, refine, replay, run, schema, sign, split, takeover, verify
 from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
@@ -56,6 +56,7 @@ for _command in (
     bundle.bundle,
     sign.sign,
     run.run,
+    takeover.takeover,
     replay.replay,
     verify.verify,
     draw.draw,

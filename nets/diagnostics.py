@@ -108,6 +108,8 @@ CODES: Final[dict[str, str]] = {
     "F5032": "the journal is damaged",
     "F5033": "the journal is in use",
     "F5034": "the journal cannot be used",
+    "F5050": "a run that a new bundle may not go on from",
+    "F5051": "a marking that the new bundle does not reach",
     "F5060": "an operator's endpoint that is open to everybody",
     "F5061": "an operator's endpoint that cannot be served",
     "F5062": "a certificate that cannot be used",

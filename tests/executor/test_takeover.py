@@ -1,0 +1,222 @@
+"""A new bundle goes on where an old one has stopped, or is refused with every reason."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from firable.cli.main import main
+from firable.decompose.splitting.cut import split
+from firable.executor.journal.sqlite_journal import SqliteJournal
+from firable.executor.journal.takeover import take_over
+from firable.executor.links.link import COORDINATOR
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.messages import EPOCH_BITS, Keep, Stored, VoteRequest
+from firable.nets.bundle import read_bundle
+from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import InputError
+from firable.nets.text import parse_net
+
+OLD = """\
+firable: 1
+cell: cell
+controllers:
+  line: {coordinator: true, places: {}}
+  robot:
+    start: free
+    places:
+      free:
+      working: {send: {machine: R, command: WORK}, until: worked}
+      worked_out:
+  table:
+    start: empty
+    places:
+      empty:
+      full:
+transitions:
+  begin: {from: [robot.free, table.empty], to: [robot.working, table.full]}
+  end:   {from: robot.working, to: robot.worked_out}
+  clear: {from: [robot.worked_out, table.full], to: [robot.free, table.empty]}
+"""
+WITH_INSPECTION = OLD.replace("      full:\n", "      full:\n      inspected:\n").replace(
+    "  clear: {from: [robot.worked_out, table.full],",
+    "  inspect: {from: table.full, to: table.inspected, if: robot.worked_out}\n"
+    "  clear: {from: [robot.worked_out, table.inspected],",
+)
+OTHER_COMMAND = OLD.replace("command: WORK", "command: GRIND")
+OTHER_NAME = OLD.replace("working", "at_work")
+
+
+def cell(text: str) -> Decomposition:
+    return split(parse_net(text))
+
+
+def kept_in(
+    marking: set[str], decomposition: Decomposition, **more: Mapping[str, Stored]
+) -> dict[str, dict[str, Stored]]:
+    """What journals keep of a cell at rest in a marking."""
+    kept: dict[str, dict[str, Stored]] = {COORDINATOR: {"epoch": 2}}
+    for subnet in decomposition.subnets:
+        word = sum(1 << i for i, place in enumerate(subnet.places) if place.name in marking)
+        kept[subnet.name] = {"epoch": 4, "word": f"{word:x}"}
+    for machine, of in more.items():
+        kept[machine].update(of)
+    return kept
+
+
+def joint_marking(decomposition: Decomposition, kept: Mapping[str, Mapping[str, Stored]]) -> set[str]:
+    machines = [LocalController.restored(decomposition, s.name, kept[s.name]) for s in decomposition.subnets]
+    assert all(machine.held for machine in machines)
+    return {name for machine in machines for name in machine.subnet.names(machine.marking)}
+
+
+def reasons(error: InputError) -> str:
+    assert {diagnostic.code for diagnostic in error.diagnostics} == {"F5050"}
+    return "\n".join(diagnostic.message for diagnostic in error.diagnostics)
+
+
+def test_the_marking_is_taken_over_by_the_names_of_its_places_and_all_are_held() -> None:
+    old, new = cell(OLD), cell(WITH_INSPECTION)
+    marking = {"robot.worked_out", "table.full"}
+    moved = take_over(old, new, kept_in(marking, old), [COORDINATOR])
+    assert set(moved.marking) == marking
+    assert joint_marking(new, moved.kept) == marking
+
+
+def test_nothing_said_under_the_old_net_is_new_under_the_new_one() -> None:
+    old, new = cell(OLD), cell(WITH_INSPECTION)
+    moved = take_over(old, new, kept_in({"robot.free", "table.empty"}, old), [COORDINATOR])
+    coordinator = Coordinator.restored(new, moved.kept[COORDINATOR])
+    robot = LocalController.restored(new, "robot", moved.kept["robot"])
+    assert coordinator.next_round >= robot.closed_below > (4 << EPOCH_BITS)
+    assert robot.epoch > 4
+    late = VoteRequest("robot", (4 << EPOCH_BITS) + 17, ("begin",), 0, 0)
+    assert not any(isinstance(effect, Keep) and effect.key.startswith("promise") for effect in robot.receive(late))
+
+
+def test_a_command_under_way_keeps_its_number_and_is_asked_after() -> None:
+    old, new = cell(OLD), cell(WITH_INSPECTION)
+    under_way: dict[str, Stored] = {"command/signal/robot.worked": ("robot.working", 7, "issued")}
+    moved = take_over(old, new, kept_in({"robot.working", "table.full"}, old, robot=under_way), [COORDINATOR])
+    robot = LocalController.restored(new, "robot", moved.kept["robot"])
+    assert moved.under_way == ("robot.working",)
+    assert robot.commands.questions == (("robot.working", 7),)
+    assert robot.read("robot.worked", value=True, entry=6) == []
+
+
+def test_the_number_of_a_command_that_is_over_goes_on() -> None:
+    old, new = cell(OLD), cell(WITH_INSPECTION)
+    over: dict[str, Stored] = {"command/signal/robot.worked": ("robot.working", 7, "over")}
+    moved = take_over(old, new, kept_in({"robot.free", "table.empty"}, old, robot=over), [COORDINATOR])
+    robot = LocalController.restored(new, "robot", moved.kept["robot"])
+    assert robot.commands.entry("robot.worked") == 7
+    assert not robot.commands.questions
+
+
+@pytest.mark.parametrize(
+    ("text", "marking", "more", "reason"),
+    [
+        (OTHER_NAME, {"robot.working", "table.full"}, {}, "the new net has no place of that name"),
+        (OTHER_COMMAND, {"robot.working", "table.full"}, {}, "sends another command"),
+        (WITH_INSPECTION, {"robot.free", "table.empty"}, {"robot": {"promise/3": ("begin",)}}, "has promised"),
+        (WITH_INSPECTION, {"robot.free", "table.empty"}, {COORDINATOR: {"round/3": ("begin",)}}, "not everybody"),
+        (
+            WITH_INSPECTION,
+            {"robot.worked_out", "table.full"},
+            {"robot": {"command/signal/robot.worked": ("robot.working", 7, "issued")}},
+            "its token has gone on",
+        ),
+    ],
+)
+def test_what_cannot_be_carried_over_is_refused(
+    text: str, marking: set[str], more: dict[str, dict[str, Stored]], reason: str
+) -> None:
+    old = cell(OLD)
+    with pytest.raises(InputError) as caught:
+        take_over(old, cell(text), kept_in(marking, old, **more), [COORDINATOR])
+    assert reason in reasons(caught.value)
+
+
+def test_a_place_that_is_renamed_is_no_matter_while_it_is_empty() -> None:
+    old, new = cell(OLD), cell(OTHER_NAME)
+    moved = take_over(old, new, kept_in({"robot.free", "table.empty"}, old), [COORDINATOR])
+    assert joint_marking(new, moved.kept) == {"robot.free", "table.empty"}
+
+
+def test_all_reasons_are_told_together() -> None:
+    old = cell(OLD)
+    kept = kept_in({"robot.working", "table.full"}, old, robot={"promise/3": ("begin",)})
+    with pytest.raises(InputError) as caught:
+        take_over(old, cell(OTHER_NAME), kept, [COORDINATOR])
+    assert len(caught.value.diagnostics) == 2
+
+
+def bundle(folder: Path, name: str, text: str) -> Path:
+    net, made = folder / f"{name}.firable.yaml", folder / f"{name}.bundle"
+    net.write_text(text)
+    assert main(["bundle", str(net), "-o", str(made)]) == 0
+    return made
+
+
+@pytest.fixture(scope="module")
+def bundles(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("bundles")
+    return bundle(folder, "old", OLD), bundle(folder, "new", WITH_INSPECTION)
+
+
+def journal(path: Path, of: Path, marking: set[str]) -> Path:
+    read = read_bundle(of)
+    kept = kept_in(marking, read.decomposition)
+    written = SqliteJournal(path, read.digest, kept)
+    for machine, records in kept.items():
+        written.write(machine, [Keep(key, value) for key, value in records.items()])
+    written.sync()
+    written.close()
+    return path
+
+
+def test_the_command_writes_a_journal_that_the_new_bundle_opens(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old, new = bundles
+    before = journal(tmp_path / "old.journal", old, {"robot.worked_out", "table.full"})
+    content, into = before.read_bytes(), tmp_path / "new.journal"
+    assert main(["takeover", str(old), str(new), "--journal", str(before), "--into", str(into)]) == 0
+    assert "robot.worked_out, table.full" in capsys.readouterr().out
+    assert before.read_bytes() == content
+    read = read_bundle(new)
+    opened = SqliteJournal(into, read.digest, [COORDINATOR, *(s.name for s in read.decomposition.subnets)])
+    kept = {s.name: dict(opened.kept(s.name)) for s in read.decomposition.subnets}
+    opened.close()
+    assert joint_marking(read.decomposition, kept) == {"robot.worked_out", "table.full"}
+
+
+def test_a_marking_that_the_new_net_never_reaches_is_refused_and_nothing_written(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old, new = bundles
+    before, into = journal(tmp_path / "old.journal", old, {"robot.free", "table.full"}), tmp_path / "new.journal"
+    assert main(["takeover", str(old), str(new), "--journal", str(before), "--into", str(into)]) == 2
+    assert "F5051" in capsys.readouterr().err
+    assert not into.exists()
+
+
+def test_files_that_stand_in_the_way_or_are_missing_are_told_of(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old, new = bundles
+    missing, into = tmp_path / "none.journal", tmp_path / "new.journal"
+    assert main(["takeover", str(old), str(new), "--journal", str(missing), "--into", str(into)]) == 2
+    assert "F1001" in capsys.readouterr().err
+    assert not missing.exists(), "a journal is not made by looking for one"
+    before = journal(tmp_path / "old.journal", old, {"robot.free", "table.empty"})
+    into.write_text("precious")
+    assert main(["takeover", str(old), str(new), "--journal", str(before), "--into", str(into)]) == 2
+    assert "F1017" in capsys.readouterr().err
+    assert into.read_text() == "precious"
+    into.unlink()
+    assert main(["takeover", str(new), str(old), "--journal", str(before), "--into", str(into)]) == 2
+    assert "F5031" in capsys.readouterr().err
