@@ -21,11 +21,14 @@ from firable.cli import bundle, check, convert, draw, prove, refine, replay, run
 from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
-_EXTRA = {
+EXTRAS = {
     **dict.fromkeys(("z3", "networkx", "numpy", "platformdirs"), ("prove", "all that checking and proving need")),
     "mtkahypar": ("split", "what looks for owners of large nets"),
     "zenoh": ("zenoh", "the link between hosts over a network"),
     "serial": ("serial", "what serial lines need"),
+    "pymodbus": ("modbus", "what Modbus devices need"),
+    "asyncua": ("opcua", "what OPC UA servers need"),
+    "aiomqtt": ("mqtt", "what devices behind an MQTT broker need"),
     "cryptography": ("sign", "what signs bundles and checks signatures"),
     "cvc5": ("verify", "the second solver; or ask the first one: --solver z3"),
 }
@@ -103,8 +106,8 @@ def _ended_by(error: Exception, arguments: Sequence[str]) -> int:
         case InputError():
             show_errors(error.diagnostics)
             return worst(map(exit_code_of, error.diagnostics))
-        case ModuleNotFoundError() if error.name and error.name.partition(".")[0] in _EXTRA:
-            extra, what = _EXTRA[error.name.partition(".")[0]]
+        case ModuleNotFoundError() if error.name and error.name.partition(".")[0] in EXTRAS:
+            extra, what = EXTRAS[error.name.partition(".")[0]]
             click.echo(
                 f"error: this command needs '{error.name}', which is not installed\n"
                 f"  hint: pip install 'firable[{extra}]' installs {what}",

@@ -55,7 +55,7 @@ class Wanted:
 
 
 class Connection(Protocol):
-    """One connection to a device. `read` and `write` are each called by one task; the two at the same time.
+    """One connection to a device. `read` is called by one task, `write` by another, at the same time; but `read` first.
 
     Any of them raises `LinkError` or `OSError` when the connection has failed; then it is closed, and never used again.
     """

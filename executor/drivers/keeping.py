@@ -118,11 +118,6 @@ class Kept:
 
     async def _serve(self, connection: Connection) -> None:
         self._take(await connection.read())
-        if not self.started and not self.stopping:
-            await connection.write(self.safe)
-            self.started = True
-        self.connections += 1
-        self.served.ready()
         await self._first_of(self._read(connection), self._write(connection))
 
     async def _first_of(self, *work: Coroutine[Any, Any, None]) -> None:
@@ -151,6 +146,11 @@ class Kept:
             self.awake.set()
 
     async def _write(self, connection: Connection) -> None:
+        if not self.started and not self.stopping:
+            await connection.write(self.safe)
+            self.started = True
+        self.connections += 1
+        self.served.ready()
         loop = asyncio.get_running_loop()
         heartbeat = self.document.heartbeat
         due = loop.time()

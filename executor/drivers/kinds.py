@@ -21,6 +21,9 @@ GROUP: Final = "firable.drivers"
 OWN: Final[Mapping[str, tuple[str, str]]] = {
     "modbus-tcp": ("firable.executor.drivers.modbus", "TCP"),
     "modbus-rtu": ("firable.executor.drivers.modbus", "RTU"),
+    "opcua": ("firable.executor.drivers.opcua", "KIND"),
+    "mqtt": ("firable.executor.drivers.mqtt", "KIND"),
+    "serial": ("firable.executor.drivers.serial_line", "KIND"),
 }
 """The module and the name of the kind in it."""
 

@@ -7,6 +7,9 @@ EXECUTOR = Path(__file__).parent.parent.parent / "executor"
 WITH_A_LIBRARY: frozenset[str] = frozenset(
     {
         "firable.executor.drivers.far_side.modbus_server",
+        "firable.executor.drivers.far_side.mqtt_device",
+        "firable.executor.drivers.far_side.opcua_server",
+        "firable.executor.drivers.far_side.serial_device",
         "firable.executor.links.serial_line",
         "firable.executor.links.zenoh_link",
         "firable.executor.operating.control",

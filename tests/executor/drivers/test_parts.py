@@ -1,15 +1,18 @@
 """The parts of a driver, each alone: process image, completions, channels, and the simulated driver."""
 
 import asyncio
+import sys
 from collections.abc import Iterable
 
 import pytest
 from support.cells import decomposition_of, plant_of
 
+from firable.cli.main import EXTRAS
 from firable.executor.cell.plant import Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import Heard
-from firable.executor.drivers.binding import ChannelDocument, SignalDocument
+from firable.executor.drivers.binding import ChannelDocument, SignalDocument, parse_binding
+from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.channels import NUMBER_MAX, Channel
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.device import Value, Writes
@@ -192,3 +195,28 @@ def test_simulated_driver_shows_its_image_and_says_what_became_of_a_command() ->
 
     answers = run_in_virtual_time(main())
     assert answers == [Answer.NOT_RECEIVED, Answer.WORKING, Answer.DONE, Answer.NOT_RECEIVED]
+
+
+@pytest.mark.parametrize(
+    ("library", "device"),
+    [
+        ("pymodbus", "driver: modbus-tcp, host: localhost"),
+        ("serial", "driver: modbus-rtu, port: /dev/ttyS0"),
+        ("asyncua", "driver: opcua, url: 'opc.tcp://localhost/'"),
+        ("aiomqtt", "driver: mqtt, host: localhost"),
+        ("serial", "driver: serial, port: /dev/ttyS0"),
+    ],
+)
+def test_missing_library_ends_the_run_and_is_told_by_the_extra_that_brings_it(
+    library: str, device: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    binding = parse_binding(f"{{firable_bind: 1, cell: c, devices: {{d: {{{device}}}}}}}")  # needs no library
+    for name in list(sys.modules):
+        if name.partition(".")[0] == library:
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, library, None)
+    heard = Heard()
+    with pytest.raises(ModuleNotFoundError) as missing:
+        asyncio.run(BoundDriver(binding, (), frozenset()).run(heard, heard))
+    assert missing.value.name is not None
+    assert missing.value.name.partition(".")[0] in EXTRAS

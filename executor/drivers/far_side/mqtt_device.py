@@ -1,0 +1,114 @@
+"""A device behind an MQTT broker, and a broker for it: mosquitto, as a process of its own, behind a relay.
+
+The relay stands between the driver and the broker; the device talks to the broker directly, as one in another part of
+the plant would.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import socket
+import tempfile
+from collections.abc import Callable, Collection
+from contextlib import suppress
+from pathlib import Path
+
+from aiomqtt import Client, MqttError
+
+from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.far_side.end import Faults
+from firable.executor.drivers.far_side.relay import Relay
+
+
+def mosquitto() -> str | None:
+    """The broker's program, if it is installed; Debian puts it where ordinary users do not look."""
+    return shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
+
+
+class MqttEnd:
+    """A device that takes what is written to `taken` topics, and a broker; `port` 0 takes a free one for drivers."""
+
+    def __init__(self, taken: Collection[Point], port: int = 0) -> None:
+        self.faults = Faults()
+        self.taken = sorted(taken)
+        self.relay = Relay(self.faults, port)
+        self.behind = 0
+        self.broker: asyncio.subprocess.Process | None = None
+        self.folder: tempfile.TemporaryDirectory[str] | None = None
+        self.changes: asyncio.Queue[tuple[Point, Value]] = asyncio.Queue()
+        self.written: Callable[[Point, Value], None] = lambda _point, _value: None
+        self.serving: asyncio.Task[None] | None = None
+        self.is_ready = asyncio.Event()
+
+    @property
+    def port(self) -> int:
+        """The port at which a driver reaches the broker."""
+        return self.relay.port
+
+    async def start(self, written: Callable[[Point, Value], None]) -> None:
+        """Start the broker and the device."""
+        self.written = written
+        program = mosquitto()
+        if program is None:
+            raise FileNotFoundError("mosquitto is not installed")
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.behind = probe.getsockname()[1]
+        self.folder = tempfile.TemporaryDirectory()
+        configuration = Path(self.folder.name) / "mosquitto.conf"
+        configuration.write_text(
+            f"listener {self.behind} 127.0.0.1\nallow_anonymous true\npersistence false\nset_tcp_nodelay true\n"
+        )
+        quiet = asyncio.subprocess.DEVNULL
+        self.broker = await asyncio.create_subprocess_exec(
+            program, "-c", str(configuration), stdout=quiet, stderr=quiet
+        )
+        self.serving = asyncio.create_task(self._serve())
+        await self.is_ready.wait()
+        await self.mend()
+
+    async def stop(self) -> None:
+        """End the device and the broker."""
+        await self.cut()
+        if self.serving is not None:
+            self.serving.cancel()
+            await asyncio.gather(self.serving, return_exceptions=True)
+        if self.broker is not None:
+            self.broker.terminate()
+            await self.broker.wait()
+        if self.folder is not None:
+            self.folder.cleanup()
+
+    def show(self, point: Point, value: Value) -> None:
+        """Publish a value, retained."""
+        self.changes.put_nowait((point, value))
+
+    async def cut(self) -> None:
+        """Close the driver's connections, and take no new ones."""
+        await self.relay.close()
+
+    async def mend(self) -> None:
+        """Take connections again, at the same port."""
+        await self.relay.open(self.behind)
+
+    async def _serve(self) -> None:
+        while True:
+            with suppress(MqttError):
+                async with Client("127.0.0.1", self.behind) as client:
+                    await client.subscribe([(topic, 1) for topic in self.taken])
+                    self.is_ready.set()
+                    await asyncio.gather(self._take(client), self._publish(client))
+            await asyncio.sleep(0.01)  # the broker is not there yet
+
+    async def _take(self, client: Client) -> None:
+        async for message in client.messages:
+            payload = message.payload
+            if isinstance(payload, (bytes, bytearray)):
+                self.written(message.topic.value, payload.decode())
+
+    async def _publish(self, client: Client) -> None:
+        while True:
+            point, value = await self.changes.get()
+            text = str(int(value)) if isinstance(value, bool) else str(value)
+            await client.publish(point, "garbage" if self.faults.garbage else text, qos=1, retain=True)

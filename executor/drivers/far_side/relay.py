@@ -1,0 +1,71 @@
+"""A relay in a network line, which can be cut, hold what goes through it, delay it or garble it.
+
+It stands before servers whose own misbehaviour cannot be asked for. What it holds while it is silent goes on when it is
+not any more, as the answers of a slow network do: late, and on the old connection.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+
+from firable.executor.drivers.far_side.end import Faults
+
+
+class Relay:
+    """A port of this host that leads to another one."""
+
+    def __init__(self, faults: Faults, port: int = 0, *, garbles: bool = True) -> None:
+        self.faults = faults
+        self.garbles = garbles
+        self.port = port
+        self.target = 0
+        self.server: asyncio.Server | None = None
+        self.carrying: set[asyncio.Task[None]] = set()
+
+    async def open(self, target: int) -> None:
+        """Lead to a port of this host."""
+        self.target = target
+        self.server = await asyncio.start_server(self._accepted, "127.0.0.1", self.port)
+        self.port = self.server.sockets[0].getsockname()[1]
+
+    async def close(self) -> None:
+        """Drop all connections, and take no new ones."""
+        if self.server is not None:
+            self.server.close()
+            self.server = None
+        tasks = list(self.carrying)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _accepted(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.get_running_loop().create_task(self._carried(reader, writer))
+        self.carrying.add(task)
+        task.add_done_callback(self.carrying.discard)
+
+    async def _carried(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        far_writer: asyncio.StreamWriter | None = None
+        try:
+            far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self.target)
+            there = self._carry(reader, far_writer, garbles=False)
+            await asyncio.gather(there, self._carry(far_reader, writer, garbles=self.garbles))
+        except OSError:
+            pass  # the end behind it takes no connection, or has dropped it: so does the relay
+        finally:
+            for one in (writer, far_writer):
+                if one is not None:
+                    one.transport.abort()
+
+    async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, garbles: bool) -> None:
+        with suppress(OSError):
+            while some := await reader.read(65_536):
+                if self.faults.delay_s:
+                    await asyncio.sleep(self.faults.delay_s)
+                while self.faults.silent:
+                    await asyncio.sleep(0.01)
+                if garbles and self.faults.garbage:
+                    some = bytes(byte ^ 0x5A for byte in some)
+                writer.write(some)
+                await writer.drain()
+        writer.close()

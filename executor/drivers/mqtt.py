@@ -1,0 +1,130 @@
+"""MQTT, by aiomqtt: points are topics, values their payloads as text.
+
+What a device shows it publishes *retained*, so that a driver that connects learns at once how things stand; what the
+driver writes is not, because a device that comes back must not find an old command waiting. Everything goes with QoS 1,
+and a write is confirmed by the broker: that the device has a command is shown by the number that it has taken. That the
+device is there at all is not to be seen from a connection to a broker; `alive` in the binding is for that.
+
+The first answer of a connection is what the broker has retained. It ends with a message that the driver sends to itself
+on a topic of its own: the broker answers on one connection in order.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import uuid
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Final
+
+from pydantic import Field
+
+from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes
+
+if TYPE_CHECKING:
+    from aiomqtt import Client
+
+
+class MqttOptions(Options):
+    """A broker; `tls` uses the certificates that the system trusts."""
+
+    host: str
+    port: int = Field(default=1883, ge=1, le=65_535)
+    user: str | None = None
+    password: str | None = None
+    tls: bool = False
+
+
+class MqttConnection:
+    """A connection to a broker."""
+
+    def __init__(self, client: Client, wanted: Wanted) -> None:
+        self.client = client
+        self.wanted = wanted
+        self.own = f"firable/{uuid.uuid4().hex}"
+        self.is_first = True
+
+    async def open(self) -> None:
+        """Connect, and subscribe to what is wanted."""
+        await self.client.__aenter__()
+        await self.client.subscribe([(topic, 1) for topic in (*self.wanted.read, self.own)])
+        await self.client.publish(self.own, "1", qos=1, timeout=self.wanted.timeout_s)
+
+    async def read(self) -> Sequence[tuple[Point, Value]]:
+        """All messages that have come; at first, all that were retained."""
+        from aiomqtt import MqttError
+
+        batch: list[tuple[Point, Value]] = []
+        messages = self.client.messages
+        try:
+            while self.is_first or not batch or len(messages):
+                message = await asyncio.wait_for(anext(messages), self.wanted.timeout_s if self.is_first else None)
+                if message.topic.value == self.own:
+                    self.is_first = False
+                    break
+                payload = message.payload
+                text = payload.decode("utf-8", "replace") if isinstance(payload, (bytes, bytearray)) else str(payload)
+                batch.append((message.topic.value, text))
+        except MqttError as error:
+            raise LinkError(str(error)) from None
+        return batch
+
+    async def write(self, writes: Writes) -> None:
+        """Publish values in their order, each when the broker has the one before."""
+        from aiomqtt import MqttError
+
+        for topic, value in writes:
+            payload = str(int(value)) if isinstance(value, bool) else str(value)
+            try:
+                await self.client.publish(topic, payload, qos=1, timeout=self.wanted.timeout_s)
+            except MqttError as error:
+                raise LinkError(f"'{topic}': {error}") from None
+
+    async def close(self) -> None:
+        """Say goodbye if that can be."""
+        with suppress(Exception):
+            await asyncio.wait_for(self.client.__aexit__(None, None, None), self.wanted.timeout_s)
+
+
+class Mqtt:
+    """Devices behind an MQTT broker."""
+
+    options: type[Options] = MqttOptions
+
+    def point_problem(self, point: Point, use: Use) -> str:
+        """What is wrong with a topic."""
+        if any(sign in point for sign in "+#\0") or len(point.encode()) > 65_535:
+            return f"a topic to {use} has no wildcards: no `+`, no `#`"
+        return ""
+
+    async def connect(self, options: MqttOptions, wanted: Wanted) -> Connection:
+        """Make a new client."""
+        from aiomqtt import Client, MqttError, TLSParameters
+
+        logger = logging.getLogger("firable.mqtt")
+        logger.addHandler(logging.NullHandler())  # what matters is told by us
+        client = Client(
+            options.host,
+            options.port,
+            username=options.user,
+            password=options.password,
+            logger=logger,
+            timeout=wanted.timeout_s,
+            keepalive=max(1, math.ceil(wanted.timeout_s)),
+            tls_params=TLSParameters() if options.tls else None,
+        )
+        connection = MqttConnection(client, wanted)
+        try:
+            await connection.open()
+        except MqttError as error:
+            await connection.close()
+            raise LinkError(f"{options.host}:{options.port}: {error}") from None
+        except BaseException:
+            await connection.close()
+            raise
+        return connection
+
+
+KIND: Final = Mqtt()

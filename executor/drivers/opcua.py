@@ -1,0 +1,184 @@
+"""OPC UA, by asyncua.
+
+Points are node ids, such as `ns=2;s=Robot.Done` or `ns=3;i=1001`. The server tells of changes by a subscription with a
+queue for each node, so that edges between two of its messages are counted; a value whose status is not good is no
+value. What is written takes the type that its node has. Of several writes the last, which is the number of a command,
+goes out when the others are confirmed, because a server may take those of one request in any order.
+
+A client that has lost its connection is not repaired: asyncua can reconnect by itself, and would then bring back
+subscriptions with what was queued in the meantime. A new client begins with what the nodes hold now.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Final
+
+from pydantic import Field
+
+from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes
+
+if TYPE_CHECKING:
+    from asyncua.client.client import Client
+    from asyncua.common.node import Node
+
+QUEUE: Final = 1000
+"""How many changes of a node the server keeps between two of its messages."""
+
+OVERFLOW: Final = 0x480
+"""The bits of a status by which a server says that it has dropped changes from a queue."""
+
+
+class OpcUaOptions(Options):
+    """A server, and how often it looks at its nodes and tells of them."""
+
+    url: str
+    every_s: float = Field(default=0.01, gt=0, le=60, allow_inf_nan=False)
+    user: str | None = None
+    password: str | None = None
+
+
+class OpcUaConnection:
+    """A session with a server, and a subscription to the nodes that are read."""
+
+    def __init__(self, client: Client, wanted: Wanted) -> None:
+        self.client = client
+        self.wanted = wanted
+        self.told: asyncio.Queue[tuple[Point, Value] | Exception] = asyncio.Queue()
+        self.points: dict[str, Point] = {}
+        self.types: dict[Point, Any] = {}
+        self.is_first = True
+
+    async def open(self, every_s: float) -> None:
+        """Connect, and subscribe to what is wanted."""
+        from asyncua.ua.uatypes import Double
+
+        self.client.connection_lost_callback = self._lost
+        await self.client.connect()
+        nodes = [self.client.get_node(point) for point in self.wanted.read]
+        self.points = {node.nodeid.to_string(): point for node, point in zip(nodes, self.wanted.read, strict=True)}
+        subscription = await self.client.create_subscription(1000 * every_s, self)
+        if nodes:
+            several: Iterable[Node] = nodes
+            made = await subscription.subscribe_data_change(several, queuesize=QUEUE, sampling_interval=Double(0))
+            for point, one in zip(self.wanted.read, made, strict=True):
+                if not isinstance(one, int):
+                    raise LinkError(f"the server does not let '{point}' be read: {one.name}")
+
+    async def read(self) -> Sequence[tuple[Point, Value]]:
+        """All changes that have come; at first, what every node holds."""
+        batch: list[tuple[Point, Value]] = []
+        missing = set(self.wanted.read) if self.is_first else set()
+        while missing or not batch or not self.told.empty():
+            if self.is_first and not missing and self.told.empty():
+                break
+            one = await asyncio.wait_for(self.told.get(), self.wanted.timeout_s if missing else None)
+            if isinstance(one, Exception):
+                raise LinkError(str(one) or type(one).__name__) from one
+            missing.discard(one[0])
+            batch.append(one)
+        self.is_first = False
+        return batch
+
+    async def write(self, writes: Writes) -> None:
+        """Write values, the last one when the others are confirmed."""
+        for some in (writes[:-1], writes[-1:]):
+            if some:
+                await self._write(some)
+
+    async def close(self) -> None:
+        """End the session if that can be, and the connection in any case."""
+        with suppress(Exception):
+            await asyncio.wait_for(self.client.disconnect(), self.wanted.timeout_s)
+        self.client.disconnect_socket()
+
+    def datachange_notification(self, node: Node, value: Any, data: Any) -> None:
+        """The subscription tells of a change (called by asyncua)."""
+        status = data.monitored_item.Value.StatusCode
+        point = self.points[node.nodeid.to_string()]
+        shown = value if isinstance(value, (bool, int, float, str)) else repr(value)
+        if isinstance(shown, bool) and status.value & OVERFLOW == OVERFLOW:
+            self.told.put_nowait((point, shown))  # how many edges are gone nobody knows, but not fewer than two
+            self.told.put_nowait((point, not shown))
+        self.told.put_nowait((point, shown if status.is_good() else status.name))
+
+    def status_change_notification(self, status: Any) -> None:
+        """The subscription has ended (called by asyncua)."""
+        self.told.put_nowait(LinkError(f"the server has ended the subscription: {status.Status.name}"))
+
+    async def _lost(self, error: Exception) -> None:
+        self.told.put_nowait(error)
+
+    async def _write(self, writes: Writes) -> None:
+        from asyncua import ua
+        from asyncua.ua.uaerrors import UaError
+
+        nodes = [self.client.get_node(point) for point, _ in writes]
+        for (point, _), node in zip(writes, nodes, strict=True):
+            if point not in self.types:
+                self.types[point] = await node.read_data_type_as_variant_type()
+        try:
+            values = [
+                ua.DataValue(ua.Variant(_typed(value, self.types[point]), self.types[point])) for point, value in writes
+            ]
+            await self.client.write_values(nodes, values)
+        except UaError as error:
+            raise LinkError(f"the server does not let '{writes[0][0]}' be written: {error}") from None
+        except (ValueError, TypeError) as error:
+            raise LinkError(f"'{writes[0][0]}' does not take {writes[0][1]!r}: {error}") from None
+
+
+def _typed(value: Value, kind: Any) -> Value:
+    """The value in the type that a node has."""
+    match kind.name:
+        case "Boolean":
+            return bool(value)
+        case "String":
+            return str(value)
+        case "Float" | "Double":
+            return float(value)
+        case _:
+            return int(value)
+
+
+class OpcUa:
+    """OPC UA servers."""
+
+    options: type[Options] = OpcUaOptions
+
+    def point_problem(self, point: Point, use: Use) -> str:
+        """What is wrong with a node id; what may be written only the server knows."""
+        parts = dict(part.partition("=")[::2] for part in point.split(";"))
+        kinds = set(parts) - {"ns"}
+        if len(kinds) != 1 or not kinds <= {"i", "s", "g", "b"} or not parts.get("ns", "0").isdecimal():
+            return f"a node to {use} has an id such as `ns=2;s=Robot.Done` or `ns=3;i=1001`"
+        if "i" in kinds and not parts["i"].isdecimal():
+            return "what stands after `i=` is a number"
+        return ""
+
+    async def connect(self, options: OpcUaOptions, wanted: Wanted) -> Connection:
+        """Make a new client."""
+        from asyncua.client.client import Client
+        from asyncua.ua.uaerrors import UaError
+
+        logging.getLogger("asyncua").addHandler(logging.NullHandler())  # what matters is told by us
+        client = Client(options.url, timeout=wanted.timeout_s, watchdog_intervall=wanted.timeout_s)
+        if options.user is not None:
+            client.set_user(options.user)
+            client.set_password(options.password or "")
+        connection = OpcUaConnection(client, wanted)
+        try:
+            await connection.open(options.every_s)
+        except UaError as error:
+            await connection.close()
+            raise LinkError(f"{options.url}: {error}") from None
+        except BaseException:
+            await connection.close()
+            raise
+        return connection
+
+
+KIND: Final = OpcUa()

@@ -1,0 +1,42 @@
+"""OPC UA against a server of asyncua; making one takes a second, so that all tests have the same."""
+
+import asyncio
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+
+from firable.executor.drivers.bench import Far
+from firable.executor.drivers.conformance import DriverConformance
+from firable.executor.drivers.far_side.machine import ROLES
+from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
+
+POINTS = {role: f"ns=2;s=M.{role}" for role in (*ROLES, "number", "code")}
+BITS = {"sensor", "closed", "tripped", "output"}
+
+
+@pytest.fixture(scope="module")
+def shared() -> Iterator[tuple[asyncio.Runner, OpcUaEnd]]:
+    with asyncio.Runner() as runner:
+        end = OpcUaEnd({point: False if role in BITS else 0 for role, point in POINTS.items()})
+        yield runner, end
+        runner.run(end.end())
+
+
+class TestOpcUa(DriverConformance):
+    @pytest.fixture(autouse=True)
+    def _shared(self, shared: tuple[asyncio.Runner, OpcUaEnd]) -> None:
+        self.runner, self.end = shared
+        self.end.faults.silent = self.end.faults.garbage = False
+        self.end.faults.delay_s = 0.0
+
+    def run(self, work: Any) -> None:
+        self.runner.run(work)
+
+    @asynccontextmanager
+    async def far_end(self) -> AsyncIterator[Far]:
+        if not self.end.port:
+            await self.end.start(lambda _point, _value: None)
+            await self.end.stop()
+        yield Far(self.end, f"driver: opcua, url: 'opc.tcp://127.0.0.1:{self.end.port}/', every_s: 0.005", POINTS)
