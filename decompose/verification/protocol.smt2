@@ -4,12 +4,13 @@
 ; A relation with a number, as marked.1, is what a step makes of it; a definition with one speaks of these.
 ; To check it with another solver: cvc5 --incremental FILE, or z3 FILE; every name is followed by `unsat`.
 ; It can be decided, for functions and what depends on what go one way through the sorts:
-;   Place, Round, Transition, Controller.
+;   Place, Round, Coordinator, Transition, Controller.
 (set-logic UF)
 (declare-sort Place 0)
 (declare-sort Round 0)
 (declare-sort Transition 0)
 (declare-sort Controller 0)
+(declare-sort Coordinator 0)
 (declare-fun marked (Place) Bool)
 (declare-fun shadow (Place) Bool)
 (declare-fun begun (Round) Bool)
@@ -26,23 +27,26 @@
 (declare-fun commit-order (Round Transition Controller) Bool)
 (declare-fun abort-order (Round Transition Controller) Bool)
 (declare-fun acknowledgement (Round Transition Controller) Bool)
+(declare-fun coordinator-of (Round) Coordinator)
 (declare-fun coordinated (Transition) Bool)
 (declare-fun input (Transition Place) Bool)
 (declare-fun output (Transition Place) Bool)
-(declare-fun clears (Transition Place) Bool)
 (declare-fun permissive (Transition Place) Bool)
 (declare-fun inhibitive (Transition Place) Bool)
+(declare-fun clears (Transition Place) Bool)
 (declare-fun takes-part (Transition Controller) Bool)
 (declare-fun owner (Place) Controller)
 (declare-fun home (Transition) Controller)
+(define-fun reads ((t Transition) (p Place)) Bool
+  (or (input t p) (output t p) (permissive t p) (inhibitive t p)))
 (define-fun writes ((t Transition) (p Place)) Bool
   (or (input t p) (output t p) (clears t p)))
-(define-fun reads ((t Transition) (p Place)) Bool
-  (or (writes t p) (permissive t p) (inhibitive t p)))
+(define-fun touches ((t Transition) (p Place)) Bool
+  (or (reads t p) (writes t p)))
 ; assumed of every net: who owns a place that a coordinated transition moves or reads takes part in it (O3)
-(assert (forall ((u Transition) (q Place)) (=> (and (coordinated u) (reads u q)) (takes-part u (owner q)))))
+(assert (forall ((u Transition) (q Place)) (=> (and (coordinated u) (touches u q)) (takes-part u (owner q)))))
 ; assumed of every net: a local transition moves and reads places of its home alone
-(assert (forall ((u Transition) (q Place)) (=> (and (not (coordinated u)) (reads u q)) (= (owner q) (home u)))))
+(assert (forall ((u Transition) (q Place)) (=> (and (not (coordinated u)) (touches u q)) (= (owner q) (home u)))))
 ; invariant V1: a part with a vote stays promised until its order is obeyed
 (define-fun inv-V1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
@@ -514,14 +518,15 @@
 ; 'restart' keeps the invariant
 (push 1)
 (echo "protocol.keeps.restart")
+(declare-const k Coordinator)
 ; given: the invariant
 (assert invariant)
 ; decided after 'restart'
 (define-fun decided.1 ((s Round)) Bool
-  (or (decided s) (begun s)))
+  (or (decided s) (and (begun s) (= (coordinator-of s) k))))
 ; abort-order after 'restart'
 (define-fun abort-order.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (abort-order s u d) (and (asked s u) (takes-part u d) (not (decided s)))))
+  (or (abort-order s u d) (and (asked s u) (takes-part u d) (not (decided s)) (= (coordinator-of s) k))))
 (define-fun inv-V2.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
     (=> (and (promised r t c) (or (not (decided.1 r)) (committed r t))) (part-enabled t c))))
@@ -963,8 +968,8 @@
 (assert invariant)
 ; sense: it is a signal
 (assert (signal p))
-; sense: no promise reads it
-(assert (forall ((s Round) (u Transition)) (=> (promised s u (owner p)) (not (reads u p)))))
+; sense: no promise reads or clears it
+(assert (forall ((s Round) (u Transition)) (=> (promised s u (owner p)) (not (touches u p)))))
 ; marked after 'sense'
 (define-fun marked.1 ((q Place)) Bool
   (or (and (= q p) (not (marked q))) (and (not (= q p)) (marked q))))
@@ -1576,7 +1581,7 @@
 (define-fun shadow.1 ((q Place)) Bool
   (or (and (= q p) (not (shadow q))) (and (not (= q p)) (shadow q))))
 ; and what is to be shown does not hold
-(assert (not (and (signal p) (forall ((s Round) (u Transition)) (=> (promised s u (owner p)) (not (reads u p)))))))
+(assert (not (and (signal p) (forall ((s Round) (u Transition)) (=> (promised s u (owner p)) (not (touches u p)))))))
 (check-sat)
 (pop 1)
 
@@ -1737,14 +1742,15 @@
 ; 'restart' changes nothing, or makes something known for good
 (push 1)
 (echo "protocol.advances.restart")
+(declare-const k Coordinator)
 ; given: the invariant
 (assert invariant)
 ; decided after 'restart'
 (define-fun decided.1 ((s Round)) Bool
-  (or (decided s) (begun s)))
+  (or (decided s) (and (begun s) (= (coordinator-of s) k))))
 ; abort-order after 'restart'
 (define-fun abort-order.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (abort-order s u d) (and (asked s u) (takes-part u d) (not (decided s)))))
+  (or (abort-order s u d) (and (asked s u) (takes-part u d) (not (decided s)) (= (coordinator-of s) k))))
 ; and what is to be shown does not hold
 (assert (not
   (and

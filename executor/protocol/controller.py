@@ -2,7 +2,7 @@
 
 It fires its local transitions by itself and its parts of coordinated transitions on the coordinator's commit only.
 A yes vote is a promise (O1): until the round is decided, the parts promised are a *lock*. What disturbs a lock waits:
-local transitions, other promises, and changes of the signals that the promised parts read, which are latched outside
+local transitions, other promises, and changes of the signals that the promised parts read or clear, latched outside
 the process image and taken in when the lock is released. So an external gate that was open at the vote is open, in
 the image, at the commit, and the commit always finds its part enabled. (The signal itself may have dropped meanwhile:
 Eq. (8) then means "each true at its own vote", which SEMANTICS O4 accepts for gates that no command clears.)
@@ -334,7 +334,7 @@ class LocalController:
         return any(transition.disturbs(promise.writes, promise.reads) for promise in self.promises.values())
 
     def _locked_reads(self) -> int:
-        return _union(promise.reads for promise in self.promises.values())
+        return _union(promise.reads | promise.writes for promise in self.promises.values())
 
     def _readiness(self) -> Readiness:
         enabled = () if self.held else self.parts.items()

@@ -4,7 +4,8 @@ Places and signals of a net share one integer, the *word*: bit i is place i, bit
 A transition is enabled iff all bits of `needs` are set and none of `forbids`; it fires by clearing and setting bits.
 The completion signal of a command is cleared in the same act in which the token enters the place (SEMANTICS,
 "Completion gates"), so for the protocol a completion is one more thing that a transition writes, and a gate one more
-that it reads.
+that it reads. Who clears a signal does not read it: two commands that one signal completes do not disturb each other by
+it, for cleared twice is cleared.
 
 This is a compiled copy of the rule, not the rule: `firable.semantics.firing` is, and the tests hold the copy to it.
 """
@@ -44,8 +45,8 @@ class Compiled:
 
     @property
     def reads(self) -> Word:
-        """The sources of gates, internal and external, and everything written."""
-        return self.needs | self.forbids | self.clears
+        """The places that it moves tokens of, and the sources of gates, internal and external."""
+        return self.needs | self.forbids
 
     def enabled(self, word: Word) -> bool:
         """Eq. (1) and (2): firable, and every external gate open."""

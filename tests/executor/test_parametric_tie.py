@@ -300,7 +300,7 @@ FAULTS: list[tuple[str, type, str]] = [
     ("controller", NoLock, "O1"),
     ("controller", AppliesTwice, "leads elsewhere"),
     ("controller", VotesAgain, "obeyed"),
-    ("controller", SignalsUnlocked, "no promise reads it"),
+    ("controller", SignalsUnlocked, "no promise reads or clears it"),
     ("coordinator", StaleVotes, "a vote of the round has arrived"),
     ("coordinator", DecidesEarly, "all who take part have voted yes"),
     ("coordinator", ClosesEarly, "an acknowledgement of the round has arrived"),

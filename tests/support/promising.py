@@ -47,7 +47,7 @@ class Sets:
 
     @property
     def reads(self) -> Marking:
-        return self.full | self.empty | self.clears
+        return self.full | self.empty
 
     @property
     def writes(self) -> Marking:
@@ -154,7 +154,7 @@ class Promising:
                 local, central = sets.fire(now.local), sets.fire(now.central)
                 yield replace(now, local=local, central=central) if sets.firable(now.central) else None
         for bit, places in self.waiting:
-            latched = any(self.of(part).reads & bit for part in now.promised)
+            latched = any((self.of(part).reads | self.of(part).clears) & bit for part in now.promised)
             if now.local & places and not now.local & bit and not latched:
                 stale = any(self.of(part).clears & bit for part in now.ordered)
                 yield replace(now, local=now.local | bit, central=now.central if stale else now.central | bit)

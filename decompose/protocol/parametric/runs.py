@@ -8,7 +8,7 @@ run is not shown. The right protocol has such runs too, of which nothing is wron
 happen, and that what is proved is not proved of nothing.
 
 A run stands as text, `promise r1 G a; fire l`: an action and the names for its parameters. Names of rounds are r1, r2;
-of coordinated transitions capital letters, of local ones small; of controllers a, b, c. There are no other things but
+of coordinated transitions capital letters, of local ones small; of controllers a, b, c; of coordinators k1, k2. There are no other things but
 places, which are p1, p2 and so on, as many as asked for; a place that a step names is a signal. Rejected: a search for
 the actions, too; it takes minutes where this takes a tenth of a second, and the runs worth showing are known.
 """
@@ -38,6 +38,7 @@ from firable.decompose.protocol.parametric.script import Script
 from firable.decompose.protocol.parametric.system import (
     INITIAL,
     Controller,
+    Coordinator,
     Place,
     Protocol,
     Round,
@@ -90,6 +91,7 @@ class _Stage:
     transitions: tuple[Variable, ...]
     controllers: tuple[Variable, ...]
     rounds: tuple[Variable, ...]
+    coordinators: tuple[Variable, ...]
 
     @property
     def sorts(self) -> tuple[tuple[Sort, tuple[Variable, ...]], ...]:
@@ -98,6 +100,7 @@ class _Stage:
             (Transition, self.transitions),
             (Controller, self.controllers),
             (Round, self.rounds),
+            (Coordinator, self.coordinators),
         )
 
 
@@ -182,7 +185,7 @@ def _stage(protocol: Protocol, steps: Sequence[Step], places: int, given: Sequen
         return tuple(sorted((v for v in found if v.sort == sort), key=lambda v: v.name))
 
     ordinary = tuple(Variable(f"p{i + 1}", Place) for i in range(places))
-    return _Stage(ordinary, of(Place), of(Transition), of(Controller), of(Round))
+    return _Stage(ordinary, of(Place), of(Transition), of(Controller), of(Round), of(Coordinator))
 
 
 def _named(protocol: Protocol, step: Step) -> Iterator[tuple[Variable, Variable]]:

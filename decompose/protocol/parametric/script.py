@@ -103,11 +103,13 @@ class Script:
         """Add a comment."""
         self._body.append(f"; {words}")
 
-    def speak_of(self, *items: Relation | Definition) -> None:
-        """Declare relations and write definitions before anything is said with them."""
+    def speak_of(self, *items: Relation | Function | Definition) -> None:
+        """Declare relations and functions and write definitions before anything is said with them."""
         for item in items:
             if isinstance(item, Relation):
                 self._declare(item)
+            elif isinstance(item, Function):
+                self._declare_function(item)
             else:
                 self._define_once(item)
 
@@ -209,10 +211,12 @@ class Script:
 
     def _declare_term(self, term: Term) -> None:
         if isinstance(term, Application):
-            function: Function = term.function
-            self._declare_sorts((function.argument, function.sort))
-            text = f"(declare-fun {function.name} ({function.argument.name}) {function.sort.name})"
-            self._declared.setdefault(function.name, text)
+            self._declare_function(term.function)
+
+    def _declare_function(self, function: Function) -> None:
+        self._declare_sorts((function.argument, function.sort))
+        text = f"(declare-fun {function.name} ({function.argument.name}) {function.sort.name})"
+        self._declared.setdefault(function.name, text)
 
     def _declare_constant(self, name: str, sort: Sort) -> None:
         self._declare_sorts((sort,))

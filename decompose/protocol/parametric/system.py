@@ -10,14 +10,16 @@ each decomposition (`side_conditions`).
 
 **Signals.** To the protocol a signal, as the process image of its owner has it, is a place that the cell fills and
 empties (`sense`): an external gate reads it as an internal one reads a place, and a command that it completes clears
-it. A change of a signal that a promise reads is kept out of the image until the promise ends, so here it happens later.
+it. That two commands clear one signal keeps neither promise from the other: cleared twice is cleared. A change of a signal that a promise reads or clears is kept out of the image until the promise ends, so here it happens later.
 What is proved is thus Eq. (1) *and* (2), of the images that the controllers have at one instant. That an image tells
 the truth about the cell is assumed (O4).
 
-**Rounds.** The coordinator asks for transitions in rounds, each decided once: with one transition committed, or with
-none. Any number of rounds may be open at once, of one arbitration group or of several, and a round may ask for any
-transitions: the proof needs no groups, because parts that conflict disturb each other, and a promise in one round
-refuses those of others. What was asked together is told apart by the one commit of each round.
+**Rounds.** Coordinators ask for transitions in rounds, each decided once: with one transition committed, or with none.
+A round is that of one coordinator, of which there are any number, beside or above each other: none knows what another
+one has open, and nothing is asked of who decides what. Any number of rounds may be open at once, of one arbitration
+group or of several, and a round may ask for any transitions: the proof needs no groups, because parts that conflict
+disturb each other, and a promise in one round refuses those of others, whoever decides them. What was asked together is
+told apart by the one commit of each round.
 
 **Messages.** A message, once sent, is in a set that only grows, and whoever reads the set may act on it at any time,
 again and again, or never. So each message may be lost, doubled, delayed and overtaken, without limit, and no fault has
@@ -26,7 +28,7 @@ that is bad in every way (Lamport, Specifying Systems; Padon et al., Ivy, PLDI 2
 
 **Crashes.** A controller that crashes does nothing for a while, or for ever; its memory is stable (O6). So its crash
 changes nothing here, and whatever it might do stays possible after its restart. A coordinator that crashes keeps what
-it has decided and gives up the rest (`restart`).
+it has decided and gives up the rest of its rounds (`restart`).
 
 **What fires when.** `shadow` is the marking of the central net: it fires at a commit and at each local firing, and has
 the signals of the images. All that is proved compares it with `marked`, what the controllers hold.
@@ -57,14 +59,17 @@ from firable.decompose.protocol.parametric.script import Action, Demand, Update
 # --- What there is
 
 Place, Transition, Controller, Round = Sort("Place"), Sort("Transition"), Sort("Controller"), Sort("Round")
+Coordinator = Sort("Coordinator")
 
 p, t, c, r = Variable("p", Place), Variable("t", Transition), Variable("c", Controller), Variable("r", Round)
+k = Variable("k", Coordinator)
 """Parameters of actions."""
 q, u, d, s = Variable("q", Place), Variable("u", Transition), Variable("d", Controller), Variable("s", Round)
 """Whatever else there is of the sorts."""
 
 owner = Function("owner", Place, Controller)
 home = Function("home", Transition, Controller)
+coordinator_of = Function("coordinator-of", Round, Coordinator)  # so no two rounds of theirs have one name
 coordinated = Relation("coordinated", (Transition,))
 input_of = Relation("input", (Transition, Place))
 output_of = Relation("output", (Transition, Place))
@@ -76,7 +81,10 @@ signal = Relation("signal", (Place,))
 initially = Relation("initially", (Place,))
 
 writes = Definition("writes", (t, p), input_of(t, p) | output_of(t, p) | clears(t, p))
-reads = Definition("reads", (t, p), writes(t, p) | permissive_of(t, p) | inhibitive_of(t, p))
+reads = Definition(
+    "reads", (t, p), input_of(t, p) | output_of(t, p) | permissive_of(t, p) | inhibitive_of(t, p)
+)
+touches = Definition("touches", (t, p), reads(t, p) | writes(t, p))
 disturb = Definition(  # firing one could change what the other reads
     "disturb-at", (t, u, p), (writes(t, p) & reads(u, p)) | (reads(t, p) & writes(u, p))
 )
@@ -84,10 +92,10 @@ disturb = Definition(  # firing one could change what the other reads
 GATES_TAKE_PART: Final = "who owns a place that a coordinated transition moves or reads takes part in it (O3)"
 
 STATIC: Final[tuple[tuple[str, Formula], ...]] = (
-    (GATES_TAKE_PART, forall(u, q)((coordinated(u) & reads(u, q)).implies(takes_part(u, owner(q))))),
+    (GATES_TAKE_PART, forall(u, q)((coordinated(u) & touches(u, q)).implies(takes_part(u, owner(q))))),
     (
         "a local transition moves and reads places of its home alone",
-        forall(u, q)((~coordinated(u) & reads(u, q)).implies(same(owner(q), home(u)))),
+        forall(u, q)((~coordinated(u) & touches(u, q)).implies(same(owner(q), home(u)))),
     ),
 )
 """What is assumed of every net and its split, and checked of each."""
@@ -196,7 +204,7 @@ def part_applied(of: Variable, at: Term) -> Update:
     return Update(marked, (q,), (own & _fired(marked, of, q)) | (~own & marked(q)))
 
 
-_stop_all = abort_order(s, u, d) | (asked(s, u) & takes_part(u, d) & ~decided(s))
+_stop_all = abort_order(s, u, d) | (asked(s, u) & takes_part(u, d) & ~decided(s) & same(coordinator_of(s), k))
 
 ASK: Final = Action(
     "ask",
@@ -264,13 +272,13 @@ GIVE_UP: Final = Action(
 )
 RESTART: Final = Action(
     "restart",
-    (),
+    (k,),
     (),
     (
-        adds_where(decided, begun(s)),
+        adds_where(decided, begun(s) & same(coordinator_of(s), k)),
         Update(abort_order, (s, u, d), _stop_all),
     ),
-    "the coordinator crashes, starts again, and gives up all rounds that are not decided",
+    "the coordinator {k} crashes, starts again, and gives up all of its rounds that are not decided",
 )
 APPLY: Final = Action(
     "apply",
@@ -338,7 +346,7 @@ SENSE: Final = Action(
     (p,),
     (
         Demand("it is a signal", signal(p)),
-        Demand("no promise reads it", forall(s, u)(promised(s, u, owner(p)).implies(~reads(u, p)))),
+        Demand("no promise reads or clears it", forall(s, u)(promised(s, u, owner(p)).implies(~touches(u, p)))),
     ),
     tuple(Update(tokens, (q,), (same(q, p) & ~tokens(q)) | (~same(q, p) & tokens(q))) for tokens in (marked, shadow)),
     "the signal {p} changes",

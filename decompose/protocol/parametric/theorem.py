@@ -55,6 +55,7 @@ from firable.decompose.protocol.parametric.system import (
     closed_round,
     commit_order,
     coordinated,
+    coordinator_of,
     d,
     decided,
     formals_of,
@@ -118,7 +119,7 @@ class ParametricObligation:
 def theory(protocol: Protocol = PROTOCOL, conjuncts: Sequence[Conjunct] = INVARIANT) -> Script:
     """What there is, what is assumed of every net, and what the invariant says."""
     script = Script()
-    script.speak_of(*MOVING)
+    script.speak_of(*MOVING, coordinator_of)
     for words, formula in protocol.static:
         script.add(formula, f"assumed of every net: {words}")
     for conjunct in conjuncts:

@@ -43,9 +43,11 @@ from firable.decompose.protocol.parametric.system import (
     central_enabled,
     commit_order,
     coordinated,
+    coordinator_of,
     d,
     home,
     input_of,
+    k,
     marked,
     obeyed,
     owner,
@@ -68,6 +70,7 @@ STUCK: Final = none_open & exists(s, u, d)(promised(s, u, d))
 
 EARLIER: Final = Variable("e", Round)
 """The round of a message, where it is not asked whether it is the present one."""
+_OTHER: Final = Variable("o", Transition)
 
 
 @dataclass(frozen=True)
@@ -395,18 +398,35 @@ WRONG: Final = (
     Wrong(
         "decisions-not-in-stable-storage",
         "O6",
-        "a coordinator that crashes forgets what it has decided, and gives up every round that is begun",
+        "a coordinator that crashes forgets what it has decided, and gives up every round that it has begun",
         _with(
             "restart",
             lambda action: replace(
                 action,
-                updates=(action.updates[0], adds_where(abort_order, asked(s, u) & takes_part(u, d))),
+                updates=(
+                    action.updates[0],
+                    adds_where(abort_order, asked(s, u) & takes_part(u, d) & same(coordinator_of(s), k)),
+                ),
             ),
         ),
         ("keeps.restart",),
-        f"{_VOTES}; decide r1 G; apply r1 G a; restart; release r1 G b; note r1 G a; note r1 G b; close r1",
+        f"{_VOTES}; decide r1 G; apply r1 G a; restart k1; release r1 G b; note r1 G a; note r1 G b; close r1",
         2,
         APART,
+    ),
+    Wrong(
+        "rounds-of-one-number",
+        "O8",
+        "each coordinator numbers its rounds, and an abort of one is taken for that of another one's round",
+        _instead(
+            "release",
+            "the order to abort",
+            abort_order(EARLIER, _OTHER, c) & ~same(coordinator_of(EARLIER), coordinator_of(r)),
+            *(EARLIER, _OTHER),
+        ),
+        ("keeps.release",),
+        f"{_VOTES}; ask r2 H; give-up r2; release r1 G a r2 H; fire l; decide r1 G",
+        4,
     ),
     Wrong(
         "filled-outputs-not-looked-at",
