@@ -72,7 +72,7 @@ def ask(decomposition: Decomposition, asked: Asked, seconds: float, *, evidence:
     from firable.decompose.protocol.outages import outage_verdict, outages
     from firable.decompose.protocol.refuting import readable, refute
     from firable.decompose.protocol.verdicts import protocol_verdicts
-    from firable.decompose.protocol.wrong import WRONG
+    from firable.decompose.protocol.wrong import wrong_protocols
 
     def limits() -> Limits:
         return Limits(Deadline.after(seconds))
@@ -86,7 +86,11 @@ def ask(decomposition: Decomposition, asked: Asked, seconds: float, *, evidence:
         verdicts, protocols = found.verdicts, found.protocols
         files = found.evidence() if evidence else {}
     dead = tuple(outages(decomposition, limits)) if asked.faults else ()
-    refutations = tuple(readable(refute(wrong, decomposition, limits())) for wrong in WRONG) if asked.wrong else ()
+    refutations = (
+        tuple(readable(refute(wrong, decomposition, limits())) for wrong in wrong_protocols(decomposition.net))
+        if asked.wrong
+        else ()
+    )
     verdicts += tuple(map(outage_verdict, dead)) + tuple(one.verdict for one in refutations)
     protocols |= {refutation.verdict.name: refutation.protocol for refutation in refutations}
     return Answered(verdicts, protocols, files, dead, refutations)

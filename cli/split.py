@@ -226,8 +226,8 @@ def _because(reasons: Sequence[dict[str, Any]]) -> Iterator[str]:
         elif reason["because"] == "conflict":
             yield f"{reason['transition']}: local, in conflict with {reason['rival']} at {reason['place']}"
         if lower := reason["lifted_from"]:
-            rival = f"in conflict with {reason['rival']} at {reason['place']}"
-            yield f"{reason['transition']}: would be decided by {lower}, but stands {rival}, which is not"
+            rival = f"{reason['rival']} at {reason['place']}"
+            yield f"{reason['transition']}: would be decided by {lower}, but competes with {rival}, which is not"
 
 
 def _groups(report: Report) -> Iterator[str]:

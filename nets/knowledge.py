@@ -21,6 +21,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
+from firable.nets.contention import contentions
 from firable.nets.decomposition import Decomposition
 from firable.nets.layers import Layers
 from firable.nets.net import Net, Transition
@@ -43,7 +44,8 @@ class Reason:
 
     `gates` are the places and signals of other controllers that its gates read, where nothing else makes it global.
     `rival` is what it conflicts with at `place`: by which a local transition is joined to a global one, or one whose
-    participants all stand under the coordinator `lifted_from` is decided by another one above that.
+    participants all stand under the coordinator `lifted_from` is decided by another one above that; that may also be
+    one that it contends with there (`firable.nets.contention`).
     """
 
     transition: str
@@ -85,7 +87,7 @@ class Knowledge:
 def reasons(decomposition: Decomposition) -> tuple[Reason, ...]:
     """Why the coordinator decides each transition that it decides, in the order of the net."""
     net = decomposition.net
-    joined, layers = _joined(decomposition), Layers(net)
+    joined, layers, in_the_way = _joined(decomposition), Layers(net), _in_the_way(decomposition)
     found = []
     for row in decomposition.coordinated:
         if row.name not in net.transition_index:
@@ -100,7 +102,7 @@ def reasons(decomposition: Decomposition) -> tuple[Reason, ...]:
         if (lower := layers.common(part.controller for part in row.parts)) == (row.at or layers.root):
             lower = ""
         else:
-            rival, place = _rival(net, transition)
+            rival, place = _rival(net, transition) or in_the_way.get(row.name, ("", ""))
         if len(movers) > 1:
             found.append(Reason(row.name, Because.ARCS, (), rival, place, lower))
             continue
@@ -214,14 +216,25 @@ def _joined(decomposition: Decomposition) -> Mapping[str, tuple[str, str]]:
     return joined
 
 
-def _rival(net: Net, transition: Transition) -> tuple[str, str]:
-    """One that it conflicts with, and the place; empty where there is none."""
+def _rival(net: Net, transition: Transition) -> tuple[str, str] | None:
+    """One that it conflicts with, and the place; None where there is none."""
     for places, table in ((transition.inputs, net.consumers), (transition.outputs, net.producers)):
         for place in places:
             for other in table[net.place_index[place]]:
                 if net.transitions[other] is not transition:
                     return net.transitions[other].name, place
-    return "", ""
+    return None
+
+
+def _in_the_way(decomposition: Decomposition) -> Mapping[str, tuple[str, str]]:
+    """Of each coordinated transition, one that it contends with, and the place or signal."""
+    net, found = decomposition.net, dict[str, tuple[str, str]]()
+    if Layers(net).several:
+        names = {row.name for row in decomposition.coordinated}
+        for one in contentions(net, names):
+            found.setdefault(one.mover, (one.reader, one.at))
+            found.setdefault(one.reader, (one.mover, one.at))
+    return found
 
 
 def _keeping(subnet: Net) -> Callable[[Transition], bool]:

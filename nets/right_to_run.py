@@ -65,6 +65,7 @@ def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
     if Layers(net).several:
         yield "o8"
         yield from (f"o8.{t.name}" for t in net.transitions if len(_owners(net, t)) > 1)
+        yield "o8-apart"
     yield from ("ownership", "initial-marking", "commands", "arbitration")
     yield from (f"arbitration.{group.name}" for group in decomposition.groups)
     yield from PROTOCOL

@@ -2,7 +2,7 @@
 
 A run of the protocol is a run of a net of its own, whose places are promises, messages and a copy of the central net,
 and belong to no controller. What is to be seen is who does what after what: so each event stands in words in the lane
-of the controller that acts, of the coordinator, or of nobody where a message is lost or comes late. Beside it stand
+of the controller that acts, of its coordinator, or of nobody where a message is lost or comes late. Beside it stand
 the tokens that the controllers gain and lose, each in the lane of its owner; what the central net holds meanwhile is
 told by the last event, or by the sentence below the run. The step record beside the net says who acts.
 
@@ -59,18 +59,22 @@ def _table(rows: Sequence[Markup], lanes: Sequence[str], foot: Markup | None = N
 
 
 def _actor(protocol: ProtocolNet, step: Step) -> str:
-    from firable.decompose.protocol.draft import OUTSIDE
 
     of = protocol.steps[step.fired[0]]
-    return of.controller or (_NOBODY if of.kind in OUTSIDE - {"crash", "restart"} else _COORDINATOR)
+    return of.controller or of.coordinator or _NOBODY
 
 
 def _lanes(protocol: ProtocolNet, steps: Sequence[Step]) -> tuple[str, ...]:
-    """Who acts in the run, in the order of the cell, the coordinator first, and whose tokens change."""
+    """Who acts in the run, in the order of the cell, coordinators first, and whose tokens change."""
     touched = {_actor(protocol, step) for step in steps}
     touched |= {lane for step in steps for lane, _ in _changes(protocol, step)}
-    names = (_COORDINATOR, *(controller.name for controller in protocol.parts.net.controllers), _NOBODY)
-    return tuple(name for name in names if name in touched)
+    names = (
+        _COORDINATOR,
+        *protocol.parts.deciders,
+        *(controller.name for controller in protocol.parts.net.controllers),
+        _NOBODY,
+    )
+    return tuple(name for name in dict.fromkeys(names) if name in touched)
 
 
 def _changes(protocol: ProtocolNet, step: Step) -> list[tuple[str, Markup]]:

@@ -17,7 +17,7 @@ from firable.decompose.proofs.discharging import static
 from firable.decompose.proofs.family import Family, Kind, Proved, Task
 from firable.decompose.proofs.firability import firability
 from firable.decompose.proofs.initial_marking import initial_marking
-from firable.decompose.proofs.layers import layers
+from firable.decompose.proofs.layers import apart, layers
 from firable.decompose.proofs.next_tokens import next_tokens
 from firable.decompose.proofs.obligation import Obligation
 from firable.decompose.proofs.openness import openness
@@ -54,7 +54,10 @@ FAMILIES: Final[tuple[Family, ...]] = (
     _static("ownership", "ownership", "each place and signal is owned once, by its owner", ownership, "O3"),
     _static("initial-marking", "M0", "the initial markings of the subnets together are M0", initial_marking),
     _static("commands", "commands", "the subnets send the commands of the net, on the same places", commands),
-    _static("o8", "O8", "votes add up layer by layer, and conflicts meet in one coordinator", layers, "O8"),
+    _static("o8", "O8", "votes add up layer by layer, and competitors meet in one coordinator", layers, "O8"),
+    _static(
+        "o8-apart", "O8 promises", "no coordinator's promise stands in the way of another coordinator", apart, "O8"
+    ),
     _static("arbitration", "arbitration", "conflicts are decided as in the central net", arbitration, "O2"),
     Family(
         "protocol",

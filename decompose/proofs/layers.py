@@ -1,4 +1,4 @@
-"""O8: with coordinators above coordinators, votes still add up to Eq. (7) and (8), and conflicts meet in one decider.
+"""O8: with coordinators above coordinators, votes still add up to Eq. (7) and (8), and competitors meet in one decider.
 
 A coordinator that is asked from above answers with the AND of its children's votes, so what the decider of a transition
 computes is a conjunction bracketed along the tree, from its participants up to it. For each global transition that is
@@ -8,8 +8,12 @@ that part is not firable. That the tree is one, each controller under one coordi
 of the net.
 
 Who decides is a fact for each row and group: the lowest common ancestor of all participants, of the whole conflict
-component where there is one. Here it is found by its definition, the deepest of those that are above everyone, and not
-by the search from below that the split uses.
+component where there is one, and of all that contend (`firable.nets.contention`). Here it is found by its definition,
+the deepest of those that are above everyone, and not by the search from below that the split uses.
+
+What this is for is an obligation of its own: no two coordinators ask one controller for parts that are firable together
+and disturb each other (`apart`). So what one coordinator has been promised never makes another one give up a round, and
+no two of them give up for ever because of each other. It is stated of the table as it is, whoever made it.
 
 Nothing is to be shown of a net in one layer.
 """
@@ -18,13 +22,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 from firable.analysis.induction.smt import Term, Terms
-from firable.decompose.proofs.obligation import Obligation, equation, facts
+from firable.decompose.proofs.obligation import Obligation, claimed, equation, facts
 from firable.decompose.proofs.sides import Sides, holds, signals
+from firable.nets.contention import contentions
 from firable.nets.layers import Layers
-from firable.nets.net import Net
+from firable.nets.net import Net, Transition
 from firable.semantics.firing import enabled
 
 
@@ -37,6 +42,41 @@ def layers(sides: Sides) -> Iterator[Obligation]:
     for row in sides.decomposition.coordinated:
         if row.is_global:
             yield _votes(sides, tree, row.name, row.at or tree.root, [part.controller for part in row.parts])
+
+
+def apart(sides: Sides) -> Iterator[Obligation]:
+    """That no promise to one coordinator stands in the way of another one; nothing where there is one layer."""
+    tree = Layers(sides.net)
+    if not tree.several:
+        return
+    terms = Terms()
+    at = {row.name: row.at or tree.root for row in sides.decomposition.coordinated}
+    never: list[Term] = []
+    for subnet in sides.subnets:
+        its = [(at[whole], t) for t in range(len(subnet.transitions)) if (whole := sides.whole_of(subnet, t)) in at]
+        for (one, t), (other, u) in combinations(its, 2):
+            if one != other and _disturb(subnet, subnet.transitions[t], subnet.transitions[u]):
+                never.append(terms.negation(terms.conjunction([_yes(terms, subnet, t), _yes(terms, subnet, u)])))
+    yield claimed(
+        terms,
+        "o8-apart",
+        "no two coordinators ask one controller for parts that could both be promised and disturb each other",
+        terms.conjunction(never),
+    )
+
+
+def _disturb(subnet: Net, t: Transition, u: Transition) -> bool:
+    """Whether firing one part could change what the other one reads (O1)."""
+
+    def moved(part: Transition) -> set[str]:
+        cleared = {subnet.place(place).completion for place in part.outputs}
+        return {*part.inputs, *part.outputs, *(name for name in cleared if name is not None)}
+
+    def read(part: Transition) -> set[str]:
+        gates = (gate.signal for gate in part.external)
+        return {*part.inputs, *part.outputs, *part.permissive, *part.inhibitive, *gates}
+
+    return not (moved(t).isdisjoint(read(u)) and moved(u).isdisjoint(read(t)))
 
 
 def _votes(sides: Sides, tree: Layers, name: str, at: str, owners: Sequence[str]) -> Obligation:
@@ -81,13 +121,21 @@ def _deciders(sides: Sides, tree: Layers) -> Obligation:
         owners |= {net.signal(gate.signal).owner for gate in transition.external}
         participants[transition.name] = {owner for owner in owners if owner is not None}
     central = {name: _lowest(tree, owners) for name, owners in participants.items() if len(owners) > 1}
-    of_group: list[str] = []
+    together: dict[str, list[str]] = {name: [name] for name in central}
+    groups: dict[str, list[str]] = {}
     for group in arbitration.groups:
         members = [net.transitions[t].name for t in dict.fromkeys((*group.sequence, *group.rest))]
         if any(name in central for name in members):
-            at = _lowest(tree, set().union(*(participants[name] for name in members)))
-            central.update(dict.fromkeys(members, at))
-            of_group.append(f"'{at}' decides the group {group.name}")
+            groups[group.name] = members
+            together.update(dict.fromkeys(members, members))
+    for found in contentions(net, together.keys()):
+        one, other = together[found.mover], together[found.reader]
+        if one is not other:
+            one.extend(other)
+            together.update(dict.fromkeys(other, one))
+    for name, members in together.items():
+        central[name] = _lowest(tree, set().union(*(participants[member] for member in members)))
+    of_group = [f"'{central[members[0]]}' decides the group {name}" for name, members in groups.items()]
     made = [f"'{row.at or tree.root}' decides {row.name}" for row in sides.decomposition.coordinated]
     made += [
         f"'{group.at or tree.root}' decides the group {group.name}"
@@ -96,7 +144,7 @@ def _deciders(sides: Sides, tree: Layers) -> Obligation:
     ]
     return facts(
         "o8",
-        "each transition, with all that it conflicts with, is decided by the lowest coordinator above all participants",
+        "each transition, with all that it competes with, is decided by the lowest coordinator above all participants",
         [*(f"'{at}' decides {name}" for name, at in central.items()), *of_group],
         made,
     )

@@ -49,7 +49,14 @@ def _decide(draft: Draft, parts: Parts, t: str, voting: Collection[Part]) -> Non
             empty += draft.down_places(part.controller)
     if parts.variant.serial:
         empty += [at(ORDER, part) for others in parts.coordinated.values() for part in others]
-    draft.fire(f"decide/{t}", Step("decide", f"{t} is decided", fires=t), inputs, outputs, full, empty)
+    draft.fire(
+        f"decide/{t}",
+        Step("decide", f"{t} is decided", fires=t, coordinator=parts.decider(t)),
+        inputs,
+        outputs,
+        full,
+        empty,
+    )
 
 
 def _vote(draft: Draft, parts: Parts, part: Part) -> None:

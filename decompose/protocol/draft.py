@@ -15,16 +15,16 @@ of its firing sequence says why. *Obeying blindly*: what a controller does that 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Final
 
 from firable.decompose.protocol.parts import Part
+from firable.nets.layers import COORDINATOR
 from firable.nets.net import Net, Place, Transition
 
 ASTRAY: Final = "astray"
 """Something has fired that the central net could not fire."""
-COORDINATOR_DOWN: Final = "coordinator-down"
 
 CHANNELS: Final = ("request", "vote", "commit-order", "abort-order", "acknowledgement")
 """The messages of a part, each with a place that holds a token while it is on its way."""
@@ -45,6 +45,11 @@ def down(controller: str) -> str:
     return f"down/{controller}"
 
 
+def coordinator_down(coordinator: str) -> str:
+    """The place that holds a token while a coordinator is down, which is named as `Parts.decider` does."""
+    return "/".join(["coordinator-down", *([] if coordinator == COORDINATOR else [coordinator.partition(" ")[2]])])
+
+
 def late(channel: str) -> str:
     """The place of a copy of a message that comes late."""
     return f"late/{channel}"
@@ -55,7 +60,8 @@ class Step:
     """What one transition of a protocol net is: an event, in the words of a person who watches.
 
     `kind` is that of the protocol (`promise`, `decide`), `fires` the transition of the central net that fires by it,
-    `why` the reason for which the central net cannot follow.
+    `why` the reason for which the central net cannot follow. Who takes the step is a controller or a `coordinator`, in
+    the words of `Parts.decider`; nobody takes what just happens, as the loss of a message.
     """
 
     kind: str
@@ -63,6 +69,7 @@ class Step:
     controller: str = ""
     fires: str = ""
     why: str = ""
+    coordinator: str = ""
 
     def __str__(self) -> str:
         return f"{self.text}, {self.why}" if self.why else self.text
@@ -122,7 +129,7 @@ class Draft:
         for places, wanted in (((*t.inputs, *t.permissive), True), ((*t.outputs, *t.inhibitive), False)):
             for place in dict.fromkeys(places):
                 why = f"though in the central net {place} is {'empty' if wanted else 'full'}"
-                astray = Step(step.kind, step.text, step.controller, step.fires, why)
+                astray = replace(step, why=why)
                 known = ([], [central(place)]) if wanted else ([central(place)], [])
                 self.step(
                     f"{name}/astray/{place}",
@@ -133,8 +140,7 @@ class Draft:
                     [*empty, *known[1]],
                 )
         if self.onward:
-            onward = Step(step.kind, step.text, step.controller, step.fires)
-            self.step(f"{name}/onward", onward, inputs, outputs, [*full, ASTRAY], empty)
+            self.step(f"{name}/onward", step, inputs, outputs, [*full, ASTRAY], empty)
 
     def net(self, name: str) -> Net:
         """The net as it stands."""
@@ -142,12 +148,15 @@ class Draft:
         return Net(name, places, tuple(self.transitions))
 
     def down_places(self, controller: str) -> list[str]:
-        """What holds a token while a controller (empty: the coordinator) is down, where they can be."""
-        place = down(controller) if controller else COORDINATOR_DOWN
-        return [place] if place in self.places else []
+        """What holds a token while a controller is down, where it can be."""
+        return [place] if (place := down(controller)) in self.places else []
 
     def _up(self, step: Step) -> list[str]:
-        return [] if step.kind in OUTSIDE else self.down_places(step.controller)
+        if step.kind in OUTSIDE:
+            return []
+        if step.controller:
+            return self.down_places(step.controller)
+        return [place] if (place := coordinator_down(step.coordinator)) in self.places else []
 
 
 OUTSIDE: Final = frozenset({"lose", "double", "late", "crash", "restart", "forget", "cease"})

@@ -1,4 +1,4 @@
-"""The faults as steps: a message is lost or doubled, a controller or the coordinator crashes and starts again.
+"""The faults as steps: a message is lost or doubled, a controller or a coordinator crashes and starts again.
 
 A fault that may happen once takes its token from a place of its own, so that all runs with at most one such fault are
 runs of the one net. Faults that may happen again and again do so as long as `faults-go-on` holds a token, and at some
@@ -22,9 +22,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from firable.decompose.protocol.draft import COORDINATOR_DOWN, Draft, Step, at, down, late
+from firable.decompose.protocol.draft import Draft, Step, at, coordinator_down, down, late
 from firable.decompose.protocol.parts import Part, Parts
 from firable.decompose.protocol.variant import Faults, Often
+from firable.nets.layers import COORDINATOR
 
 WORDS: Final = {
     "request": "the request for {t} to {c}",
@@ -54,7 +55,8 @@ def declare_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterabl
     if faults.duplication and any(is_numbered(parts, channel) for channel in channels):
         draft.place(IGNORED)
     if faults.coordinator:
-        draft.place(COORDINATOR_DOWN)
+        for coordinator in crashing_coordinators(parts, faults):
+            draft.place(coordinator_down(coordinator))
     if faults.crash:
         for controller in crashing(parts, faults):
             draft.place(down(controller))
@@ -69,6 +71,11 @@ def crashing(parts: Parts, faults: Faults) -> tuple[str, ...]:
     """The controllers that may crash."""
     names = tuple(subnet.name for subnet in parts.decomposition.subnets)
     return (faults.doomed,) if faults.doomed else names
+
+
+def crashing_coordinators(parts: Parts, faults: Faults) -> tuple[str, ...]:
+    """The coordinators that may crash, as `Parts.decider` names them."""
+    return (faults.doomed,) if faults.doomed else parts.deciders
 
 
 def add_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[str]) -> None:
@@ -101,9 +108,10 @@ def add_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[st
     if IGNORED in draft.places:
         ignored = Step("late", "the late copy arrives, and is ignored for the number of its round")
         draft.step("late-copy", ignored, [IGNORED])
+    stops = "stops" if faults.restart else "stops for ever"
     if faults.crash:
         for controller in crashing(parts, faults):
-            crash = Step("crash", f"{controller} {'stops' if faults.restart else 'stops for ever'}", controller)
+            crash = Step("crash", f"{controller} {stops}", controller)
             here = [down(controller)]
             draft.step(f"crash/{controller}", crash, taken("crash"), here, allowed("crash"), here)
             if faults.restart:
@@ -112,16 +120,14 @@ def add_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[st
             if not parts.variant.stable:
                 _forget(draft, [part for its in parts.coordinated.values() for part in its], controller)
     if faults.coordinator:
-        draft.step(
-            "crash",
-            Step("crash", "the coordinator stops"),
-            taken("coordinator"),
-            [COORDINATOR_DOWN],
-            (),
-            [COORDINATOR_DOWN],
-        )
-        if faults.restart:
-            draft.step("restart", Step("restart", "the coordinator starts again"), [COORDINATOR_DOWN])
+        for coordinator in crashing_coordinators(parts, faults):
+            here = [coordinator_down(coordinator)]
+            crash = Step("crash", f"{coordinator} {stops}", coordinator=coordinator)
+            name = "" if coordinator == COORDINATOR else f"/{here[0]}"
+            draft.step(f"crash{name}", crash, taken("coordinator"), here, allowed("coordinator"), here)
+            if faults.restart:
+                again = Step("restart", f"{coordinator} starts again", coordinator=coordinator)
+                draft.step(f"restart{name}", again, here)
 
 
 def is_numbered(parts: Parts, channel: str) -> bool:

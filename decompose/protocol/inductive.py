@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from firable.decompose.protocol.building import ProtocolNet
-from firable.decompose.protocol.draft import ASTRAY, COORDINATOR_DOWN, at, central, down
+from firable.decompose.protocol.draft import ASTRAY, at, central, coordinator_down, down
 from firable.decompose.protocol.faulty import GO_ON, IGNORED
 from firable.decompose.protocol.parts import Part, Parts
 from firable.decompose.protocol.rounds import asked, committed, decided
@@ -147,7 +147,8 @@ def still_to_be_done(protocol: ProtocolNet) -> Iterator[Sentence]:
                 yield from _to_be_done(part)
     places = protocol.net.place_index
     downs = (down(subnet.name) for subnet in parts.decomposition.subnets)
-    yield from (clause((place, True)) for place in (*downs, COORDINATOR_DOWN, IGNORED) if place in places)
+    decide = map(coordinator_down, parts.deciders)
+    yield from (clause((place, True)) for place in (*downs, *decide, IGNORED) if place in places)
 
 
 def _to_be_done(part: Part) -> Iterator[Sentence]:

@@ -40,8 +40,9 @@ from firable.analysis.goal import Limits
 from firable.analysis.question import listed
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.decompose.protocol.completeness import CENTRAL_MARKINGS_MAX, carrying
-from firable.decompose.protocol.draft import COORDINATOR_DOWN, down
+from firable.decompose.protocol.draft import coordinator_down, down
 from firable.decompose.protocol.exploring import Exploration, explore_protocol, space_of
+from firable.decompose.protocol.parts import Parts
 from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL, Faults, Often
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import Holds
@@ -49,17 +50,17 @@ from firable.nets.net import Marking, Net
 from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.player import Player
 
-COORDINATOR = "coordinator"
-WHILE_FAULTS: Final = "while messages are lost and doubled, and controllers and the coordinator crash and restart"
+WHILE_FAULTS: Final = "while messages are lost and doubled, and controllers and coordinators crash and restart"
 RESUMES: Final = "when faults have ceased, whatever the central net may fire next, the protocol can fire next"
 
 
 @dataclass(frozen=True, slots=True)
 class Outage:
-    """What goes on while somebody is dead: `who` is a controller, or nobody (empty) for the coordinator.
+    """What goes on while somebody is dead: `who` is a controller, or empty, and then the `coordinator` that is.
 
-    `at_once`, `at_last` and `goes_on` divide the transitions of the central net that can fire at all, `still` and
-    `running` the machines that these send commands. What goes on is what is not kept back: it may have fired for the
+    A coordinator bears the name of a controller too, which does not die with it. `at_once`, `at_last` and `goes_on`
+    divide the transitions of the central net that can fire at all, `still` and `running` the machines that these send
+    commands. What goes on is what is not kept back: it may have fired for the
     last time for other reasons. `bound` says why this is not known, where it is not.
     """
 
@@ -70,11 +71,12 @@ class Outage:
     still: tuple[str, ...] = ()
     running: tuple[str, ...] = ()
     bound: str = ""
+    coordinator: str = ""
 
     @property
     def name(self) -> str:
         """Who is dead, in words."""
-        return self.who or "the coordinator"
+        return self.who or self.coordinator
 
 
 def fault_exploration(decomposition: Decomposition, limits: Limits | None = None) -> Exploration:
@@ -96,30 +98,31 @@ def fault_verdicts(found: Exploration) -> tuple[Verdict, ...]:
 
 
 def outages(decomposition: Decomposition, limits: Callable[[], Limits] = Limits) -> Iterator[Outage]:
-    """What stands still and what goes on while each controller is dead, and while the coordinator is.
+    """What stands still and what goes on while each controller is dead, and while each coordinator is.
 
     The limits are made anew for each.
     """
     for subnet in decomposition.subnets:
-        yield _outage(decomposition, subnet.name, limits())
-    if decomposition.coordinated:
-        yield _outage(decomposition, "", limits())
+        yield _outage(decomposition, Outage(subnet.name), limits())
+    for coordinator in Parts(decomposition, PROTOCOL).deciders:
+        yield _outage(decomposition, Outage("", coordinator=coordinator), limits())
 
 
-def _outage(decomposition: Decomposition, who: str, limits: Limits) -> Outage:
-    faults = Faults(restart=False, doomed=who)
-    faults = replace(faults, crash=Often.ONCE) if who else replace(faults, coordinator=Often.ONCE)
+def _outage(decomposition: Decomposition, dead: Outage, limits: Limits) -> Outage:
+    faults = Faults(restart=False, doomed=dead.name)
+    faults = replace(faults, crash=Often.ONCE) if dead.who else replace(faults, coordinator=Often.ONCE)
     found = explore_protocol(decomposition, PROTOCOL, faults, limits=limits)
     try:
         found.space.require_complete()
-        return _divided(found, who)
+        return _divided(found, dead)
     except (IncompleteGraph, BudgetExceeded) as error:
-        return Outage(who, bound=found.space.bound or str(error))
+        return replace(dead, bound=found.space.bound or str(error))
 
 
-def _divided(found: Exploration, who: str) -> Outage:
+def _divided(found: Exploration, dead: Outage) -> Outage:
     space, algebra = found.space, found.space.algebra
-    after = space.satisfying(Holds(down(who) if who else COORDINATOR_DOWN))
+    is_down = down(dead.who) if dead.who else coordinator_down(dead.coordinator)
+    after = space.satisfying(Holds(is_down))
     at_once, firable = list[str](), dict[str, Any]()
     for t, by in found.protocol.firing.items():
         where = algebra.disjunction(space.may_fire(i) for i in by)
@@ -129,7 +132,7 @@ def _divided(found: Exploration, who: str) -> Outage:
         if not space.count(firable[t]):
             at_once.append(t)
     commanding = _commanding(found.protocol.parts.net, firable)
-    from_start = _firing_from_start(found, who)
+    from_start = _firing_from_start(found, is_down)
     kept_back, groups = set[tuple[str, ...]](), dict[tuple[str, ...], Any]()
     stuck = cache(lambda t: algebra.conjunction([after, algebra.negation(space.backward(firable[t], after))]))
     for some in dict.fromkeys([*((t,) for t in firable), *commanding.values()]):
@@ -141,13 +144,14 @@ def _divided(found: Exploration, who: str) -> Outage:
     at_last = tuple(t for t in firable if (t,) in kept_back and t not in at_once)
     goes_on = tuple(t for t in firable if (t,) not in kept_back)
     still = tuple(machine for machine, some in commanding.items() if some in kept_back)
-    return Outage(who, tuple(at_once), at_last, goes_on, still, tuple(m for m in commanding if m not in still))
+    running = tuple(machine for machine in commanding if machine not in still)
+    return replace(dead, at_once=tuple(at_once), at_last=at_last, goes_on=goes_on, still=still, running=running)
 
 
-def _firing_from_start(found: Exploration, who: str) -> set[str]:
+def _firing_from_start(found: Exploration, is_down: str) -> set[str]:
     """The transitions that can fire where somebody crashes before anything else happens."""
     net = found.protocol.net
-    crash = net.transition_index[f"crash/{who}" if who else "crash"]
+    (crash,) = net.producers[net.place_index[is_down]]
     start = Player(net).fire(net.initial_marking, (crash,))
     places = tuple(replace(place, marked=bool(start >> i & 1)) for i, place in enumerate(net.places))
     space = space_of(replace(found.protocol, net=replace(net, places=places)), found.limits)
@@ -204,7 +208,7 @@ def outage_verdict(outage: Outage) -> Verdict:
     """As a verdict, for information: what stands still are its subjects."""
     told = f"machines: {listed(outage.still) or 'none'} stand still, {listed(outage.running) or 'none'} go on"
     return Verdict(
-        f"faults.dead.{outage.who or COORDINATOR}",
+        f"faults.dead.{outage.who or outage.coordinator.removeprefix('the ').replace(' ', '.')}",
         Status.UNKNOWN if outage.bound else Status.PROVED,
         f"while {outage.name} is dead, these transitions stand still, at once or at last, where the central net could "
         "fire them again, and no others",

@@ -1,4 +1,4 @@
-"""Who takes part in what: the parts of the coordinated transitions, their groups, and what disturbs what.
+"""Who takes part in what: the parts of the coordinated transitions, their groups, who decides, and what disturbs what.
 
 A part is what one controller has of a coordinated transition: a transition of its subnet. Two parts *disturb* each
 other if firing one could change what the other reads (O1). What can never fire (no valuation opens its external gates,
@@ -17,6 +17,7 @@ from functools import cached_property
 
 from firable.decompose.protocol.variant import Lock, Variant
 from firable.nets.decomposition import Decomposition
+from firable.nets.layers import COORDINATOR, Layers
 from firable.nets.net import Net, Transition
 
 
@@ -97,6 +98,8 @@ class Parts:
             for group in self.decomposition.groups
             if group.controller is None
         ]
+        if not self.variant.common:
+            together = [tuple(t for t in group if self._decided_at[t] == at) for group in together for at in self._at]
         grouped = {t for group in together for t in group}
         return (*filter(None, together), *((t,) for t in self.coordinated if t not in grouped))
 
@@ -104,6 +107,35 @@ class Parts:
     def group_of(self) -> dict[str, int]:
         """The index of the group of each coordinated transition."""
         return {t: g for g, group in enumerate(self.groups) for t in group}
+
+    @cached_property
+    def deciders(self) -> tuple[str, ...]:
+        """The coordinators that decide something, in words, from the root of the layers down."""
+        return tuple(dict.fromkeys(self._named(at) for at in self._at if at in self._deciding))
+
+    def decider(self, t: str) -> str:
+        """The coordinator that decides a transition, in words: with several, a controller bears its name too."""
+        return self._named(self._decided_at[t])
+
+    @cached_property
+    def _at(self) -> tuple[str, ...]:
+        return tuple(Layers(self.net).coordinators())
+
+    @cached_property
+    def _decided_at(self) -> dict[str, str]:
+        layers = Layers(self.net)
+        rows = [row for row in self.decomposition.coordinated if row.name in self.coordinated]
+        if self.variant.common:
+            return {row.name: row.at or layers.root for row in rows}
+        lowest = {row.name: layers.common(part.controller for part in row.parts) for row in rows}
+        return {t: at if at in self._at else layers.parent[at] for t, at in lowest.items()}
+
+    @cached_property
+    def _deciding(self) -> frozenset[str]:
+        return frozenset(self._decided_at.values())
+
+    def _named(self, at: str) -> str:
+        return COORDINATOR if len(self._deciding) == 1 or at == COORDINATOR else f"coordinator {at}"
 
     def excluding(self, part: Part) -> tuple[Part, ...]:
         """The parts whose promise keeps this one from being promised or fired."""
@@ -121,6 +153,8 @@ class Parts:
         if group is not None and group == self.group_of[promised.whole] and self.variant.acknowledged:
             return False  # the round is theirs together, and has one commit
         if not self.variant.arbitrated and self._conflict(promised.whole, part.whole):
+            return False
+        if not self.variant.common and group is not None and self._conflict(promised.whole, part.whole):
             return False
         covered = promised.writes if self.variant.lock is Lock.WRITES else promised.reads
         return bool(part.writes & covered or part.reads & promised.writes)

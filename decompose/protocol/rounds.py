@@ -32,10 +32,10 @@ def add_rounds(draft: Draft, parts: Parts) -> None:
             _coordinator(draft, parts, t, group, decided(parts, t))
             for part in parts.coordinated[t]:
                 _voting(draft, parts, part, decided(parts, t))
-                _ordering(draft, part, decided(parts, t))
+                _ordering(draft, parts, part, decided(parts, t))
                 _obeying(draft, parts, part)
         if len(group) > 1:
-            close = Step("close", f"the round of {_listed(group)} is closed")
+            close = Step("close", f"the round of {_listed(group)} is closed", coordinator=parts.decider(group[0]))
             draft.step(f"close-round/{g}", close, [decided(parts, group[0])], (), (), [asked(t) for t in group])
 
 
@@ -58,14 +58,17 @@ def _coordinator(draft: Draft, parts: Parts, t: str, group: Sequence[str], over:
     its = parts.coordinated[t]
     heard = [at("heard", part) for part in its]
     others = [asked(u) for u in parts.coordinated if u != t] if parts.variant.one_round else []
-    draft.step(f"ask/{t}", Step("ask", f"the coordinator asks for {t}"), (), [asked(t)], (), [asked(t), over, *others])
-    given_up = Step("give-up", f"the round of {_listed(group)} is given up")
+    who, by = parts.decider(t), _by(parts, t)
+    ask = Step("ask", f"{who} asks for {t}", coordinator=who)
+    draft.step(f"ask/{t}", ask, (), [asked(t)], (), [asked(t), over, *others])
+    given_up = Step("give-up", f"the round of {_listed(group)} is given up{by}", coordinator=who)
     draft.step(f"give-up/{t}", given_up, (), [over], [asked(t)], [over])
-    decide = Step("decide", f"{t} is decided", fires=t)
+    decide = Step("decide", f"{t} is decided{by}", fires=t, coordinator=who)
     draft.fire(f"decide/{t}", decide, heard, [committed(t), over], [asked(t)], [over])
     if not parts.variant.unanimous and len(its) > 1:
         for part in its:
-            without = Step("decide", f"{t} is decided without the vote of {part.controller}", fires=t)
+            words = f"{t} is decided{by} without the vote of {part.controller}"
+            without = Step("decide", words, fires=t, coordinator=who)
             votes = [at("heard", other) for other in its if other is not part]
             draft.fire(
                 f"decide/{t}/without/{part.controller}",
@@ -77,7 +80,8 @@ def _coordinator(draft: Draft, parts: Parts, t: str, group: Sequence[str], over:
             )
     left = [at(channel, part) for part in its for channel in _cleared(parts)]
     answered = [at(kind, part) for part in its for kind in ("noted", "obeyed")]
-    close = Step("close", f"the round of {t} is closed" if len(group) == 1 else f"{t} is settled in its round")
+    words = f"the round of {t} is closed" if len(group) == 1 else f"{t} is settled in its round"
+    close = Step("close", words, coordinator=who)
     ends, needs = ([over], []) if len(group) == 1 else ([], [over])
     draft.step(f"close/{t}", close, [asked(t), *answered, *ends, committed(t)], (), needs, left)
     draft.step(f"close/{t}/aborted", close, [asked(t), *answered, *ends], (), needs, [*left, committed(t)])
@@ -95,7 +99,8 @@ def _voting(draft: Draft, parts: Parts, part: Part, over: str) -> None:
     request, vote, heard, promised, obeyed = (
         at(kind, part) for kind in ("request", "vote", "heard", "promised", "obeyed")
     )
-    sent = Step("request", f"the coordinator requests the vote of {c} on {t}")
+    who = parts.decider(t)
+    sent = Step("request", f"{who} requests the vote of {c} on {t}", coordinator=who)
     draft.step(f"send-request/{t}/{c}", sent, (), [request], [asked(t)], [over, heard, request])
     draft.step(
         f"promise/{t}/{c}",
@@ -115,25 +120,26 @@ def _voting(draft: Draft, parts: Parts, part: Part, over: str) -> None:
     draft.step(f"promise/{t}/{c}/again", again, [request], [vote], [promised], [vote])
     old = Step("ignore", f"{c} ignores a late request for {t}", c)
     draft.step(f"ignore-request/{t}/{c}", old, [request], (), [obeyed])
-    draft.step(f"hear/{t}/{c}", Step("hear", f"the yes of {c} on {t} arrives"), [vote], [heard], (), [heard, over])
-    known = Step("hear", f"the yes of {c} on {t} arrives again")
+    heard_of = Step("hear", f"the yes of {c} on {t} arrives", coordinator=who)
+    draft.step(f"hear/{t}/{c}", heard_of, [vote], [heard], (), [heard, over])
+    known = Step("hear", f"the yes of {c} on {t} arrives again", coordinator=who)
     draft.step(f"hear/{t}/{c}/again", known, [vote], (), [heard])
     if parts.variant.vote_rounds:
-        late = Step("ignore", f"the yes of {c} on {t} arrives too late")
+        late = Step("ignore", f"the yes of {c} on {t} arrives too late", coordinator=who)
         draft.step(f"ignore-vote/{t}/{c}", late, [vote], (), [over])
 
 
-def _ordering(draft: Draft, part: Part, over: str) -> None:
-    t, c = part.whole, part.controller
+def _ordering(draft: Draft, parts: Parts, part: Part, over: str) -> None:
+    t, c, who = part.whole, part.controller, parts.decider(part.whole)
     commit, abort, heard, noted = (at(kind, part) for kind in ("commit-order", "abort-order", "heard", "noted"))
-    order = Step("order", f"the coordinator orders {c} to fire its part of {t}")
+    order = Step("order", f"{who} orders {c} to fire its part of {t}", coordinator=who)
     draft.step(f"order-commit/{t}/{c}", order, (), [commit], [committed(t)], [commit, noted])
-    order = Step("order", f"the coordinator orders {c} to give up its part of {t}")
+    order = Step("order", f"{who} orders {c} to give up its part of {t}", coordinator=who)
     draft.step(f"order-abort/{t}/{c}", order, (), [abort], [asked(t), over], [abort, committed(t), noted, heard])
     # Its vote was heard, and is of no use any more.
     draft.step(f"order-abort/{t}/{c}/voted", order, [heard], [abort], [asked(t), over], [abort, committed(t), noted])
     acknowledgement = at("acknowledgement", part)
-    note = Step("note", f"{c} is known to have obeyed on {t}")
+    note = Step("note", f"{c} is known to have obeyed on {t}", coordinator=who)
     draft.step(f"note/{t}/{c}", note, [acknowledgement], [noted], (), [noted])
     draft.step(f"note/{t}/{c}/again", note, [acknowledgement], (), [noted])
 
@@ -178,3 +184,8 @@ def copy(reader: str, place: str) -> str:
 
 def _listed(group: Sequence[str]) -> str:
     return " and ".join(group)
+
+
+def _by(parts: Parts, t: str) -> str:
+    """Who decides, where there are several that might."""
+    return f" by {parts.decider(t)}" if len(parts.deciders) > 1 else ""

@@ -51,8 +51,9 @@ class Often(StrEnum):
 class Faults:
     """What may go wrong in one run; delay and overtaking always may.
 
-    `crash` is that of a controller, any of them or the one that is `doomed` to it; `coordinator` that of the
-    coordinator. With `restart`, whoever is down may come up again, with what is in stable storage.
+    `crash` is that of a controller, `coordinator` that of a coordinator: any of them, or the one that is `doomed` to it
+    (a coordinator as `Parts.decider` names it). With `restart`, whoever is down may come up again, with what is in
+    stable storage.
     """
 
     loss: Often = Often.NEVER
@@ -69,7 +70,7 @@ class Faults:
 
 NO_FAULTS: Final = Faults()
 ONE_OF_EACH: Final = Faults(Often.ONCE, Often.ONCE, Often.ONCE, Often.ONCE)
-"""A run loses one message, doubles one, and each of a controller and the coordinator crashes once and restarts."""
+"""A run loses one message, doubles one, and each of a controller and a coordinator crashes once and restarts."""
 ANY_FAULTS: Final = Faults(Often.ALWAYS, Often.ALWAYS, Often.ALWAYS, Often.ALWAYS)
 
 
@@ -85,6 +86,8 @@ class Variant:
     `unanimous`: a commit needs all votes. `stable`: promises survive a crash (O6). Of the bare skeleton: `recheck`, a
     part is applied only if it is still firable, else blindly; `serial`, one order at a time.
     `one_round` asks for one transition at a time: fewer runs, so that what goes wrong in one of them is found sooner.
+    `common`: a conflict across coordinators is decided by their common ancestor (O8); else each decides what only those
+    below it take part in, as if nobody else decided any of the conflict.
 
     Raises `ValueError` for votes other than promised in the skeleton with rounds.
 
@@ -104,6 +107,7 @@ class Variant:
     recheck: bool = False
     serial: bool = False
     one_round: bool = False
+    common: bool = True
 
     def __post_init__(self) -> None:
         if self.acknowledged and (self.votes is not Votes.PROMISED or self.recheck or self.serial):

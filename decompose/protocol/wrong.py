@@ -12,6 +12,7 @@ from typing import Final
 
 from firable.decompose.protocol.variant import BARE, NO_FAULTS, Faults, Lock, Often, Variant
 from firable.nets.catalogue import catalogue_net
+from firable.nets.layers import Layers
 from firable.nets.net import Controller, Net, Place, Transition
 
 
@@ -44,6 +45,13 @@ WRONG: Final = (
         "conflicting transitions have deciders of their own",
         Variant(arbitrated=False),
         "scrap",
+    ),
+    WrongProtocol(
+        "conflicts-decided-below",
+        "O8",
+        "of a conflict across coordinators each decides its own share",
+        Variant(common=False),
+        "lent",
     ),
     WrongProtocol(
         "cached-gates",
@@ -89,11 +97,17 @@ WRONG: Final = (
 """Every protocol that must be refuted."""
 
 
+def wrong_protocols(net: Net) -> tuple[WrongProtocol, ...]:
+    """Those that are other protocols than the true one on this net: without layers nobody decides below another one."""
+    return tuple(wrong for wrong in WRONG if wrong.variant.common or Layers(net).several)
+
+
 def example(name: str) -> Net:
     """The net of an example: one of those here, or of the catalogue."""
     return _EXAMPLES[name] if name in _EXAMPLES else catalogue_net(name)
 
 
+_CELL = Controller("cell")
 _ROBOT, _LATHE, _PRESS, _GUARD = Controller("robot"), Controller("lathe"), Controller("press"), Controller("guard")
 _HANDED = ("robot.free", "lathe.full")
 
@@ -123,6 +137,16 @@ _EXAMPLES: Final = {
         ),
         controllers=(_ROBOT, _LATHE),
         description="the robot hands its part to the lathe, or scraps it",
+    ),
+    "lent": Net(
+        "lent",
+        _places(("robot.part", "lathe.empty", "press.empty"), (*_HANDED, "press.full")),
+        (
+            Transition("hand_over", ("robot.part", "lathe.empty"), _HANDED),
+            Transition("lend", ("robot.part", "press.empty"), ("robot.free", "press.full")),
+        ),
+        controllers=(_CELL, Controller("robot", under="cell"), Controller("lathe", under="cell"), _PRESS),
+        description="the robot of a cell hands its part to the lathe there, or to a press outside of the cell",
     ),
     "hood": Net(
         "hood",

@@ -11,7 +11,8 @@ table is derived, and for the paper's own cell the derived table is the publishe
 
 Decided by the coordinator are the global transitions and every local one in the conflict component of a global one
 (O2): two deciders of one conflict would each choose a winner. Where controllers stand in layers, it is the lowest
-coordinator above all participants of the component that decides (`firable.nets.layers`). The subnets are flat: which
+coordinator above all participants of the component that decides (`firable.nets.layers`), and of all components that
+contend for promises (`firable.nets.contention`). The subnets are flat: which
 layer a controller stands in stays with the central net, since it changes nothing that the controller itself does.
 """
 
@@ -21,6 +22,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 
+from firable.nets.contention import decided_together
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.layers import Layers
@@ -95,14 +97,11 @@ def split(net: Net) -> Decomposition:
         raise InputError(clashes)
 
     arbitration, layers = Arbitration.of(net), Layers(net)
-    decided = {name: layers.common(taking_part[name]) for name, its in parts.items() if len(its) > 1}
+    decided = _deciders(net, layers, taking_part, arbitration)
     groups = []
     for group, members in zip(arbitration.groups, arbitration.conflicts.components, strict=True):
         names = [net.transitions[t].name for t in members]
-        is_coordinated = any(len(parts[name]) > 1 for name in names)
-        at = layers.common(dict.fromkeys(owner for name in names for owner in taking_part[name]))
-        if is_coordinated:
-            decided.update(dict.fromkeys(names, at))
+        at = decided.get(names[0])
         groups.append(
             ArbitrationGroup(
                 group.name,
@@ -110,8 +109,8 @@ def split(net: Net) -> Decomposition:
                 tuple(net.transitions[t].name for t in group.rest),
                 group.by,
                 # Local transitions in conflict share a place, so they are all of its owner.
-                None if is_coordinated else parts[names[0]][0].controller,
-                at if is_coordinated and at != layers.root else None,
+                None if at is not None else parts[names[0]][0].controller,
+                at if at != layers.root else None,
             )
         )
     coordinated = tuple(
@@ -126,6 +125,21 @@ def split(net: Net) -> Decomposition:
         if t.name in decided
     )
     return Decomposition(net, _subnets(net, parts), coordinated, tuple(groups))
+
+
+def _deciders(
+    net: Net, layers: Layers, taking_part: Mapping[str, Sequence[str]], arbitration: Arbitration
+) -> dict[str, str]:
+    """The coordinator of each transition that is not its controller's own: global, or in conflict with such a one."""
+    components = [[net.transitions[t].name for t in members] for members in arbitration.conflicts.components]
+    in_conflict = {name for names in components for name in names}
+    alone = [[t.name] for t in net.transitions if t.name not in in_conflict]
+    groups = [names for names in (*components, *alone) if any(len(taking_part[name]) > 1 for name in names)]
+    decided = {}
+    for names in decided_together(net, groups) if layers.several else groups:
+        at = layers.common(dict.fromkeys(owner for name in names for owner in taking_part[name]))
+        decided.update(dict.fromkeys(names, at))
+    return decided
 
 
 def _problems(net: Net) -> Iterator[Diagnostic]:

@@ -25,7 +25,7 @@ TITLES: Final = {
 """The families, and what each says."""
 
 _METHOD: Final = "z3, of an inductive invariant of the protocol's net"  # what each such verdict says of itself
-_FAULTS: Final = "while messages are lost and doubled, and controllers and the coordinator crash and restart"
+_FAULTS: Final = "while messages are lost and doubled, and controllers and coordinators crash and restart"
 _SAFE: Final = {
     "follows": "whatever the protocol fires, the central net can fire",
     "agrees": "where no order is on its way, the controllers hold the marking of the central net",

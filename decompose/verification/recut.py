@@ -3,8 +3,9 @@
 Participants(t) are the owners of what t touches; more than one make it global. Each participant has a part, named by
 the number of its controller (0 the coordinator's own, the others from 1) and the number of the transition. Conflict is
 a shared input or output place, and a component of it is one group, the coordinator's where a global transition is in
-it: of the coordinators that are above all participants, the lowest. All this is a function of the net, so there is one
-right decomposition; what a bundle holds is that one, or is refused with the first thing that differs.
+it: of the coordinators that are above all participants, the lowest. Where there are several coordinators, it decides
+with a transition all that disturbs it and could be promised together with it. All this is a function of the net, so
+there is one right decomposition; what a bundle holds is that one, or is refused with the first thing that differs.
 
 Written for this purpose alone, and plainly: components grow by the places that their members share. It is the second
 text of these definitions; the first one, `firable.decompose.splitting`, is what it checks.
@@ -15,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import count
+from itertools import combinations, count
 
 from firable.decompose.verification.refusal import NotShownError
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
@@ -150,9 +151,54 @@ class Cut:
         ways = [self.way_up[owner] for owner in dict.fromkeys(o for name in names for o in self.participants[name])]
         return next(name for name in ways[0] if all(name in way for way in ways))
 
-    def layer(self, names: Iterable[str]) -> str | None:
-        """The coordinator that decides these transitions together; None is the root."""
-        found = self.lowest_above(names)
+    @cached_property
+    def in_layers(self) -> bool:
+        """Whether there is a coordinator under another one."""
+        return len({way[1] for way in self.way_up.values() if len(way) > 1}) > 1
+
+    @cached_property
+    def decided_at(self) -> dict[str, str]:
+        """The coordinator of each transition that is global, or competes with one that is."""
+        alone = [(t.name,) for t in self.net.transitions if t.name not in self.competes_for]
+        classes = [set(names) for names in (*self.components, *alone) if any(map(self.is_global, names))]
+        pairs = self.standing_in_the_way({name for names in classes for name in names}) if self.in_layers else ()
+        for one, other in pairs:
+            met = [names for names in classes if one in names or other in names]
+            if len(met) > 1:
+                classes = [names for names in classes if names not in met] + [met[0] | met[1]]
+        return {name: self.lowest_above(sorted(names)) for names in classes for name in names}
+
+    def standing_in_the_way(self, among: set[str]) -> Iterator[tuple[str, str]]:
+        """The pairs of these that disturb each other at a controller where the arcs let both be promised."""
+        for subnet in self.subnets:
+            its = [(whole, part) for whole, part in self.parts_at(subnet) if whole in among]
+            for (one, t), (other, u) in combinations(its, 2):
+                if self.disturb(t, u) and not any(self.wants(t).get(x, w) != w for x, w in self.wants(u).items()):
+                    yield one, other
+
+    def parts_at(self, subnet: Net) -> Iterator[tuple[str, Transition]]:
+        """The parts in a subnet, each with the transition that it is of."""
+        whole = {part.name: t for t, its in self.parts.items() for part in its if part.controller == subnet.name}
+        return ((whole[part.name], part) for part in subnet.transitions)
+
+    def disturb(self, t: Transition, u: Transition) -> bool:
+        """Whether one of two parts changes what the other one reads."""
+        for one, other in ((t, u), (u, t)):
+            changed = {*one.inputs, *one.outputs, *(self.net.place(p).completion for p in one.outputs)} - {None}
+            if changed & {*self.wants(other)}:
+                return True
+        return False
+
+    @staticmethod
+    def wants(part: Transition) -> dict[str, bool]:
+        """The places and signals that a part reads, and whether it wants them full, or 1."""
+        full = dict.fromkeys((*part.inputs, *part.permissive), True)
+        empty = dict.fromkeys((*part.outputs, *part.inhibitive), False)
+        return {gate.signal: gate.wanted for gate in part.external} | full | empty
+
+    def layer(self, name: str) -> str | None:
+        """The coordinator that decides a transition; None is the root."""
+        found = self.decided_at[name]
         return None if found == self.root else found
 
     @cached_property
@@ -170,7 +216,7 @@ class Cut:
                 name, among, by = arbiters[0].name, arbiters[0].among, arbiters[0].by
             rest = tuple(t for t in members if t not in set(among))
             if any(map(self.is_global, members)):
-                groups.append(ArbitrationGroup(name, among, rest, by, None, self.layer(members)))
+                groups.append(ArbitrationGroup(name, among, rest, by, None, self.layer(members[0])))
             else:
                 groups.append(ArbitrationGroup(name, among, rest, by, self.participants[members[0]][0]))
         return tuple(groups)
@@ -178,14 +224,10 @@ class Cut:
     @cached_property
     def coordinated(self) -> tuple[Coordinated, ...]:
         """The rows of the coordinator: the global transitions, and who competes with them."""
-        at = {t.name: self.layer([t.name]) for t in self.net.transitions if self.is_global(t.name)}
-        for group in self.groups:
-            if group.controller is None:
-                at.update(dict.fromkeys((*group.sequence, *group.rest), group.at))
         return tuple(
-            Coordinated(t.name, self.numbers[t.name], self.parts[t.name], t.description, at[t.name])
+            Coordinated(t.name, self.numbers[t.name], self.parts[t.name], t.description, self.layer(t.name))
             for t in self.net.transitions
-            if t.name in at
+            if t.name in self.decided_at
         )
 
     @cached_property

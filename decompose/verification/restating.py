@@ -27,7 +27,8 @@ HEADS: Final = {
     "ownership": "each place and signal is owned once, by its owner",
     "initial-marking": "the initial markings of the subnets together are M0",
     "commands": "the subnets send the commands of the net, on the same places",
-    "o8": "votes add up layer by layer, and conflicts meet in one coordinator",
+    "o8": "votes add up layer by layer, and competitors meet in one coordinator",
+    "o8-apart": "no coordinator's promise stands in the way of another coordinator",
     "arbitration": "conflicts are decided as in the central net",
 }
 """What stands at the head of the file of each family."""
@@ -67,6 +68,8 @@ class Restated:
                 return iter([self.initial_marking()])
             case "o8":
                 return restating_layers.layers(self)
+            case "o8-apart":
+                return restating_layers.apart(self)
             case "arbitration":
                 return restating_choice.arbitration(self)
         return restating_facts.FAMILIES[name](self)

@@ -3,7 +3,8 @@
 The second text of `firable.decompose.protocol.building`, which it checks, for the true protocol alone: without
 faults, and under any number of them. The table below is the protocol as docs/protocol.md tells it, a row for each step;
 what stands in it is a place of the part (`request` is `request/G2/robot`), of its transition (`asked`, `committed`) or
-of its group (`decided`), or a set of places in capitals:
+of its group (`decided`), or a set of places in capitals. Who acts is the controller, or the coordinator that decides
+the transition; where several decide something, each may crash by itself, and `coordinator-down` bears its name.
 
     INPUTS, OUTPUTS     what the part takes and puts, in the subnet of its controller
     FULL, EMPTY         what Eq. (1) demands of its places
@@ -27,6 +28,8 @@ ASTRAY: Final = "astray"
 GO_ON: Final = "faults-go-on"
 LATE: Final = "late-copy-of-old-round"
 COORDINATOR_DOWN: Final = "coordinator-down"
+UNNAMED: Final = "the coordinator"
+"""The root of the layers where none of the controllers is marked as it."""
 MESSAGES: Final = ("request", "vote", "commit-order", "abort-order", "acknowledgement")
 MEMORY: Final = ("promised", "obeyed", "heard", "noted")
 
@@ -176,6 +179,17 @@ class Voting:
         """The place of the decision on the round of a transition."""
         return f"decided/{'+'.join(self.group_of[t])}"
 
+    def coordinator_down(self, t: str) -> str:
+        """The place that holds a token while the coordinator of a transition is down."""
+        at = self.cut.decided_at[t]
+        several = len({self.cut.decided_at[t] for t in self.parts}) > 1
+        return f"{COORDINATOR_DOWN}/{at}" if several and at != UNNAMED else COORDINATOR_DOWN
+
+    @cached_property
+    def coordinators_down(self) -> tuple[str, ...]:
+        """These places, of all coordinators that decide something."""
+        return tuple(sorted(set(map(self.coordinator_down, self.parts))))
+
     @cached_property
     def places(self) -> dict[str, bool]:
         """All places, and whether they hold a token at the start."""
@@ -185,7 +199,7 @@ class Voting:
         some += [(f"{kind}/{t}", False) for t in self.parts for kind in ("asked", "committed")]
         some += [(part.at(kind), False) for part in self.all_parts for kind in (*MESSAGES, *MEMORY)]
         if self.faults:
-            some += [(GO_ON, True), (LATE, False), (COORDINATOR_DOWN, False)]
+            some += [(GO_ON, True), (LATE, False), *((down, False) for down in self.coordinators_down)]
             some += [(f"down/{subnet.name}", False) for subnet in self.cut.subnets]
         return _distinct(some, "place")
 
@@ -200,21 +214,22 @@ class Voting:
             for t in group:
                 yield from self._of_coordinator(t, over, alone=len(group) == 1)
             if len(group) > 1:
-                yield self._step(f"close-round/{number}", "", HOME, {over}, (), (), {f"asked/{t}" for t in group})
+                its = self.coordinator_down(group[0])
+                yield self._step(f"close-round/{number}", its, HOME, {over}, (), (), {f"asked/{t}" for t in group})
         for part in self.all_parts:
             for row in _OF_PART:
                 yield self._of_part(part, *row)
         for part in self.local:
             own = part.own
             places = (own.inputs, own.outputs, own.permissive, (*own.inhibitive, *self.others(part)))
-            yield from self._firing(f"fire/{part.whole}", part.controller, part.whole, *places)
+            yield from self._firing(f"fire/{part.whole}", f"down/{part.controller}", part.whole, *places)
         if self.faults:
             yield from self._of_faults()
 
     def _step(
         self,
         name: str,
-        controller: str | None,
+        down: str | None,
         kind: str,
         takes: Iterable[str] = (),
         puts: Iterable[str] = (),
@@ -222,22 +237,21 @@ class Voting:
         empty: Iterable[str] = (),
         fires: str = "",
     ) -> Step:
-        """A step of a controller (empty: the coordinator; None: of nobody), which takes none while it is down."""
-        nobody = not self.faults or controller is None
-        down = () if nobody else (f"down/{controller}",) if controller else (COORDINATOR_DOWN,)
-        return Step(name, frozenset(takes), frozenset(puts), frozenset(full), frozenset((*empty, *down)), fires, kind)
+        """A step of somebody (None: of nobody) who takes none while there is a token on this place."""
+        closed = (*empty, down) if self.faults and down is not None else empty
+        return Step(name, frozenset(takes), frozenset(puts), frozenset(full), frozenset(closed), fires, kind)
 
     def _of_coordinator(self, t: str, over: str, *, alone: bool) -> Iterator[Step]:
-        asked, committed, its = f"asked/{t}", f"committed/{t}", self.parts[t]
-        yield self._step(f"ask/{t}", "", "", (), {asked}, (), {asked, over})
-        yield self._step(f"give-up/{t}", "", HOME + REPEATS, (), {over}, {asked}, {over})
+        asked, committed, its, down = f"asked/{t}", f"committed/{t}", self.parts[t], self.coordinator_down(t)
+        yield self._step(f"ask/{t}", down, "", (), {asked}, (), {asked, over})
+        yield self._step(f"give-up/{t}", down, HOME + REPEATS, (), {over}, {asked}, {over})
         heard = [part.at("heard") for part in its]
-        yield from self._firing(f"decide/{t}", "", t, heard, (committed, over), (asked,), (over,))
+        yield from self._firing(f"decide/{t}", down, t, heard, (committed, over), (asked,), (over,))
         answered = {asked, *(part.at(kind) for part in its for kind in ("noted", "obeyed"))}
         on_their_way = {part.at(kind) for part in its for kind in MESSAGES}
         takes, full = (answered | {over}, set[str]()) if alone else (answered, {over})
-        yield self._step(f"close/{t}", "", HOME, takes | {committed}, (), full, on_their_way)
-        yield self._step(f"close/{t}/aborted", "", HOME, takes, (), full, on_their_way | {committed})
+        yield self._step(f"close/{t}", down, HOME, takes | {committed}, (), full, on_their_way)
+        yield self._step(f"close/{t}/aborted", down, HOME, takes, (), full, on_their_way | {committed})
 
     def _of_part(self, part: Part, name: str, who: str, kind: str, *columns: str) -> Step:
         own = part.own
@@ -254,14 +268,14 @@ class Voting:
         takes, puts, full, empty = (
             [place for word in column.split() for place in sets.get(word, (part.at(word),))] for column in columns
         )
-        controller = part.controller if who == "controller" else ""
+        down = f"down/{part.controller}" if who == "controller" else self.coordinator_down(part.whole)
         named = name.replace("*", f"{part.whole}/{part.controller}")
-        return self._step(named, controller, kind, takes, puts, full, empty)
+        return self._step(named, down, kind, takes, puts, full, empty)
 
     def _firing(
         self,
         name: str,
-        controller: str,
+        down: str,
         t: str,
         takes: Iterable[str],
         puts: Iterable[str],
@@ -272,13 +286,13 @@ class Voting:
         whole, own = self.cut.net.transition(t), (takes, puts, full, empty)
         moved = (whole.inputs, whole.outputs, whole.permissive, whole.inhibitive)
         both = [[*mine, *map(central, its)] for mine, its in zip(own, moved, strict=True)]
-        yield self._step(name, controller, "", both[0], both[1], both[2], both[3], t)
+        yield self._step(name, down, "", both[0], both[1], both[2], both[3], t)
         for place in {*whole.inputs, *whole.permissive}:
             empty_there = [*empty, central(place)]
-            yield self._step(f"{name}/astray/{place}", controller, "", takes, [*puts, ASTRAY], full, empty_there, t)
+            yield self._step(f"{name}/astray/{place}", down, "", takes, [*puts, ASTRAY], full, empty_there, t)
         for place in {*whole.outputs, *whole.inhibitive}:
             full_there = [*full, central(place)]
-            yield self._step(f"{name}/astray/{place}", controller, "", takes, [*puts, ASTRAY], full_there, empty, t)
+            yield self._step(f"{name}/astray/{place}", down, "", takes, [*puts, ASTRAY], full_there, empty, t)
 
     def _of_faults(self) -> Iterator[Step]:
         yield self._step("cease", None, "", {GO_ON})
@@ -290,8 +304,10 @@ class Voting:
             down = f"down/{subnet.name}"
             yield self._step(f"crash/{subnet.name}", None, "", (), {down}, {GO_ON}, {down})
             yield self._step(f"restart/{subnet.name}", None, HOME, {down})
-        yield self._step("crash", None, "", (), {COORDINATOR_DOWN}, (), {COORDINATOR_DOWN})
-        yield self._step("restart", None, HOME, {COORDINATOR_DOWN})
+        for down in self.coordinators_down:
+            name = "" if down == COORDINATOR_DOWN else f"/{down}"
+            yield self._step(f"crash{name}", None, "", (), {down}, {GO_ON}, {down})
+            yield self._step(f"restart{name}", None, HOME, {down})
 
     def way(self, t: str) -> tuple[Step, ...]:
         """The steps by which a transition fires where nothing else is asked."""

@@ -222,7 +222,7 @@ class Obligations:
             yield from (_any([(place, True)]) for place in self._faulty())
 
     def _faulty(self) -> Iterator[str]:
-        yield from ("coordinator-down", "late-copy-of-old-round")
+        yield from (*self.voting.coordinators_down, "late-copy-of-old-round")
         yield from (f"down/{subnet.name}" for subnet in self.voting.cut.subnets)
 
     # --- The obligations

@@ -6,6 +6,7 @@ from functools import cache
 
 import pytest
 from support.bundle_mutants import evidence_mutants, line_mutants, net_mutants, verdict_mutants
+from support.layered_nets import cells_in_a_line
 from support.owned_nets import owned_net
 
 from firable.analysis.check import check
@@ -64,6 +65,14 @@ def test_every_verdict_on_the_protocol_of_a_cell_has_evidence_that_the_checker_s
     name: str, faults: Faults
 ) -> None:
     net = catalogue_net(name)
+    proof = prove_inductively(built(net, faults), TIMEOUT_MS)
+    assert not proof.open_
+    assert proof.text == stated_anew(net, faults)
+
+
+@FAULTS
+def test_protocol_of_layers_is_proved_and_stated_anew(faults: Faults) -> None:
+    net = cells_in_a_line()
     proof = prove_inductively(built(net, faults), TIMEOUT_MS)
     assert not proof.open_
     assert proof.text == stated_anew(net, faults)

@@ -8,9 +8,10 @@ run is not shown. The right protocol has such runs too, of which nothing is wron
 happen, and that what is proved is not proved of nothing.
 
 A run stands as text, `promise r1 G a; fire l`: an action and the names for its parameters. Names of rounds are r1, r2;
-of coordinated transitions capital letters, of local ones small; of controllers a, b, c; of coordinators k1, k2. There are no other things but
-places, which are p1, p2 and so on, as many as asked for; a place that a step names is a signal. Rejected: a search for
-the actions, too; it takes minutes where this takes a tenth of a second, and the runs worth showing are known.
+of coordinated transitions capital letters, of local ones small; of controllers a, b, c; of coordinators k1, k2. There
+are no other things but places, which are p1, p2 and so on, as many as asked for; a place that a step names is a signal.
+Rejected: a search for the actions, too; it takes minutes where this takes a tenth of a second, and the runs worth
+showing are known.
 """
 
 from __future__ import annotations

@@ -10,7 +10,8 @@ each decomposition (`side_conditions`).
 
 **Signals.** To the protocol a signal, as the process image of its owner has it, is a place that the cell fills and
 empties (`sense`): an external gate reads it as an internal one reads a place, and a command that it completes clears
-it. That two commands clear one signal keeps neither promise from the other: cleared twice is cleared. A change of a signal that a promise reads or clears is kept out of the image until the promise ends, so here it happens later.
+it. That two commands clear one signal keeps neither promise from the other: cleared twice is cleared. A change of a
+signal that a promise reads or clears is kept out of the image until the promise ends, so here it happens later.
 What is proved is thus Eq. (1) *and* (2), of the images that the controllers have at one instant. That an image tells
 the truth about the cell is assumed (O4).
 
@@ -81,9 +82,7 @@ signal = Relation("signal", (Place,))
 initially = Relation("initially", (Place,))
 
 writes = Definition("writes", (t, p), input_of(t, p) | output_of(t, p) | clears(t, p))
-reads = Definition(
-    "reads", (t, p), input_of(t, p) | output_of(t, p) | permissive_of(t, p) | inhibitive_of(t, p)
-)
+reads = Definition("reads", (t, p), input_of(t, p) | output_of(t, p) | permissive_of(t, p) | inhibitive_of(t, p))
 touches = Definition("touches", (t, p), reads(t, p) | writes(t, p))
 disturb = Definition(  # firing one could change what the other reads
     "disturb-at", (t, u, p), (writes(t, p) & reads(u, p)) | (reads(t, p) & writes(u, p))
