@@ -272,7 +272,7 @@ def family_refused(bundle: Bundle, file: str, text: str) -> bool:
     return False
 
 
-@pytest.mark.parametrize("family", [family for family in HEADS if family != "o8"])  # one layer
+@pytest.mark.parametrize("family", [family for family in HEADS if not family.startswith("o8")])  # one layer
 def test_every_change_of_a_line_of_an_obligation_is_refused(family: str) -> None:
     bundle, file = bundled("workshop-1"), f"{family}.smt2"
     text = "\n\n".join(bundle.evidence[file].split("\n\n")[:9])  # its head, and eight of its obligations
@@ -292,7 +292,7 @@ DECLARING = ("(declare-const ", "(define-fun ")
 TOKEN = re.compile(r'\|[^|]*\||"[^"]*"|[^\s()|"]+|[()]')
 
 
-@pytest.mark.parametrize("family", [family for family in HEADS if family != "o8"])  # one layer
+@pytest.mark.parametrize("family", [family for family in HEADS if not family.startswith("o8")])  # one layer
 def test_every_change_of_a_word_of_an_obligation_is_refused(family: str) -> None:
     bundle, file = bundled("workshop-1"), f"{family}.smt2"
     text = bundle.evidence[file]
