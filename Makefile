@@ -13,6 +13,11 @@ PYTEST_OPTIONS ?= -q -n auto --dist loadfile
 FACTOR ?= 20
 SEED := $(shell date +%s)
 CAMPAIGN ?= tests
+# A rehearsal: how many runs of each cell, from which seed, by how many processes.
+RUNS ?= 20000
+FROM ?= 0
+JOBS ?= $(shell nproc 2>/dev/null || echo 1)
+REHEARSED := one_robot two_robots_shared two_robots_separate one_robot_mc_late
 
 # Public nets to test against, where they stand beside the checkout; tests that miss them say so.
 ifneq ($(wildcard ../shared/nets),)
@@ -24,7 +29,7 @@ export PYO3_PYTHON = $(abspath $(BIN)/python)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test fmt bench bench-instructions campaign mutants clean lint lint-python lint-ruff lint-format
+.PHONY: help demo test fmt bench bench-instructions campaign simulate mutants clean lint lint-python lint-ruff lint-format
 .PHONY: lint-types lint-types-tests
 .PHONY: lint-rust lint-rust-format lint-clippy test-rust test-python
 
@@ -77,6 +82,10 @@ bench: $(MADE)/develop ## measure, as ratios to yardsticks in the same run; writ
 campaign: $(MADE)/develop ## every property of the tests on FACTOR times as many drawn nets; SEED brings a campaign back
 	FIRABLE_CAMPAIGN=$(FACTOR) FIRABLE_SEED=$(SEED) $(BIN)/pytest $(PYTEST_OPTIONS) --dist load \
 		-m "hypothesis or seeds" --hypothesis-seed=$(SEED) $(CAMPAIGN)
+
+simulate: $(MADE)/develop ## the executor through faults, RUNS seeds on each cell and on drawn nets; FROM is the first seed
+	@set -e; for net in $(REHEARSED:%=catalogue:%) drawn; do \
+		$(BIN)/firable rehearse $$net --seeds $(RUNS) --from $(FROM) --jobs $(JOBS); done
 
 mutants: $(MADE)/mutants ## which wrong edits of FILE the tests in TESTS do not notice
 	@test -n "$(FILE)" -a -n "$(TESTS)" || { echo "make mutants FILE=semantics/firing.py TESTS=tests/semantics"; exit 2; }

@@ -17,7 +17,22 @@ from collections.abc import Sequence
 import click
 
 from firable import __version__
-from firable.cli import bundle, check, convert, draw, prove, refine, replay, run, schema, sign, split, takeover, verify
+from firable.cli import (
+    bundle,
+    check,
+    convert,
+    draw,
+    prove,
+    refine,
+    rehearse,
+    replay,
+    run,
+    schema,
+    sign,
+    split,
+    takeover,
+    verify,
+)
 from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
@@ -61,6 +76,7 @@ for _command in (
     run.run,
     takeover.takeover,
     replay.replay,
+    rehearse.rehearse,
     verify.verify,
     draw.draw,
     convert.convert,

@@ -107,6 +107,8 @@ class LocalController:
         self.held = False
         self.epoch = 0
         self.readiness = Readiness(-1, frozenset())
+        self.readiness_of: tuple[Word, bool, Word, Word] | None = None
+        """The word, the hold and the untold signals (with what promises hold of them) that the readiness is of."""
         self.told = -1
         """The sequence number of the newest report that was sent."""
         self.seen = -1
@@ -337,6 +339,10 @@ class LocalController:
         return _union(promise.reads | promise.writes for promise in self.promises.values())
 
     def _readiness(self) -> Readiness:
+        known = (self.word, self.held, self.untold, self.untold and self._locked_reads())
+        if known == self.readiness_of and self.readiness.sequence >= self.epoch << EPOCH_BITS:
+            return self.readiness  # nothing has changed that it depends on
+        self.readiness_of = known
         enabled = () if self.held else self.parts.items()
         ready = frozenset(name for name, part in enabled if self._is_enabled(part))
         if ready != self.readiness.transitions or self.readiness.sequence < self.epoch << EPOCH_BITS:

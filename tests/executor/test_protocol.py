@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples, seeds
+from support.gated_nets import GATE_MOVED_BY_A_LOCAL, GATE_OF_A_LOCAL, net_of
 from support.owned_nets import owned_net, owned_nets
 from support.reference import load_net
 
@@ -99,36 +100,6 @@ def test_one_seed_is_one_run() -> None:
     traces = [list(Simulation(decomposition_of("one_robot"), 7, NETWORKS[3]).run(800).lines()) for _ in range(2)]
     assert traces[0] == traces[1]
     assert traces[0] != list(Simulation(decomposition_of("one_robot"), 8, NETWORKS[3]).run(800).lines())
-
-
-def net_of(places: str, marked: str, *transitions: Transition) -> Net:
-    """A net of the controllers `a` and `b`; a place of `a` is named by `a` and a letter."""
-    names = places.split()
-    return Net(
-        "net",
-        tuple(Place(name, name[0], marked=name in marked.split()) for name in names),
-        transitions,
-        controllers=(Controller("a"), Controller("b")),
-    )
-
-
-GATE_OF_A_LOCAL = net_of(
-    "a.i a.p a.s a.x b.j b.y",
-    "a.i a.s b.j",
-    Transition("G", ("a.i", "b.j"), ("a.p", "b.y")),
-    Transition("l", ("a.s",), ("a.x",), inhibitive=("a.p",)),
-)
-"""A local transition must not fire between a decision and its application: it reads what the part will write."""
-
-GATE_MOVED_BY_A_LOCAL = net_of(
-    "a.s a.x b.y b.z",
-    "a.s b.z",
-    Transition("G", ("a.s",), ("a.x",), inhibitive=("b.y",)),
-    Transition("back", ("a.x",), ("a.s",)),
-    Transition("k", ("b.z",), ("b.y",)),
-    Transition("k-back", ("b.y",), ("b.z",)),
-)
-"""A gate elsewhere opens and closes by a local transition, of which the coordinator hears only later."""
 
 
 @pytest.mark.seeds

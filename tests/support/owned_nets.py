@@ -1,83 +1,16 @@
-"""Random nets in which everything has an owner, for the split and the protocol: small, with every kind of gate.
+"""Random nets in which everything has an owner, for the split and the protocol: those of the simulation.
 
 `owned_nets` is for properties, whose failures are shrunk; `owned_net` is for a search over seeds.
 """
 
-import random
-
 from hypothesis import strategies as st
 
-from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.executor.simulation.drawn import drawn_net, owned_net
+from firable.nets.net import Net
 
-Arcs = tuple[tuple[str, ...], tuple[str, ...]]
-
-
-def owned_net(seed: int) -> Net:
-    """The net of `drawn_net` that is drawn from a seed."""
-    return drawn_net(random.Random(seed), f"random-{seed}")
+__all__ = ["owned_net", "owned_nets"]
 
 
 def owned_nets() -> st.SearchStrategy[Net]:
     """The nets of `drawn_net`, with every choice left to hypothesis."""
     return st.randoms(use_true_random=False).map(lambda draw: drawn_net(draw, "random"))
-
-
-def drawn_net(draw: random.Random, title: str) -> Net:
-    """A net of two or three controllers, with local and global transitions.
-
-    It is marked so that its first transition can fire unless a gate keeps it, and no gate waits for the completion of a
-    command that was never sent.
-    """
-    owners = ["a", "b", "c"][: draw.randint(2, 3)]
-    names = [f"{draw.choice(owners)}.p{i}" for i in range(draw.randint(4, 8))]
-    arcs = _arcs(draw, owners, names)
-    filled = {name for inputs, _ in arcs for name in inputs if draw.random() < 0.6} | set(arcs[0][0])
-    filled -= {name for _, outputs in arcs[::2] for name in outputs if draw.random() < 0.7} | set(arcs[0][1])
-
-    signals: dict[str, Signal] = {}
-    places = {}
-    for name in names:
-        owner, command, completion = name[0], None, None
-        if draw.random() < 0.5:
-            command = Command(owner.upper(), f"C{name[2:]}")
-            if name not in filled and draw.random() < 0.6:
-                completion = f"{owner}.done{draw.randint(1, 2)}"
-                signals[completion] = Signal(completion, owner, SignalKind.COMPLETION)
-        places[name] = Place(name, owner, name in filled, command, completion)
-    for i in range(draw.randint(0, 2)):
-        owner = draw.choice(owners)
-        signals[f"{owner}.s{i}"] = Signal(f"{owner}.s{i}", owner)
-
-    def transition(i: int, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Transition:
-        others = [name for name in names if name not in inputs + outputs]
-        gates = draw.sample(others, min(len(others), draw.choice([0, 0, 1, 2])))
-        permissive = tuple(gate for gate in gates if draw.random() < 0.2)
-        wanted = {done: True for name in inputs if (done := places[name].completion)}
-        if signals and draw.random() < 0.3:
-            wanted.setdefault(draw.choice(list(signals)), draw.random() < 0.5)
-        inhibitive = tuple(gate for gate in gates if gate not in permissive)
-        external = tuple(ExternalGate(signal, value) for signal, value in wanted.items())
-        return Transition(f"t{i}", inputs, outputs, permissive, inhibitive, external)
-
-    return Net(
-        title,
-        tuple(places.values()),
-        tuple(transition(i, *both) for i, both in enumerate(arcs)),
-        tuple(signals.values()),
-        tuple(Controller(owner) for owner in owners),
-    )
-
-
-def _arcs(draw: random.Random, owners: list[str], names: list[str]) -> list[Arcs]:
-    """Inputs and outputs of some transitions, most with a way back, so that the net goes on."""
-    arcs: list[Arcs] = []
-    for _ in range(draw.randint(2, 5)):
-        owner = draw.choice(owners)
-        own = [name for name in names if name.startswith(owner)]
-        pool = own if len(own) > 1 and draw.random() < 0.4 else names
-        joined = draw.sample(pool, draw.randint(2, min(4, len(pool))))
-        cut = draw.randint(1, len(joined) - 1)
-        arcs.append((tuple(joined[:cut]), tuple(joined[cut:])))
-        if draw.random() < 0.7:
-            arcs.append((arcs[-1][1], arcs[-1][0]))
-    return arcs

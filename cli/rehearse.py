@@ -1,0 +1,188 @@
+"""`firable rehearse`: the whole executor of a cell through faults, from seeds; each run judged by the semantics."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from typing import TYPE_CHECKING
+
+import click
+
+from firable.cli import text
+from firable.cli.options import answer, format_option, load_net
+from firable.cli.report import Report
+
+if TYPE_CHECKING:
+    from firable.executor.simulation.campaign import Campaign, Run
+    from firable.executor.simulation.judge import Subject
+    from firable.nets.verdict import Verdict
+
+DRAWN = "drawn"
+_CHUNK = 50
+_SEEDS_PER_NET = 10
+_FAILURES_MAX = 5
+
+
+@click.command(short_help="Run a cell's controllers through crashes and faults, many times, from seeds.")
+@click.argument("net", metavar="NET")
+@click.option(
+    "--seeds", type=click.IntRange(min=1), default=1000, show_default=True, metavar="N", help="How many runs."
+)
+@click.option("--from", "first", type=click.IntRange(min=0), default=0, metavar="SEED", help="The first of the seeds.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="SEED", help="One run alone, and what happened in it.")
+@click.option(
+    "--faults",
+    metavar="KINDS",
+    help="These kinds of faults in every run, with commas between, or 'none'; else they are drawn.",
+)
+@click.option("--steps", type=click.IntRange(min=0), metavar="N", help="How long a run is before everything is mended.")
+@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
+@format_option
+def rehearse(
+    net: str,
+    seeds: int,
+    first: int,
+    seed: int | None,
+    faults: str | None,
+    steps: int | None,
+    jobs: int,
+    format_: str,
+) -> int:
+    """Run the controllers and the coordinator of NET many times, through faults that a seed draws.
+
+    The machines of the protocol are those that run the cell; network, disks, clocks, machines and operator are
+    simulated. Messages are lost and overtaken, processes killed and restarted, writes lost, machines late. Each run
+    must be a trace of NET with every command sent once, and must go on when everything is mended in the end. A run
+    that fails is made shorter and printed as the command that brings it back.
+
+    NET may also be 'drawn': then seeds draw nets as well, small ones with every kind of gate.
+
+    Kinds of faults: loss, duplication, delay, reordering, partition, crash, torn, unsynced, disk, drift, jump, slow,
+    late, stuck, flapping, stale, forgetful, pause, step, stop.
+    """
+    from firable.executor.simulation.campaign import Run
+
+    kinds = _kinds(faults)
+    asked = [seed] if seed is not None else range(first, first + seeds)
+    runs = [Run(each, kinds, steps) for each in asked]
+    return answer("rehearse", format_, lambda: _report(net, runs, jobs, format_ == "text"), _show)
+
+
+def _kinds(faults: str | None) -> tuple[str, ...] | None:
+    from firable.executor.simulation.faults import KINDS
+
+    if faults is None:
+        return None
+    named = [] if faults == "none" else [each.strip() for each in faults.split(",")]
+    if unknown := [each for each in named if each not in KINDS]:
+        raise click.UsageError(f"there is no fault '{unknown[0]}'; there are: {', '.join(KINDS)}; or 'none'")
+    return tuple(each for each in KINDS if each in named)
+
+
+def _report(argument: str, runs: Sequence[Run], jobs: int, is_text: bool) -> Report:
+    from firable.executor.simulation.campaign import shrunk
+
+    subject = _subjects(argument)  # an input that cannot be split is refused here
+    started = time.monotonic()
+    done = _campaign(argument, runs, jobs)
+    if is_text and len(runs) > 1:
+        seconds = time.monotonic() - started
+        click.echo(f"{done.runs:,} runs in {seconds:.1f} s: {done.runs / max(seconds, 1e-3):,.0f} a second", err=True)
+    if done.failed and len(runs) > 1:
+        first = done.failed[0]
+        shorter = shrunk(subject(first.run.seed), first)
+        # Where seeds draw nets, another seed may be of another net: then the first run is shown as it was.
+        if subject(shorter.run.seed) is subject(first.run.seed):
+            done.failed[0] = shorter
+    net = subject(done.failed[0].run.seed if done.failed else runs[0].seed).net
+    return Report(
+        "rehearse",
+        argument,
+        net,
+        (_verdict(argument, done),),
+        run={
+            "runs": done.runs,
+            "counts": dict(sorted(done.counts.items())),
+            "never_fired": [] if argument == DRAWN else [t.name for t in net.transitions if t.name not in done.fired],
+            "failed": [
+                {"command": f.command(argument), "kind": f.kind, "message": f.message, "log": list(f.log)}
+                for f in done.failed[:_FAILURES_MAX]
+            ],
+        },
+    )
+
+
+@cache
+def _subjects(argument: str) -> Callable[[int], Subject]:
+    """What a seed is tried on: the net of the argument, or one that is drawn."""
+    from firable.decompose.splitting.cut import split
+    from firable.executor.simulation.drawn import owned_net
+    from firable.executor.simulation.judge import Subject
+
+    if argument == DRAWN:
+        drawn = cache(lambda number: Subject(split(owned_net(number))))
+        return lambda seed: drawn(seed // _SEEDS_PER_NET)
+    loaded = load_net(argument)
+    with loaded.placing():
+        subject = Subject(split(loaded.net))
+    return lambda _: subject
+
+
+def _part(argument: str, runs: Sequence[Run]) -> Campaign:
+    from firable.executor.simulation.campaign import campaign
+
+    return campaign(_subjects(argument), runs)
+
+
+def _campaign(argument: str, runs: Sequence[Run], jobs: int) -> Campaign:
+    from concurrent.futures import ProcessPoolExecutor
+
+    from firable.executor.simulation.campaign import Campaign
+
+    chunks = [runs[i : i + _CHUNK] for i in range(0, len(runs), _CHUNK)]
+    part = partial(_part, argument)
+    done = Campaign()
+    if jobs == 1:
+        for chunk in chunks:
+            done.join(part(chunk))
+            if len(done.failed) >= _FAILURES_MAX:
+                break
+        return done
+    with ProcessPoolExecutor(jobs) as pool:
+        for found in pool.map(part, chunks):
+            done.join(found)
+            if len(done.failed) >= _FAILURES_MAX:
+                pool.shutdown(cancel_futures=True)
+                break
+    return done
+
+
+def _verdict(argument: str, done: Campaign) -> Verdict:
+    from firable.nets.verdict import Status, Verdict
+
+    method = "simulation from seeds, judged by the reference player"
+    what = "trace of the net, and goes on when everything is mended"
+    if not done.failed:
+        return Verdict("rehearsal", Status.PROVED, f"each of {text.counted(done.runs, 'run')} is a {what}", method)
+    worst = done.failed[0]
+    statement = f"each run is a {what}; of {text.counted(done.runs, 'run')} not: {len(done.failed)}"
+    hint = f"{worst.kind}: {worst.message}\n{worst.command(argument)}"
+    return Verdict("rehearsal", Status.VIOLATED, statement, method, hint=hint)
+
+
+def _show(report: Report) -> None:
+    text.heading(report.net, report.input)
+    run = report.run
+    for failed in run["failed"][:1]:
+        click.echo("\n  the last steps:")
+        for line in failed["log"]:
+            click.echo(f"  {line}")
+    if run["counts"]:
+        told = ", ".join(f"{count:,} {what}" for what, count in run["counts"].items())
+        click.echo(f"\n  what happened: {told}")
+    if run["never_fired"]:
+        click.echo(f"  never fired: {', '.join(run['never_fired'])}")
+    text.show_verdicts(report.net, report.verdicts)
+    for failed in run["failed"]:
+        click.echo(f"\n  {click.style(failed['command'], bold=True)}")

@@ -1,0 +1,90 @@
+"""A simulated process: one machine on its disk, and what waits to leave it.
+
+It is the host of the machine, and does what every host has to: the writes of an act become durable before anything of
+the act leaves. What an act wants to let out stands in the outbox, in order, until the sync behind which it may leave.
+Killed, the process loses the machine, the outbox and what its disk had not synced. Of the acts whose writes survive,
+firings and changes of signals have happened, although nobody was told: a restart finds them done.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from firable.executor.protocol.messages import Effect, Firing, Keep, Stored, Taken
+from firable.executor.simulation.disk import Disk
+
+Machine = TypeVar("Machine")
+
+
+@dataclass(slots=True)
+class Act:
+    """What one call of a machine let out, and whether it wrote anything."""
+
+    writes: bool
+    leaving: list[Effect]
+
+
+@dataclass(slots=True)
+class Process(Generic[Machine]):
+    """A process that is not started yet."""
+
+    name: str
+    draw: random.Random
+    disk: Disk = field(init=False)
+    machine: Machine | None = None
+    outbox: list[Act] = field(default_factory=list)
+    rate: float = 1.0
+    """Seconds of its clock for a second of the simulation."""
+    started_seconds: float = 0.0
+    jumped_seconds: float = 0.0
+    is_held: bool = False
+    """Whether it has restarted, and no operator has resumed it yet."""
+    cut_off: bool = False
+    """Whether no message reaches it or leaves it."""
+
+    def __post_init__(self) -> None:
+        self.disk = Disk(self.draw)
+
+    def act(self, effects: Iterable[Effect]) -> bool:
+        """Take the effects of one call, writes to the disk, the rest to the outbox; returns whether there are any."""
+        batch: dict[str, Stored | None] = {}
+        leaving: list[Effect] = []
+        for effect in effects:
+            if isinstance(effect, Keep):
+                batch[effect.key] = effect.value
+            else:
+                leaving.append(effect)
+        if batch:
+            self.disk.write(batch)
+        elif not leaving:
+            return False
+        self.outbox.append(Act(bool(batch), leaving))
+        return True
+
+    def sync(self) -> list[Effect]:
+        """Make durable what the acts wrote, and return what may leave now; raises `DiskFailedError`."""
+        if self.disk.unsynced:
+            self.disk.sync()
+        leaving = [effect for act in self.outbox for effect in act.leaving]
+        self.outbox.clear()
+        return leaving
+
+    def kill(self) -> list[Effect]:
+        """End at once; returns what had happened, though nothing of it was told to anybody."""
+        kept = self.disk.crash()
+        happened: list[Effect] = []
+        for act in self.outbox:
+            if not kept:
+                break
+            kept -= act.writes
+            happened += [effect for effect in act.leaving if isinstance(effect, Firing | Taken)]
+        self.outbox.clear()
+        self.machine = None
+        return happened
+
+    def now_seconds(self, at_seconds: float) -> float:
+        """What its clock shows, which began anew with the process."""
+        return (at_seconds - self.started_seconds) * self.rate + self.jumped_seconds

@@ -1,0 +1,81 @@
+"""`firable rehearse`: what it says of runs that pass and of one that fails, and the mistakes of its users."""
+
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+import firable.executor.simulation.campaign
+from firable.cli.main import main
+from firable.executor.simulation.world import Machines
+from firable.nets.net import Net, Place, Transition
+from firable.nets.pnml_writer import write_pnml
+
+SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+
+
+def told(capsys: pytest.CaptureFixture[str]) -> str:
+    return capsys.readouterr().out
+
+
+def test_runs_that_pass_are_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["rehearse", "catalogue:one_robot", "--seeds", "20"]) == 0
+    out = told(capsys)
+    assert "each of 20 runs is a trace of the net, and goes on when everything is mended" in out
+    assert "kills" in out
+
+
+def test_the_report_is_of_the_schema_and_holds_no_measured_time(capsys: pytest.CaptureFixture[str]) -> None:
+    documents = []
+    for jobs in ("1", "2"):
+        assert main(["rehearse", "drawn", "--seeds", "60", "--jobs", jobs, "--format", "json"]) == 0
+        documents.append(told(capsys))
+    assert documents[0] == documents[1]
+    document = json.loads(documents[0])
+    jsonschema.validate(document, SCHEMA)
+    assert document["reports"][0]["run"]["runs"] == 60
+
+
+def test_a_run_that_fails_is_shown_with_its_last_steps_and_the_command_that_brings_it_back(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from support.planted import DecidesEarly
+
+    planted = Machines(coordinator=DecidesEarly)
+    monkeypatch.setattr(firable.executor.simulation.campaign, "REAL", planted)
+    for function in ("rehearse", "campaign", "shrunk"):
+        made = getattr(firable.executor.simulation.campaign, function)
+        monkeypatch.setattr(made, "__defaults__", (planted,))
+    assert main(["rehearse", "catalogue:one_robot", "--seeds", "30", "--format", "json"]) == 1
+    document = json.loads(told(capsys))
+    jsonschema.validate(document, SCHEMA)
+    command = document["reports"][0]["run"]["failed"][0]["command"]
+    assert command.startswith("firable rehearse catalogue:one_robot --seed ")
+    assert main(command.split()[1:]) == 1
+    out = told(capsys)
+    assert "the last steps:" in out
+    assert command in out
+
+
+def test_a_kind_of_fault_that_there_is_not_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["rehearse", "catalogue:one_robot", "--faults", "los"]) == 2
+    error = capsys.readouterr().err
+    assert "there is no fault 'los'" in error
+    assert "loss, duplication" in error
+
+
+def test_a_net_without_owners_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    net = Net("net", (Place("p", marked=True), Place("q")), (Transition("t", ("p",), ("q",)),))
+    (tmp_path / "net.pnml").write_text(write_pnml(net)[0])
+    assert main(["rehearse", str(tmp_path / "net.pnml")]) == 2
+    assert "owner" in capsys.readouterr().err
+
+
+def test_every_kind_of_fault_is_in_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    from firable.executor.simulation.faults import KINDS
+
+    assert main(["rehearse", "--help"]) == 0
+    words = told(capsys).replace("\n", " ").replace(",", " ").replace(".", " ").split()
+    assert not [kind for kind in KINDS if kind not in words]

@@ -1,0 +1,43 @@
+"""Two nets of two controllers in which a gate stands between a coordinated and a local transition."""
+
+from firable.nets.net import Controller, Net, Place, Transition
+
+
+def net_of(places: str, marked: str, *transitions: Transition) -> Net:
+    """A net of the controllers `a` and `b`; a place of `a` is named by `a` and a letter."""
+    names = places.split()
+    return Net(
+        "net",
+        tuple(Place(name, name[0], marked=name in marked.split()) for name in names),
+        transitions,
+        controllers=(Controller("a"), Controller("b")),
+    )
+
+
+GATE_OF_A_LOCAL = net_of(
+    "a.i a.p a.s a.x b.j b.y",
+    "a.i a.s b.j",
+    Transition("G", ("a.i", "b.j"), ("a.p", "b.y")),
+    Transition("l", ("a.s",), ("a.x",), inhibitive=("a.p",)),
+)
+"""A local transition must not fire between a decision and its application: it reads what the part will write."""
+
+GATE_MOVED_BY_A_LOCAL = net_of(
+    "a.s a.x b.y b.z",
+    "a.s b.z",
+    Transition("G", ("a.s",), ("a.x",), inhibitive=("b.y",)),
+    Transition("back", ("a.x",), ("a.s",)),
+    Transition("k", ("b.z",), ("b.y",)),
+    Transition("k-back", ("b.y",), ("b.z",)),
+)
+"""A gate elsewhere opens and closes by a local transition, of which the coordinator hears only later."""
+
+GATE_READ_AGAIN = net_of(
+    "a.i a.p a.s a.x b.j b.y",
+    "a.i a.s b.j",
+    Transition("G", ("a.i", "b.j"), ("a.p", "b.y")),
+    Transition("G-back", ("a.p", "b.y"), ("a.i", "b.j")),
+    Transition("l", ("a.s",), ("a.x",), inhibitive=("a.p",)),
+    Transition("l-back", ("a.x",), ("a.s",)),
+)
+"""As `GATE_OF_A_LOCAL`, again and again."""
