@@ -2,7 +2,9 @@
 
 A command is issued once for each entry of a token, and numbered: `entry` counts the commands that share a completion
 signal, or those of a place whose command has none. Of each such count only the newest command matters, since a
-completion of an earlier one is stale. So one record a count is kept, under `command/...`: the place, the entry, and
+completion of an earlier one is stale. So one record a count is kept, under `command/...`: the place, the entry, and how
+far it has come. Where two places share a completion and are entered together, the earlier command has a record of its
+own, until the completion comes that is that of both. A command is
 
 - *issued*: it was handed on to be sent. It may have been sent, or not, or half: who crashed cannot know;
 - *owed*: its token entered while the controller was held after a restart, and it was not handed on yet;
@@ -90,6 +92,12 @@ class Commands:
         """A token enters a place with a command: issue it or, in a controller that is held, owe it."""
         key = self._key(place)
         earlier = self.newest.get(key)
+        if earlier is not None and earlier.place != place and earlier.stage is not Stage.OVER:
+            beside = _place_key(earlier.place)
+            self.newest[beside] = earlier
+            yield self._kept(beside)
+        if key != _place_key(place):
+            yield from self._over(_place_key(place))
         entry = earlier.entry + 1 if earlier is not None else 1
         self.newest[key] = Command(place, entry, Stage.OWED if held else Stage.ISSUED)
         yield self._kept(key)
@@ -99,6 +107,9 @@ class Commands:
     def completed(self, completion: str) -> Iterator[Effect]:
         """The completion signal of the newest command has been taken into the process image."""
         yield from self._over(_signal_key(completion))
+        for key, command in self.newest.items():
+            if command.stage is not Stage.OVER and self.subnet.place(command.place).completion == completion:
+                yield from self._over(key)
 
     def sent(self, place: str, entry: int) -> Iterator[Effect]:
         """The driver has taken a command: one without a completion signal is over with that."""
@@ -108,11 +119,11 @@ class Commands:
 
     def answer(self, place: str, entry: int, answer: Answer) -> bool:
         """Take what is said of a command issued before the restart; False where it is not asked after (any more)."""
-        key = self._key(place)
-        if not self._is_newest(key, entry) or self.newest[key].answer is not Answer.UNKNOWN:
-            return False
-        self.newest[key].answer = answer
-        return True
+        for command in self.newest.values():
+            if (command.place, command.entry, command.answer) == (place, entry, Answer.UNKNOWN):
+                command.answer = answer
+                return True
+        return False
 
     def resume(self, marked: frozenset[str]) -> Iterator[Effect]:
         """Send what is owed; a command whose token has left its place meanwhile is void."""
@@ -140,7 +151,7 @@ class Commands:
 
     def _key(self, place: str) -> str:
         completion = self.subnet.place(place).completion
-        return _signal_key(completion) if completion is not None else f"{PREFIX}place/{place}"
+        return _signal_key(completion) if completion is not None else _place_key(place)
 
     def _kept(self, key: str) -> Keep:
         command = self.newest[key]
@@ -149,6 +160,10 @@ class Commands:
 
 def _signal_key(completion: str) -> str:
     return f"{PREFIX}signal/{completion}"
+
+
+def _place_key(place: str) -> str:
+    return f"{PREFIX}place/{place}"
 
 
 def _is_owed(command: Command) -> bool:

@@ -36,7 +36,17 @@ from firable.executor.simulation.network import Network, ProgressLostError, Simu
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Arbiter, ArbitrationRule, Controller, Net, Place, Transition
+from firable.nets.net import (
+    Arbiter,
+    ArbitrationRule,
+    Command,
+    Controller,
+    Net,
+    Place,
+    Signal,
+    SignalKind,
+    Transition,
+)
 from firable.semantics.replaying import replay
 
 Machine = LocalController | Coordinator
@@ -383,3 +393,28 @@ def test_turns_of_an_arbiter_outlive_a_restart() -> None:
         kept += controller.start()
         controller.resume()
     assert fired == ["A", "A-back", "B", "B-back", "A", "A-back"]
+
+
+def test_both_of_two_commands_that_share_a_completion_are_asked_after_and_over_together() -> None:
+    fill, shared = Command("FILL", "RUN"), Command("HEAT", "RUN")
+    net = Net(
+        "both",
+        (
+            Place("a.p", "a", marked=True),
+            Place("a.fill", "a", command=fill, completion="a.done"),
+            Place("a.heat", "a", command=shared, completion="a.done"),
+        ),
+        (Transition("begin", ("a.p",), ("a.fill", "a.heat")),),
+        (Signal("a.done", "a", SignalKind.COMPLETION),),
+        (Controller("a"),),
+    )
+    decomposition = split(net)
+    controller = LocalController(decomposition, "a")
+    kept = [*controller.start(), *controller.fire()]
+    again = restarted(controller, decomposition, kept)
+    assert again.commands.questions == (("a.heat", 2), ("a.fill", 1))
+    for place, entry in again.commands.questions:
+        again.answer(place, entry, Answer.NOT_RECEIVED)
+    assert {(e.place, e.entry) for e in again.resume() if isinstance(e, Sending)} == {("a.fill", 1), ("a.heat", 2)}
+    kept += again.read("a.done", value=True, entry=2)
+    assert not restarted(again, decomposition, kept).commands.questions
