@@ -63,8 +63,8 @@ def verify(
     by z3. Of each it is told how. "shown", or "proved" in JSON, means that the evidence shows it, whether it says that
     something holds or that it is violated; a verdict that nothing shows is "claimed", or "unknown", and told why.
 
-    Exit codes: 0 all verdicts of the documents are shown, 3 some are only claimed, or the time was over, 2 evidence was
-    damaged or edited, is about another net, or does not show what it claims.
+    Exit codes: 0 all that is claimed is shown, 3 some is only claimed, or the time was over, 2 evidence was damaged or
+    edited, is about another net, or does not show what it claims. What a bundle itself leaves undecided claims nothing.
     """
     milliseconds = max(1, round(timeout * 1000))
     net = None if of is None else load_net(of).net
@@ -165,9 +165,11 @@ def _shortened(text: str) -> str:
 
 
 def _told(verdict: Verdict, method: str, only_claimed: str, *, shown: bool) -> Verdict:
-    """What is said of a verdict of a bundle."""
+    """What is said of a verdict of a bundle; one that the bundle leaves undecided claims nothing, and weighs so."""
     from firable.nets.verdict import Status, Verdict
 
+    if verdict.status is Status.UNKNOWN:
+        return Verdict(verdict.name, Status.UNKNOWN, verdict.statement, method, verdict.weight, bound=only_claimed)
     violated = "it is violated: " if verdict.status is Status.VIOLATED else ""
     return Verdict(
         verdict.name,
@@ -245,16 +247,29 @@ def _show_bundle(report: Report) -> None:
             count = f"{shown:>4} of {len(some):<4}"
             click.echo(f"  {click.style(symbol, fg=colour)} {count} {family:<16} {titles[family]}")
     late = [verdict for some in families.values() for verdict in some if not verdict.holds]
-    text.show_verdicts(report.net, [*late, *others], verbose=True, words=_WORDS)
+    told = [*late, *others]
+    text.show_verdicts(report.net, [v for v in told if _claims(v)], verbose=True, words=_WORDS)
+    if undecided := [verdict for verdict in told if not _claims(verdict)]:
+        click.echo(f"\n{click.style('left undecided by the bundle itself', bold=True)}")
+        width = max(len(verdict.name) for verdict in undecided)
+        for verdict in undecided:
+            click.echo(f"  ? {verdict.name:<{width}}  {verdict.statement}")
     _summary(report)
     if report.files:
         click.echo(f"\n  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
 
 
+def _claims(verdict: Verdict) -> bool:
+    """Whether the bundle claims something of it; of a verdict that must hold it does, since it runs by it."""
+    return verdict.holds or verdict.weight.value == "required"
+
+
 def _summary(report: Report) -> None:
+    claimed = [verdict for verdict in report.verdicts if _claims(verdict)]
     counts: Mapping[str, int] = {
-        word: sum(verdict.status.value == status for verdict in report.verdicts)
-        for word, status in (("shown", "proved"), ("not shown", "unknown"))
+        "shown": sum(verdict.holds for verdict in claimed),
+        "not shown": sum(not verdict.holds for verdict in claimed),
+        "left undecided": len(report.verdicts) - len(claimed),
     }
     told = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
     click.echo(f"\n{told or 'the document claims nothing'}")

@@ -13,6 +13,7 @@ import pytest
 from firable.analysis.evidence.document import document_from_text
 from firable.cli.main import main
 from firable.nets.bundle import read_bundle, write_bundle
+from firable.nets.verdict import Status
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +54,17 @@ def test_a_bundle_of_another_net_is_refused(bundle: Path, capsys: pytest.Capture
 def test_the_files_of_a_bundle_go_to_another_solver(bundle: Path, tmp_path: Path) -> None:
     assert main(["verify", str(bundle), "--smt-dir", str(tmp_path / "smt")]) == 0
     assert {"eq7.smt2", "arbitration.smt2"} <= {file.name for file in (tmp_path / "smt").iterdir()}
+
+
+def test_a_bundle_may_hold_the_proof_on_its_own_protocol(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = tmp_path / "cell.bundle"
+    assert main(["bundle", "catalogue:conceptual_one_robot", "-o", str(made), "--faults"]) == 0
+    capsys.readouterr()
+    assert main(["verify", str(made), "--smt-dir", str(tmp_path / "smt")]) == 0
+    told = capsys.readouterr().out
+    assert "5 of 5    explored         the protocol of this very net does what the net does" in told
+    assert "3 of 3    faults           while messages are lost" in told
+    assert {"explored.smt2", "faults.smt2"} <= {file.name for file in (tmp_path / "smt").iterdir()}
 
 
 def test_a_damaged_bundle_is_refused(bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -98,6 +110,25 @@ def test_a_warning_that_nothing_shows_is_only_claimed(
     write_bundle(tmp_path / "bare", replace(whole, verdicts=bare, evidence={**whole.evidence, file: text}))
     assert main(["verify", str(tmp_path / "bare")]) == 3
     assert "? claimed   live" in capsys.readouterr().out
+
+
+def test_what_the_bundle_leaves_undecided_is_told_and_claims_nothing(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole, file = read_bundle(bundle), "check.evidence.json"
+    document = document_from_text(whole.evidence[file], file)
+    text = replace(document, records=tuple(r for r in document.records if r.name != "starvation")).to_text()
+    unknown: dict[str, Any] = {"status": Status.UNKNOWN, "evidence": (), "witness": None}
+    verdicts = tuple(replace(v, **unknown) if v.name == "starvation" else v for v in whole.verdicts)
+    doubted = replace(whole, verdicts=verdicts, evidence={**whole.evidence, file: text})
+    write_bundle(tmp_path / "doubted", doubted)
+    assert main(["verify", str(tmp_path / "doubted")]) == 0
+    told = capsys.readouterr().out
+    assert "left undecided by the bundle itself\n  ? starvation  every live transition" in told
+    assert "shown, 1 left undecided\n" in told
+    write_bundle(tmp_path / "edited", replace(doubted, evidence=whole.evidence))
+    assert main(["verify", str(tmp_path / "edited")]) == 2
+    assert "'starvation' is unknown, and the evidence says otherwise" in capsys.readouterr().err.replace("\n", " ")
 
 
 def test_no_time_at_all_refutes_nothing(bundle: Path, capsys: pytest.CaptureFixture[str]) -> None:
