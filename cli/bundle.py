@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from firable.cli import text
+from firable.cli.loop import machines_option, plant_text
 from firable.cli.options import (
     analysis_options,
     answer,
@@ -23,27 +24,39 @@ from firable.cli.report import Report
 @click.command(short_help="Check and prove a net, and seal it in a bundle that may run.")
 @net_argument
 @click.option("-o", "--output", metavar="FILE", required=True, help="The bundle to write.")
+@machines_option
 @click.option("--faults", is_flag=True, help="The same under lost and doubled messages, crashes and restarts.")
 @click.option("--protocol", is_flag=True, help="Hold the proof on the voting protocol of this very net, too.")
 @analysis_options
 @page_option
 @format_option
 def bundle(
-    net: str, output: str, page: str | None, format_: str, *, protocol: bool, faults: bool, **limits: Any
+    net: str,
+    output: str,
+    page: str | None,
+    format_: str,
+    *,
+    machines: str | None,
+    protocol: bool,
+    faults: bool,
+    **limits: Any,
 ) -> int:
     """Check NET, split it, prove the split, and write subnets, table, verdicts and evidence as one sealed file.
 
     Nothing is written unless everything that the net must prove is proved, and evidence on it was found. `firable run`
     refuses a bundle of which any byte was changed. Each bundle holds the proof on the protocol for nets of any size;
     with --protocol and --faults it also holds one on the protocol of NET itself, step by step.
+    With --machines it holds the plant, and the proof that its machines keep what votes rely on (O4).
     """
     if output == "-":
         raise click.UsageError("a bundle cannot go to standard output, where the report goes: name a file")
-    more = {"protocol": protocol, "faults": faults}
+    more: dict[str, Any] = {"protocol": protocol, "faults": faults}
+    if machines is not None:
+        more["plant"] = plant_text(machines)
     return answer("bundle", format_, with_page(lambda: _report(net, output, limits, more), page), _show)
 
 
-def _report(argument: str, output: str, limits: dict[str, Any], more: dict[str, bool]) -> Report:
+def _report(argument: str, output: str, limits: dict[str, Any], more: dict[str, Any]) -> Report:
     from firable.analysis.check import check
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits

@@ -31,12 +31,26 @@ def read_machines(argument: str) -> PlantModel:
     """The plant that an argument names: a plant file, or `catalogue:NAME`; raises `InputError` as its reader does."""
     from firable.nets.machines.plant_file import read_plant
 
+    return read_plant(_plant_file(argument))
+
+
+def plant_text(argument: str) -> str:
+    """The text of the plant file that an argument names, after it has been read without a mistake."""
+    from firable.nets.machines.plant_file import SIZE_BYTES_MAX, parse_plant
+    from firable.nets.source import read_source
+
+    source = read_source(_plant_file(argument), SIZE_BYTES_MAX)
+    parse_plant(source.text, source.file)
+    return source.text
+
+
+def _plant_file(argument: str) -> Path | str:
     if not argument.startswith(CATALOGUE):
-        return read_plant(argument)
+        return argument
     path = catalogue_file(argument, "plant")
     if not path.exists():
         raise click.UsageError(f"'{argument}' is a net without machines")
-    return read_plant(path)
+    return path
 
 
 def loop_report(argument: str, machines: str, allowed: Budget, loop_file: str | None) -> Report:

@@ -228,13 +228,20 @@ def _show(report: Report) -> None:
 
 def _show_bundle(report: Report) -> None:
     from firable.decompose.verification.explored import TITLES
+    from firable.decompose.verification.machines import TITLE as MACHINES
     from firable.decompose.verification.protocol import TITLE
     from firable.decompose.verification.restating import HEADS
 
     click.echo(f"  the bundle {report.bundle['digest'][:16]}…: split anew, and stated anew what it must prove")
     if signers := report.bundle.get("signed_by"):
         click.echo("  signed by " + ", ".join(f"{name[:16]}…" for name in signers.split(", ")) + ", which you trust")
-    titles = {**HEADS, "protocol": TITLE, **TITLES, "persistent": "of each vote it is shown whether it is persistent"}
+    titles = {
+        **HEADS,
+        "protocol": TITLE,
+        **TITLES,
+        "o4": MACHINES,
+        "persistent": "of each vote it is shown whether it is persistent",
+    }
     families: dict[str, list[Verdict]] = {family: [] for family in titles}
     others: list[Verdict] = []
     for verdict in report.verdicts:

@@ -18,13 +18,16 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
+from firable.decompose.proofs.held_gates import held_gates
 from firable.decompose.proofs.proving import TIMEOUT_MS, prove
 from firable.decompose.protocol.shown import proved_without_exploring
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import persistence
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.machines.plant_file import parse_plant
 from firable.nets.right_to_run import unproved
+from firable.nets.verdict import Verdict
 from firable.semantics.trace import Discipline
 
 EVIDENCE: Final = "check.evidence.json"
@@ -40,12 +43,14 @@ def make_bundle(
     timeout_ms: int = TIMEOUT_MS,
     protocol: bool = False,
     faults: bool = False,
+    plant: str = "",
 ) -> Bundle:
     """Split the net of a report, prove the decomposition and bundle both with all verdicts and their evidence.
 
     `limits` are for the evidence on the verdicts of the report: what it cannot show in that time is only claimed.
     `firable verify` will say so of a warning; a verdict that is required is no reason to run without evidence. With
-    `protocol` and `faults` the bundle holds the verdicts on the protocol of this very net, too, proved by an invariant.
+    `protocol` and `faults` the bundle holds the verdicts on the protocol of this very net, too, proved by an
+    invariant. With the text of a `plant` file, the bundle holds it and that its machines keep what votes rely on (O4).
 
     Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the report is not that of exploring
     this net by interleaving, which is how it will be executed, and for everything that must be proved and is not, or
@@ -65,8 +70,11 @@ def make_bundle(
     on_the_net = (replace(v, evidence=(*v.evidence, EVIDENCE)) if v.name in named else v for v in report.verdicts)
     families = ["explored"] * (protocol or faults) + ["faults"] * faults
     run, obligations = proved_without_exploring(decomposition, families, timeout_ms)
-    verdicts = (*on_the_net, *proof.verdicts, *run, *voted)
-    files = {EVIDENCE: document.to_text(), **proof.files, **obligations, **shown}
+    held, machines = tuple[Verdict, ...](), dict[str, str]()
+    if plant:
+        held, machines = held_gates(decomposition, parse_plant(plant)).sealed(plant, limits)
+    verdicts = (*on_the_net, *proof.verdicts, *run, *held, *voted)
+    files = {EVIDENCE: document.to_text(), **proof.files, **obligations, **machines, **shown}
     bundle = Bundle(decomposition, verdicts, files)
     if problems := unproved(bundle):
         lacking = {record.name: record.lacking for record in document.records if record.proved and record.lacking}

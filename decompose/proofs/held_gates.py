@@ -24,6 +24,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from hashlib import sha256
+from typing import TYPE_CHECKING
 
 from firable.analysis.goal import Limits
 from firable.analysis.loop.families import ENDED, Family, all_of, answers, any_of, never
@@ -39,9 +41,13 @@ from firable.nets.net import SignalKind, Transition
 from firable.nets.verdict import Status, Verdict, Witness
 from firable.semantics.player import Player
 
+if TYPE_CHECKING:
+    from firable.analysis.evidence.document import Document
+
 COMPLETIONS = "o4.completions"
 COMMANDS = "o4.commands"
 EVIDENCE = "o4.evidence.json"
+PLANT = "plant.yaml"
 _HINT = "put the interlock into the machine's own controller, or make the signal one that a command clears"
 
 
@@ -61,13 +67,37 @@ class HeldGates:
     loop: ClosedLoop
     asked: CheckReport
 
-    def evidence(self, limits: Limits | None = None) -> dict[str, bytes]:
-        """The document of evidence on the questions, for `firable verify`, by the name of its file."""
+    def document(self, limits: Limits | None = None) -> Document:
+        """The evidence on the questions."""
         from firable.analysis.evidence.producing.producer import evidence_of_report
 
         questions = tuple(verdict for verdict in self.asked.verdicts if verdict.name.startswith("property."))
-        data = evidence_of_report(replace(self.asked, verdicts=questions), (), limits).to_bytes()
+        return evidence_of_report(replace(self.asked, verdicts=questions), (), limits)
+
+    def evidence(self, limits: Limits | None = None) -> dict[str, bytes]:
+        """The document, for `firable verify`, by the name of its file."""
+        data = self.document(limits).to_bytes()
         return {EVIDENCE if data.startswith(b"{") else f"{EVIDENCE}.gz": data}
+
+    def sealed(self, plant: str, limits: Limits | None = None) -> tuple[tuple[Verdict, ...], dict[str, str]]:
+        """The verdicts as a bundle holds them, with the text of the plant that they are about, and the document."""
+        document = self.document(limits)
+        lacking = any(record.lacking for record in document.records)
+        method = f"closed loop with the machines of the plant {sha256(plant.encode()).hexdigest()}"
+        shown = [
+            Verdict(
+                verdict.name,
+                verdict.status,
+                verdict.statement,
+                method,
+                evidence=(EVIDENCE, PLANT),
+                discipline=verdict.discipline,
+            )
+            if verdict.holds and not lacking
+            else verdict
+            for verdict in self.verdicts
+        ]
+        return tuple(shown), {EVIDENCE: document.to_text(), PLANT: plant}
 
 
 def held_gates(decomposition: Decomposition, model: PlantModel, budget: Budget | None = None) -> HeldGates:

@@ -8,7 +8,9 @@ them anew. So everything is derived a second time, by code that shares nothing w
    after every name (`restating`, `reading`, `obligations`);
 3. the theorem on the protocol must be the one that is published, and the second solver confirm it (`protocol`); where
    the bundle speaks of the protocol of this very net, the net of that is made anew, too (`explored`);
-4. the verdicts on the central net must be those that its documents of evidence show (`documents`);
+4. where the bundle names machines, the loop that they close is closed anew, and its document must show of it that they
+   keep each gate that a vote relies on (`machines`); the verdicts on the central net must be those that its documents
+   of evidence show (`documents`);
 5. nothing is left over: no file that nobody needs, no verdict that nobody knows; and nothing is left out: each verdict
    that every net has is there, warnings too.
 
@@ -23,6 +25,7 @@ from typing import Final
 from firable.decompose.verification.checked import CheckedVerdict, Examination
 from firable.decompose.verification.documents import check_verdicts_on_the_net
 from firable.decompose.verification.explored import check_explored
+from firable.decompose.verification.machines import check_machines
 from firable.decompose.verification.obligations import check_obligations
 from firable.decompose.verification.protocol import check_protocol
 from firable.decompose.verification.recut import check_cut
@@ -58,6 +61,7 @@ def _checked(bundle: Bundle, solver: str, timeout_ms: int) -> tuple[CheckedVerdi
     check_obligations(examination, cut, solver, answers, timeout_ms)
     check_protocol(examination, solver, answers, timeout_ms)
     check_explored(examination, cut, solver, answers, timeout_ms)
+    check_machines(examination, cut, answers, timeout_ms)
     check_verdicts_on_the_net(examination, answers, timeout_ms)
     for verdict in list(examination.unjudged()):
         raise NotShownError(f"nobody knows what '{verdict.name}' is on", "verdicts", verdict.name)

@@ -31,6 +31,7 @@ from firable.decompose.verification.words import SENTENCES, sentence_of
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula as StateFormula
 from firable.nets.interchange import net_digest
+from firable.nets.net import Net
 from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.player import NotFirableError, Player
 from firable.semantics.trace import Discipline
@@ -49,7 +50,8 @@ class _Shown:
 def check_verdicts_on_the_net(examination: Examination, answers: Answers, timeout_ms: int) -> None:
     """Judge every verdict that documents show or could show; raises `NotShownError` where one is not what they show."""
     formulas, shown = Formulas(), _Shown()
-    for file in sorted(name for name in examination.bundle.evidence if name.endswith(SUFFIX)):
+    others = set(examination.bundle.evidence) - examination.used
+    for file in sorted(name for name in others if name.endswith(SUFFIX)):
         _read(examination, file, answers, timeout_ms, formulas, shown)
     _judge_votes(examination, formulas, shown)
     for verdict in list(examination.unjudged()):
@@ -63,15 +65,16 @@ def check_verdicts_on_the_net(examination: Examination, answers: Answers, timeou
         raise NotShownError(f"'{file}' answers a question that no verdict asks", "evidence", file)
 
 
-def _read(
-    examination: Examination, file: str, answers: Answers, timeout_ms: int, formulas: Formulas, shown: _Shown
-) -> None:
+def checked_document(
+    examination: Examination, file: str, net: Net, answers: Answers, timeout_ms: int
+) -> list[CheckedRecord]:
+    """The records of a document of evidence, checked, which must be about this very net and the one spelling of it."""
     text = examination.text(file)
     try:
         document = document_from_text(text, file)
         if document.to_text() != text:
             raise NotShownError(f"'{file}' is not as it was written", "evidence", file)
-        if net_digest(document.net) != net_digest(examination.bundle.net):
+        if net_digest(document.net) != net_digest(net):
             raise NotShownError(f"'{file}' is about another net", "evidence", file)
         if document.discipline is not Discipline.INTERLEAVING:
             raise NotShownError(f"'{file}' is about another discipline", "evidence", file)
@@ -79,7 +82,13 @@ def _read(
     except InputError as error:
         raise NotShownError(f"'{file}': {error.diagnostics[0].message}", "evidence", file) from None
     _ask_again(document, file, answers, timeout_ms)
-    for one in checked:
+    return checked
+
+
+def _read(
+    examination: Examination, file: str, answers: Answers, timeout_ms: int, formulas: Formulas, shown: _Shown
+) -> None:
+    for one in checked_document(examination, file, examination.bundle.net, answers, timeout_ms):
         record = one.record
         if record.name:
             if record.name in shown.records or record.query:
