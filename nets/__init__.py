@@ -11,11 +11,11 @@ of the example cells in `catalogue_names`.
     except InputError as error:
         print(*error.diagnostics, sep="\n")
 
-To build: a `Net` is made of `Controller`, `Place` with its `Command` (in a conceptual net with a `TaskUse` or a
-`Resource`), `Signal` of a `SignalKind`, `Transition` with each `ExternalGate`, `Arbiter` with its `ArbitrationRule`,
-and `Property` with its `PropertyKind` and `Fairness`, whose formula `parse_formula` reads and `format_formula` prints
-(`FormulaError` where it is none). A net that exists is well formed; what is wrong with an input is an `InputError`,
-each `Diagnostic` with its `Severity` and its `Span`. `net_digest` tells nets apart.
+To build: a `Net` is made of `Controller`, `Place` with its `Command` and perhaps a `TimeLimit` (in a conceptual net
+with a `TaskUse` or a `Resource`), `Signal` of a `SignalKind`, `Transition` with each `ExternalGate`, `Arbiter` with its
+`ArbitrationRule`, and `Property` with its `PropertyKind` and `Fairness`, whose formula `parse_formula` reads and
+`format_formula` prints (`FormulaError` where it is none). A net that exists is well formed; what is wrong with an input
+is an `InputError`, each `Diagnostic` with its `Severity` and its `Span`. `net_digest` tells nets apart.
 
 To pass on: a `Verdict` has a `Status`, never a bare Boolean, a `Weight` and perhaps a `Witness`. A `Bundle` holds a
 `Decomposition` with the verdicts on it: `read_bundle`, `write_bundle`.
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
         Signal,
         SignalKind,
         TaskUse,
+        TimeLimit,
         Transition,
     )
     from firable.nets.pnml import read_pnml
@@ -81,6 +82,7 @@ __all__ = [
     "Span",
     "Status",
     "TaskUse",
+    "TimeLimit",
     "Transition",
     "Verdict",
     "Weight",
@@ -120,7 +122,7 @@ _MODULES: Final = {
             "Place",
             "Property",
         ),
-        *("PropertyKind", "Resource", "Signal", "SignalKind", "TaskUse", "Transition"),
+        *("PropertyKind", "Resource", "Signal", "SignalKind", "TaskUse", "TimeLimit", "Transition"),
     ),
     "pnml": ("read_pnml",),
     "pnml_writer": ("write_pnml",),

@@ -60,7 +60,7 @@ def contentions(net: Net, among: Collection[str]) -> Iterator[Contention]:
             empty.setdefault(name, []).append(t)
         for name in dict.fromkeys(gate.signal for gate in t.external):
             asking.setdefault(name, []).append(t)
-        for name in dict.fromkeys(completion for p in t.outputs if (completion := net.place(p).completion)):
+        for name in dict.fromkeys(signal for p in t.outputs for signal in net.place(p).cleared):
             clearing.setdefault(name, []).append(t)
     for place in net.places:
         p = net.place_index[place.name]

@@ -64,7 +64,7 @@ CODES: Final[dict[str, str]] = {
     "F2015": "more than one coordinator",
     "F2016": "duplicate transition number",
     "F2017": "an arc to something that is not a place",
-    "F2018": "a signal that is both a sensor and a completion",
+    "F2018": "a signal of two kinds",
     "F2019": "the owner and the name of a place or signal disagree",
     "F2020": "a change of the net that would change its meaning",
     "F2021": "unknown source of a gate",
@@ -74,6 +74,8 @@ CODES: Final[dict[str, str]] = {
     "F2025": "unknown step, sensor or role of a task",
     "F2026": "a template that cannot be filled",
     "F2027": "controllers that are no tree",
+    "F2028": "a time limit without a completion",
+    "F2029": "not a time limit",
     # F3: analysis
     "F3001": "a machine is started that no command ever stops",
     "F3002": "an output signal on a place marked in M0",

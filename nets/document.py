@@ -15,6 +15,8 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from firable.nets.time_limits import TIME_PATTERN
+
 _DIGITS: Final = re.compile(r"0|-?[1-9][0-9]{0,17}")
 
 
@@ -30,6 +32,10 @@ def as_integer(value: object) -> object:
 
 def _as_formula(value: object) -> object:
     return str(value).lower() if isinstance(value, bool) else value
+
+
+def _as_time(value: object) -> object:
+    return {"time": value} if isinstance(value, str) else value
 
 
 def _as_pair(value: object) -> object:
@@ -85,11 +91,31 @@ class ResourceDocument(_Extensible):
     prefix: Text = Field(default="", description="What comes before the names of the machine's signals.")
 
 
+class WithinDocument(StrictDocument):
+    """How long the completion may take, and names for what that gives; the time alone is the short form."""
+
+    time: str = Field(json_schema_extra={"pattern": TIME_PATTERN}, description="Such as 5s, 500ms or 2min.")
+    to: Name | None = Field(default=None, description="The fault place, one of `places`; else PLACE_fault.")
+    transition: Name | None = Field(default=None, description="The fault transition; else CONTROLLER.PLACE_timeout.")
+    timer: Name | None = Field(default=None, description="The signal that the time is over; else PLACE_overdue.")
+
+
 class PlaceDocument(StrictDocument):
     """A place; nothing after its name is a place without a command."""
 
     send: CommandDocument | None = Field(default=None, description="The command sent when a token enters.")
     until: Name | None = Field(default=None, description="The completion signal that lets the token out.")
+    within: (
+        Annotated[
+            WithinDocument,
+            BeforeValidator(
+                _as_time,
+                json_schema_input_type=WithinDocument
+                | Annotated[str, Field(json_schema_extra={"pattern": TIME_PATTERN})],
+            ),
+        ]
+        | None
+    ) = Field(default=None, description="How long the completion may take before the token goes to a fault place.")
     task: TaskUseDocument | None = Field(default=None, description="The registered task that the place stands for.")
     opens: ResourceDocument | None = Field(default=None, description="The resource that the place stands for.")
     description: Text = ""

@@ -5,6 +5,9 @@ missing key is refused): what a bundle's hash covers must be all that the execut
 form and so needs no YAML, no positions and none of the conveniences of the text format. Formulas are text in the
 grammar of `formula`, which keeps the form free of a second syntax.
 
+Version 3 has the time limit of a place and the kind `timer` of a signal. A net of an earlier version is not read: its
+bundle is made anew from the net file, with a proof by the release that will run it.
+
 Rejected: pickling the dataclasses (runs code on reading) and hashing the YAML text (a comment would void a proof).
 """
 
@@ -35,11 +38,12 @@ from firable.nets.net import (
     SignalKind,
     TaskUse,
     TemporalProperty,
+    TimeLimit,
     Transition,
 )
 from firable.nets.temporal import Logic, format_temporal, logics, parse_temporal
 
-FORMAT: Final = "firable-net/2"
+FORMAT: Final = "firable-net/3"
 
 
 def net_to_json(net: Net) -> dict[str, Any]:
@@ -81,6 +85,9 @@ def net_to_json(net: Net) -> dict[str, Any]:
                     "prefix": place.resource.prefix,
                     "parameters": [list(pair) for pair in place.resource.parameters],
                 },
+                "within": None
+                if place.within is None
+                else {"milliseconds": place.within.milliseconds, "timer": place.within.timer},
             }
             for place in net.places
         ],
@@ -147,6 +154,7 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
                 Resource(p.resource.idle, p.resource.machine, p.resource.prefix, tuple(p.resource.parameters))
                 if p.resource
                 else None,
+                TimeLimit(p.within.milliseconds, p.within.timer) if p.within else None,
             )
             for p in record.places
         ),
@@ -271,6 +279,11 @@ class _ResourceRecord(_Record):
     parameters: _Pairs
 
 
+class _TimeLimitRecord(_Record):
+    milliseconds: int
+    timer: str
+
+
 class _PlaceRecord(_Record):
     name: str
     owner: str | None
@@ -280,12 +293,13 @@ class _PlaceRecord(_Record):
     description: str
     task: _TaskUseRecord | None
     resource: _ResourceRecord | None
+    within: _TimeLimitRecord | None
 
 
 class _SignalRecord(_Record):
     name: str
     owner: str | None
-    kind: Literal["completion", "sensor"]
+    kind: Literal["completion", "sensor", "timer"]
 
 
 class _GateRecord(_Record):
@@ -319,7 +333,7 @@ class _PropertyRecord(_Record):
 
 
 class _NetRecord(_Record):
-    format: Literal["firable-net/2"]
+    format: Literal["firable-net/3"]
     name: str
     description: str
     controllers: list[_ControllerRecord]

@@ -208,7 +208,7 @@ def _joined(decomposition: Decomposition) -> Mapping[str, tuple[str, str]]:
                 continue
             reached.add((place, put))
             index = net.place_index[place]
-            for other in (net.producers if put else net.consumers)[index]:
+            for other in (net.producers if put else net.competitors)[index]:
                 rival = net.transitions[other].name
                 if rival not in is_global and rival not in joined:
                     joined[rival] = (name, place)
@@ -218,7 +218,7 @@ def _joined(decomposition: Decomposition) -> Mapping[str, tuple[str, str]]:
 
 def _rival(net: Net, transition: Transition) -> tuple[str, str] | None:
     """One that it conflicts with, and the place; None where there is none."""
-    for places, table in ((transition.inputs, net.consumers), (transition.outputs, net.producers)):
+    for places, table in ((transition.inputs, net.competitors), (transition.outputs, net.producers)):
         for place in places:
             for other in table[net.place_index[place]]:
                 if net.transitions[other] is not transition:
@@ -243,20 +243,20 @@ def _keeping(subnet: Net) -> Callable[[Transition], bool]:
     putters = Counter(place for t in subnet.transitions for place in {*t.outputs, *t.inhibitive})
     senders: dict[str, set[str]] = {}
     for place in subnet.places:
-        if place.completion is not None:
-            senders.setdefault(place.completion, set()).add(place.name)
+        for signal in place.cleared:
+            senders.setdefault(signal, set()).add(place.name)
     readers: dict[str, list[Transition]] = {signal: [] for signal in senders}
     for t in subnet.transitions:
         for signal in {gate.signal for gate in t.external} & readers.keys():
             readers[signal].append(t)
 
     def shows_what_it_clears(part: Transition) -> bool:
-        """Whether someone may read a completion that the part clears while its order is still on its way.
+        """Whether someone may read a completion or timer that the part clears while its order is still on its way.
 
         Not who needs an output place of it full, which is empty until then.
         """
         outputs = set(part.outputs)
-        cleared = {completion for place in part.outputs if (completion := subnet.place(place).completion) is not None}
+        cleared = {signal for place in part.outputs for signal in subnet.place(place).cleared}
         return any(
             t is not part and outputs.isdisjoint((*t.inputs, *t.permissive))
             for signal in cleared

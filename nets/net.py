@@ -85,11 +85,24 @@ class Resource:
 
 
 @dataclass(frozen=True, slots=True)
+class TimeLimit:
+    """How long the completion of a place's command may take, in whole milliseconds.
+
+    `timer` is a signal of the place's controller: cleared when the token enters, set when the time is over and the
+    completion has not come. The fault transition, one of those that take the token, waits for it.
+    """
+
+    milliseconds: int
+    timer: str
+
+
+@dataclass(frozen=True, slots=True)
 class Place:
     """A place: at most one token, marked or not in M0.
 
     `completion` names the completion signal of the place's command: the driver clears it when the command is sent
-    and sets it when the machine is done; every transition that takes the token out is gated by it. `task` and
+    and sets it when the machine is done; every transition that takes the token out is gated by it, but for the fault
+    transition of a place with a time limit (`within`), which wants the completion 0 and the timer 1. `task` and
     `resource` belong to a conceptual net and say what `firable refine` puts in the place's stead; the firing rule
     knows neither.
     """
@@ -102,13 +115,21 @@ class Place:
     description: str = ""
     task: TaskUse | None = None
     resource: Resource | None = None
+    within: TimeLimit | None = None
+
+    @property
+    def cleared(self) -> tuple[str, ...]:
+        """The signals that a token clears when it enters: the completion of the command, and the timer."""
+        timer = None if self.within is None else self.within.timer
+        return tuple(signal for signal in (self.completion, timer) if signal is not None)
 
 
 class SignalKind(StrEnum):
-    """What makes a signal true: the completion of a command, or a sensor that nobody clears."""
+    """What makes a signal true: the completion of a command, a sensor that nobody clears, or a time that is over."""
 
     COMPLETION = "completion"
     SENSOR = "sensor"
+    TIMER = "timer"
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +176,12 @@ class Transition:
         """
         outputs = set(self.outputs)
         return tuple(place for place in self.inputs if place in outputs)
+
+
+def is_fault(place: Place, transition: Transition, late: ExternalGate) -> bool:
+    """Whether a transition wants the timer of a place with a time limit 1 (the gate `late`) and its completion 0."""
+    gates = transition.external
+    return late in gates and place.completion is not None and ExternalGate(place.completion, wanted=False) in gates
 
 
 class ArbitrationRule(StrEnum):
@@ -301,6 +328,31 @@ class Net:
     def producers(self) -> tuple[tuple[int, ...], ...]:
         """For each place, the indexes of the transitions that have it as an output."""
         return self._adjacent(lambda transition: transition.outputs)
+
+    @cached_property
+    def fault_transitions(self) -> Mapping[int, int]:
+        """For each place with a time limit, by index, the transition that takes its token when the time is over."""
+        return {
+            p: t
+            for p, place in enumerate(self.places)
+            if place.within is not None
+            for t in self.consumers[p]
+            if is_fault(place, self.transitions[t], ExternalGate(place.within.timer))
+        }
+
+    @cached_property
+    def competitors(self) -> tuple[tuple[int, ...], ...]:
+        """For each place, who competes for its token: its consumers, without its fault transition.
+
+        That one wants the completion 0 and all the others want it 1, so no valuation opens it beside one of them.
+        """
+        faults = self.fault_transitions
+        if not faults:
+            return self.consumers
+        return tuple(
+            tuple(t for t in found if faults.get(p) != t) if p in faults else found
+            for p, found in enumerate(self.consumers)
+        )
 
     def _adjacent(self, places_of: Callable[[Transition], tuple[str, ...]]) -> tuple[tuple[int, ...], ...]:
         found: list[list[int]] = [[] for _ in self.places]

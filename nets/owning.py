@@ -1,7 +1,7 @@
 """Giving a net owners: the same net, in which each place and signal belongs to a controller and bears its name.
 
-An owned thing is named `controller.thing`, so owning renames it wherever it stands: in arcs, gates, completions and
-formulas. The name within the controller is the one it had before, without its former owner; where two of one
+An owned thing is named `controller.thing`, so owning renames it wherever it stands: in arcs, gates, completions,
+timers and formulas. The name within the controller is the one it had before, without its former owner; where two of one
 controller would then have the same name, the former owner stays in it (`robot_free`, `mc_free`). Nothing else changes:
 the net with owners has the same markings under other names.
 
@@ -55,6 +55,7 @@ def with_owners(net: Net, owner_of: Mapping[str, str], controllers: Sequence[Con
                 name=named[place.name],
                 owner=owner_of[place.name],
                 completion=None if place.completion is None else named[place.completion],
+                within=None if place.within is None else replace(place.within, timer=named[place.within.timer]),
             )
             for place in net.places
         ),

@@ -124,6 +124,11 @@ def _notes(net: Net, ids: dict[str, str]) -> Iterator[Diagnostic]:
         (owned, "places and signals lose their owner", "keep the net file: only it can be split"),
         (sum(place.command is not None for place in net.places), "places lose their command", "keep the net file"),
         (
+            sum(place.within is not None for place in net.places),
+            "places lose their time limit",
+            "in the file a fault transition may fire at any time",
+        ),
+        (
             sum((p.task or p.resource) is not None for p in net.places),
             "places lose what they open to",
             "keep the net file",

@@ -2,8 +2,8 @@
 
 The printed text is read back before it is handed out, and must give the same net: so nothing is dropped in silence, and
 what the file format has no words for (a self-loop, a completion signal that no place waits for) is an error with a
-code. The order of a file groups places and signals by their controller; `in_file_order` is that normal form, and a
-net that was read from a file has it already.
+code. The order of a file groups places and signals by controller, and has fault transitions last; `in_file_order` is
+that normal form, and a net that was read from a file has it already.
 
 Quoting is generous: a word that any YAML reader could take for a number, a Boolean or null is put in double quotes.
 The alternative, `yaml.dump`, prints neither short entries on one line nor aligned with what an engineer would write.
@@ -12,7 +12,7 @@ The alternative, `yaml.dump`, prints neither short entries on one line nor align
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Final
 
@@ -30,10 +30,12 @@ from firable.nets.net import (
     Signal,
     SignalKind,
     TemporalProperty,
+    TimeLimit,
     Transition,
 )
 from firable.nets.temporal import format_temporal
 from firable.nets.text import parse_net
+from firable.nets.time_limits import fault_place, fault_place_name, fault_transition_name, format_time, timer_name
 from firable.nets.yaml_tree import is_ambiguous
 
 WIDTH_CHARACTERS: Final = 120
@@ -85,21 +87,49 @@ def in_file_order(net: Net) -> Net:
     """
     owners = [*(controller.name for controller in net.controllers), None]
     rank = {owner: number for number, owner in enumerate(owners)}
+    given = _given_places(net)
+    places = [
+        made
+        for place in sorted(net.places, key=lambda place: rank[place.owner])
+        if place.name not in given.values()
+        for made in (place, *((net.place(given[place.name]),) if place.name in given else ()))
+    ]
+    kinds = (SignalKind.SENSOR, SignalKind.COMPLETION, SignalKind.TIMER)
     first: dict[str, int] = {}
-    for place in net.places:
-        if place.completion:
-            first.setdefault(place.completion, len(first))
+    for place in places:
+        for signal in (place.completion, place.within.timer if place.within else None):
+            if signal:
+                first.setdefault(signal, len(first))
 
-    def signal_rank(signal: Signal) -> tuple[int, bool, int]:
-        waited_for = first.get(signal.name, len(first)) if signal.kind is SignalKind.COMPLETION else 0
-        return rank[signal.owner], signal.kind is SignalKind.COMPLETION, waited_for
+    def signal_rank(signal: Signal) -> tuple[int, int, int]:
+        return rank[signal.owner], kinds.index(signal.kind), first.get(signal.name, len(first))
 
+    faults = {net.transitions[t].name: place for place, t in _faults(net, places)}
+    transitions = [_gates_in_order(net, transition) for transition in net.transitions]
+    late = {transition.name: transition for transition in transitions if transition.name in faults}
     return replace(
         net,
-        places=tuple(sorted(net.places, key=lambda place: rank[place.owner])),
+        places=tuple(places),
         signals=tuple(sorted(net.signals, key=signal_rank)),
-        transitions=tuple(_gates_in_order(net, transition) for transition in net.transitions),
+        transitions=(*(one for one in transitions if one.name not in late), *(late[name] for name in faults)),
     )
+
+
+def _faults(net: Net, places: Iterable[Place]) -> Iterator[tuple[Place, int]]:
+    """The places whose time limit has a fault transition, with its index."""
+    for place in places:
+        if (t := net.fault_transitions.get(net.place_index[place.name])) is not None:
+            yield place, t
+
+
+def _given_places(net: Net) -> dict[str, str]:
+    """The fault places that no file need declare, by the place whose time limit gives them."""
+    found = {}
+    for place, t in _faults(net, net.places):
+        given = fault_place(place)
+        if net.transitions[t].outputs == (given.name,) and net.place(given.name) == given:
+            found[place.name] = given.name
+    return found
 
 
 def _gates_in_order(net: Net, transition: Transition) -> Transition:
@@ -115,7 +145,8 @@ def _gates_in_order(net: Net, transition: Transition) -> Transition:
 
 def _implied(net: Net, transition: Transition) -> dict[ExternalGate, None]:
     """The gates that `until` puts on the transition, in the order of its inputs."""
-    completions = (net.place(name).completion for name in transition.inputs)
+    faults, t = net.fault_transitions, net.transition_index[transition.name]
+    completions = (net.place(name).completion for name in transition.inputs if faults.get(net.place_index[name]) != t)
     return dict.fromkeys(ExternalGate(signal) for signal in completions if signal is not None)
 
 
@@ -125,8 +156,10 @@ def _lines(net: Net) -> Iterator[str]:
     if net.description:
         yield f"description: {_text(net.description)}"
     places: dict[str | None, list[Place]] = {}
+    given = set(_given_places(net).values())
     for place in net.places:
-        places.setdefault(place.owner, []).append(place)
+        if place.name not in given:
+            places.setdefault(place.owner, []).append(place)
     inputs: dict[str | None, list[Signal]] = {}
     for signal in net.signals:
         if signal.kind is SignalKind.SENSOR:
@@ -143,11 +176,13 @@ def _lines(net: Net) -> Iterator[str]:
             yield f"    under: {_text(controller.under)}"
         if controller.description:
             yield f"    description: {_text(controller.description)}"
-        yield from _scope(places.get(name, []), inputs.get(name, []), f"{name}.", "    ")
-    if unowned := list(_scope(places.get(None, []), inputs.get(None, []), "", "")):
+        yield from _scope(net, places.get(name, []), inputs.get(name, []), f"{name}.", "    ")
+    if unowned := list(_scope(net, places.get(None, []), inputs.get(None, []), "", "")):
         yield ""
         yield from unowned
-    yield from _table("transitions", ((t.name, _transition(net, t)) for t in net.transitions))
+    late = {t for _, t in _faults(net, net.places)}
+    rows = ((t.name, _transition(net, t)) for i, t in enumerate(net.transitions) if i not in late)
+    yield from _table("transitions", rows)
     yield from _table(
         "arbiters",
         ((a.name, [("among", _list(a.among)), ("by", str(a.by))]) for a in net.arbiters),
@@ -155,7 +190,7 @@ def _lines(net: Net) -> Iterator[str]:
     yield from _table("properties", ((p.name, _property(p)) for p in net.properties))
 
 
-def _scope(places: list[Place], inputs: list[Signal], prefix: str, indent: str) -> Iterator[str]:
+def _scope(net: Net, places: list[Place], inputs: list[Signal], prefix: str, indent: str) -> Iterator[str]:
     def local(name: str) -> str:
         return name.removeprefix(prefix)
 
@@ -171,6 +206,8 @@ def _scope(places: list[Place], inputs: list[Signal], prefix: str, indent: str) 
             entries.append(("send", _command(place.command)))
         if place.completion:
             entries.append(("until", _text(local(place.completion))))
+        if place.within:
+            entries.append(("within", _limit(net, place, place.within, local)))
         if place.task:
             entries.append(("task", _flow(_pairs(("name", place.task.name), *place.task.arguments))))
         if place.resource:
@@ -178,6 +215,20 @@ def _scope(places: list[Place], inputs: list[Signal], prefix: str, indent: str) 
         if place.description:
             entries.append(("description", _text(place.description)))
         yield from _entry(local(place.name), entries, indent + "  ")
+
+
+def _limit(net: Net, place: Place, limit: TimeLimit, local: Callable[[str], str]) -> str:
+    """The time, and what does not bear the name that follows from the place's."""
+    entries = [("time", format_time(limit.milliseconds))]
+    if (t := net.fault_transitions.get(net.place_index[place.name])) is not None:
+        fault = net.transitions[t]
+        if fault.outputs[:1] != (fault_place_name(place.name),):
+            entries += [("to", _text(local(name))) for name in fault.outputs[:1]]
+        if fault.name != fault_transition_name(place.name):
+            entries.append(("transition", _text(fault.name)))
+    if limit.timer != timer_name(place.name):
+        entries.append(("timer", _text(local(limit.timer))))
+    return _flow(entries) if len(entries) > 1 else entries[0][1]
 
 
 def _command(command: Command) -> str:

@@ -60,7 +60,7 @@ def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
     yield from (
         f"o2.{place.name}"
         for p, place in enumerate(net.places)
-        if len(net.consumers[p]) > 1 or len(net.producers[p]) > 1
+        if len(net.competitors[p]) > 1 or len(net.producers[p]) > 1 or p in net.fault_transitions
     )
     if Layers(net).several:
         yield "o8"
@@ -155,7 +155,7 @@ def _undecided_conflicts(decomposition: Decomposition) -> Iterator[Diagnostic]:
     net = decomposition.net
     group_of = {name: group.name for group in decomposition.groups for name in (*group.sequence, *group.rest)}
     for p, place in enumerate(net.places):
-        for together in (net.consumers[p], net.producers[p]):
+        for together in (net.competitors[p], net.producers[p]):
             deciders = {group_of.get(net.transitions[t].name) for t in together}
             if len(together) > 1 and (None in deciders or len(deciders) > 1):
                 message = f"the conflict at '{place.name}' is not decided by one arbitration group"

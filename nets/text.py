@@ -10,7 +10,8 @@ once and not as its twenty consequences:
    `Net` itself, whose diagnostics name subjects that lead back into the tree as well.
 
 Which gate is internal and which external follows from the name: a declared signal or a place. `until` declares the
-completion signal of a place's command and puts its gate on each transition that takes the token out.
+completion signal of a place's command and puts its gate on each transition that takes the token out; `within` adds the
+timer, the fault transition and, where the file declares none of its name, the fault place (`firable.nets.time_limits`).
 """
 
 from __future__ import annotations
@@ -42,12 +43,21 @@ from firable.nets.net import (
     SignalKind,
     TaskUse,
     TemporalProperty,
+    TimeLimit,
     Transition,
 )
 from firable.nets.pausing import without_cycle_search
 from firable.nets.source import Source, read_source
 from firable.nets.temporal import Logic, Temporal, logics, parse_temporal
 from firable.nets.text_positions import Positions
+from firable.nets.time_limits import (
+    fault_place,
+    fault_transition,
+    fault_transition_name,
+    no_time,
+    parse_time,
+    timer_name,
+)
 from firable.nets.yaml_tree import Node, data, parse_tree
 
 SIZE_BYTES_MAX: Final = 16 * 1024 * 1024
@@ -57,7 +67,7 @@ PROBLEMS_MAX: Final = 100  # enough to join and to read; a file of noise has mil
 def read_net(path: str | Path) -> Net:
     """Read a net file.
 
-    Raises `InputError` with the position of every problem: F1001-F1012 for the text, F2001-F2022 for the net, but for
+    Raises `InputError` with the position of every problem: F1001-F1012 for the text, F2001-F2029 for the net, but for
     F2010 and F2011: the text cannot say the one, and only a split asks for the other.
     """
     return read_positioned(path)[0]
@@ -115,6 +125,9 @@ class _Scope:
     def full(self, local: str) -> str:
         return local if self.owner is None else f"{self.owner}.{local}"
 
+    def local(self, full: str) -> str:
+        return full if self.owner is None else full.removeprefix(f"{self.owner}.")
+
 
 class _Reading:
     """One document on its way to a `Net`."""
@@ -123,6 +136,8 @@ class _Reading:
         self.document = document
         self.positions = Positions(source, tree)
         self.problems: list[Diagnostic] = []
+        self.faults: list[Transition] = []
+        """The fault transitions that time limits give; they come after those of the file."""
         controllers = ((name, body or doc.ControllerDocument()) for name, body in (document.controllers or {}).items())
         self.scopes = [
             *(_Scope(name, ("controllers", name), c.start, c.inputs, c.places or {}) for name, c in controllers),
@@ -172,9 +187,10 @@ class _Reading:
             marked.add(local)
         for local, body in scope.places.items():
             place = body or doc.PlaceDocument()
-            send, task, opens = place.send, place.task, place.opens
-            yield Place(
-                scope.full(local),
+            send, task, opens, within = place.send, place.task, place.opens, place.within
+            full = scope.full(local)
+            made = Place(
+                full,
                 scope.owner,
                 local in marked,
                 Command(send.machine, send.command, tuple((send.model_extra or {}).items())) if send else None,
@@ -184,7 +200,31 @@ class _Reading:
                 Resource(opens.to, opens.machine, opens.prefix, tuple((opens.model_extra or {}).items()))
                 if opens
                 else None,
+                TimeLimit(
+                    self.milliseconds(full, within),
+                    scope.full(within.timer) if within.timer else timer_name(full),
+                )
+                if within
+                else None,
             )
+            yield made
+            if within is None:
+                continue
+            fault = fault_place(made)
+            to = scope.full(within.to) if within.to else fault.name
+            if to == fault.name and scope.local(to) not in scope.places:
+                yield fault
+            if to == full:
+                self.problem(_fault_at_itself(full))
+            elif made.completion is not None:  # otherwise `Net` says that there is none (F2028)
+                self.faults.append(fault_transition(made, to, within.transition or fault_transition_name(full)))
+
+    def milliseconds(self, place: str, within: doc.WithinDocument) -> int:
+        found = parse_time(within.time)
+        if found is None:
+            self.problem(no_time(place, within.time))
+            return 1  # that it is none is said once
+        return found
 
     def signals(self, scope: _Scope) -> Iterator[Signal]:
         for local in scope.inputs:
@@ -194,6 +234,10 @@ class _Reading:
             # A name that is a sensor too is left to `Net`, which says so (F2018).
             if local not in scope.inputs:
                 yield Signal(scope.full(local), scope.owner, SignalKind.COMPLETION)
+        for local, place in scope.places.items():
+            if place and place.within:
+                timer = scope.full(place.within.timer) if place.within.timer else timer_name(scope.full(local))
+                yield Signal(timer, scope.owner, SignalKind.TIMER)
 
     def transitions(self, places: tuple[Place, ...], signals: tuple[Signal, ...]) -> Iterator[Transition]:
         external = {signal.name for signal in signals}
@@ -225,6 +269,7 @@ class _Reading:
                 transition.number,
                 transition.description,
             )
+        yield from self.faults
 
     def properties(self) -> Iterator[Property | TemporalProperty]:
         for name, body in (self.document.properties or {}).items():
@@ -274,3 +319,10 @@ def _unknown_start(scope: _Scope, local: str, subject: Subject) -> Diagnostic:
     else:
         hint = did_you_mean(local, list(scope.places)) + "`start` names places of the same `places`"
     return Diagnostic("F2002", f"there is no place '{scope.full(local)}' to start in", hint, subject)
+
+
+def _fault_at_itself(place: str) -> Diagnostic:
+    hint = "name another place of its controller, or leave out `to`"
+    return Diagnostic(
+        "F2009", f"the fault place of '{place}' is '{place}' itself", hint, ("places", place, "within", "to")
+    )

@@ -18,6 +18,7 @@ from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, Span, Subject
 from firable.nets.source import Source
+from firable.nets.time_limits import fault_transition_name, timer_name
 from firable.nets.yaml_tree import Mapping, Node, Scalar, Sequence, node_span, nodes_along
 
 DIAGNOSTICS_MAX: Final = 20
@@ -108,6 +109,10 @@ class Positions:
                     yield ("transitions", name, which, item.text), item
             if (number := _value(transition, "number")) is not None:
                 yield ("transitions", name, "number"), number
+        scopes = [(f"{name}.", node) for name, _, node in _entries(self.tree, "controllers")]
+        for prefix, scope in (*scopes, ("", self.tree)):
+            for local, _, place in _entries(scope, "places"):
+                yield from _fault(prefix + local, prefix, _value(place, "within"))
         for name, key, arbiter in _entries(self.tree, "arbiters"):
             yield ("arbiters", name), key
             if (among := _value(arbiter, "among")) is not None:
@@ -138,6 +143,7 @@ class Positions:
                 if until.text not in declared:
                     yield ("signals", prefix + until.text), until
                 declared.add(until.text)
+            yield from _limit(prefix + local, prefix, _value(place, "within"))
 
 
 def bounded(problems: list[Diagnostic]) -> list[Diagnostic]:
@@ -165,6 +171,30 @@ def _joined(problems: list[Diagnostic]) -> list[Diagnostic]:
             first = replace(first, message=f"{first.message} (also on line {shown})")
         joined.append(first)
     return joined
+
+
+def _limit(place: str, prefix: str, within: Node | None) -> Iterator[tuple[Subject, _Found]]:
+    """A time limit and its parts; its timer, where that name is taken, stands there."""
+    if within is None:
+        return
+    subject: Subject = ("places", place, "within")
+    yield subject, within
+    for key in ("time", "to", "transition", "timer"):
+        if (value := _value(within, key)) is not None:
+            yield (*subject, key), value
+    timer = _value(within, "timer")
+    yield ("signals", prefix + timer.text if isinstance(timer, Scalar) else timer_name(place)), timer or within
+
+
+def _fault(place: str, prefix: str, within: Node | None) -> Iterator[tuple[Subject, _Found]]:
+    """The fault transition that a time limit gives, and where it says to what place that leads."""
+    if within is None:
+        return
+    named, to = _value(within, "transition"), _value(within, "to")
+    subject: Subject = ("transitions", named.text if isinstance(named, Scalar) else fault_transition_name(place))
+    yield subject, named or within
+    if isinstance(to, Scalar):
+        yield (*subject, "to", prefix + to.text), to
 
 
 def _value(node: Node, key: str) -> Node | None:

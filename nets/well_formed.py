@@ -24,8 +24,10 @@ from firable.nets.net import (
     SignalKind,
     TemporalProperty,
     Transition,
+    is_fault,
 )
 from firable.nets.temporal import Fires, atoms_in, logics
+from firable.nets.time_limits import limit_problems
 
 FORBIDDEN_IN_NAMES: Final = frozenset(" \t\r\n()[]{},:#&*!|>'\"%@`\\")
 
@@ -44,6 +46,7 @@ def problems(net: Net) -> Iterator[Diagnostic]:
         )
     yield from _layers(net, controllers)
     yield from _completions(net)
+    yield from limit_problems(net)
     yield from _meanings(net)
     known = _Known(
         {place.name for place in net.places},
@@ -177,9 +180,10 @@ def _completions(net: Net) -> Iterator[Diagnostic]:
         if signal is None:
             yield _unknown("F2003", "signal", place.completion, signals, subject)
         elif signal.kind is not SignalKind.COMPLETION:
+            declared = "a sensor" if signal.kind is SignalKind.SENSOR else "a timer"
             yield Diagnostic(
                 "F2018",
-                f"'{signal.name}' is declared as a sensor, and `until` makes it a completion signal",
+                f"'{signal.name}' is declared as {declared}, and `until` makes it a completion signal",
                 "a completion is a bit that the driver forms and clears: take it out of `inputs`, "
                 "or write `if` at the transition",
                 subject,
@@ -191,11 +195,17 @@ def _completions(net: Net) -> Iterator[Diagnostic]:
                 "add `send`, or declare the signal under `inputs` and write it as `if` of the transition",
                 subject,
             )
+        late = ExternalGate(place.within.timer) if place.within is not None else None
+        gated = [
+            transition for transition in consumers[place.name] if ExternalGate(place.completion) in transition.external
+        ]
         for transition in consumers[place.name]:
-            if ExternalGate(place.completion) not in transition.external:
+            if transition not in gated and not (late and is_fault(place, transition, late)):
                 raise ValueError(
                     f"'{transition.name}' takes the token of '{place.name}' without the gate '{place.completion}'"
                 )
+        if len(consumers[place.name]) > len(gated) + 1:
+            raise ValueError(f"'{place.name}' has more than one fault transition")
 
 
 def _meanings(net: Net) -> Iterator[Diagnostic]:

@@ -4,6 +4,11 @@ Two transitions conflict structurally if they share an input **or** an output pl
 its Eq. (4) alone would merge two tokens on a shared output into one. A conflict component is a class of the closure of
 this relation; an arbiter acts on a whole component, because one arbiter for each place loses maximality on chains
 and fires nothing on cycles (SEMANTICS, "Arbitration").
+
+A fault transition (`firable.nets.time_limits`) wants a completion 0 that all others at its place want 1. It shares the
+place with them, and no valuation opens it beside one of them: so it is their rival, but not of their component, for
+there is nothing to decide. (Of other transitions with complementary gates that is not said: their signals may belong
+to several controllers, and be read at several instants.)
 """
 
 from __future__ import annotations
@@ -74,8 +79,8 @@ class Conflicts:
     """The conflict relation of a net, by the indexes of transitions.
 
     `rivals[t]` are the transitions in structural conflict with `t`, `input_rivals[t]` those that share an input;
-    `components` are the classes with at least two members, each in the order of the net; `component_of[t]` is the index
-    of the component of `t`, or -1 for a transition that conflicts with none.
+    `components` are the classes of those who compete, with at least two members, each in the order of the net;
+    `component_of[t]` is the index of the component of `t`, or -1 for a transition that competes with none.
     """
 
     rivals: Sharing
@@ -105,15 +110,16 @@ def conflicts(net: Net) -> Conflicts:
     """The structural conflict relation; time linear in the net."""
     n_transitions = len(net.transitions)
     rivals = Sharing(n_transitions, net.consumers, net.producers)
+    competing = Sharing(n_transitions, net.competitors, net.producers)
     component_of = [-1] * n_transitions
     components: list[tuple[int, ...]] = []
     reached: set[int] = set()
     for start in range(n_transitions):
-        if component_of[start] >= 0 or not rivals.groups(start):
+        if component_of[start] >= 0 or not competing.groups(start):
             continue
         members, todo = {start}, [start]
         while todo:
-            for group in rivals.groups(todo.pop()):
+            for group in competing.groups(todo.pop()):
                 if id(group) not in reached:  # each shared place is gone through once
                     reached.add(id(group))
                     todo += [t for t in group if t not in members]

@@ -2,8 +2,9 @@
 
 Each firing must be firable, in a trace that records signals with its external gates open; every entry of a place with
 an output signal must send its command exactly once before the token leaves; and the last line must show the marking
-reached. A token that enters a place clears the completion signal of the place: a value from before is stale and opens
-no gate, and a completion may not come before its command. A trace without its last line replays as incomplete.
+reached. A token that enters a place clears the completion signal of the place and its timer: a value from before is
+stale and opens no gate, a completion may not come before its command, and a timer is set only while the token is there
+and its completion has not come. A trace without its last line replays as incomplete.
 
 One judge for counterexamples of the analysis and logs of the executor, and the slow one on purpose: it shares no
 firing rule with what wrote the trace.
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from firable.nets.diagnostics import Diagnostic, InputError, Span
-from firable.nets.net import Marking, Net
+from firable.nets.net import Marking, Net, Place
 from firable.semantics.player import Player
 from firable.semantics.trace import CommandSent, Discipline, End, Event, Fired, Header, Noted, SignalChanged, Trace
 
@@ -56,6 +57,7 @@ class Replayer:
         self.marking = net.initial_marking
         self.signals: dict[str, bool] = {}
         self.owed: set[str] = set()
+        self.timed = {place.within.timer: place for place in net.places if place.within is not None}
         self.now_seconds = 0.0
         self.firings = 0
         self.commands = 0
@@ -101,7 +103,20 @@ class Replayer:
             self._deviates(
                 event, f"'{event.signal}' completes a command of '{unsent[0]}' that was not sent", "it is stale"
             )
+        if event.value and (place := self.timed.get(event.signal)) is not None:
+            self._timed_out(event, place)
         self.signals[event.signal] = event.value
+
+    def _timed_out(self, event: SignalChanged, place: Place) -> None:
+        """When a timer may be set; not after what time, since a controller has a clock of its own."""
+        if not self.marking >> self.net.place_index[place.name] & 1:
+            self._deviates(event, f"'{event.signal}' times '{place.name}', which holds no token", "it is stale")
+        if place.name in self.owed:
+            self._deviates(
+                event, f"'{event.signal}' times a command of '{place.name}' that was not sent", "it is stale"
+            )
+        if place.completion is not None and self.signals.get(place.completion, False):
+            self._deviates(event, f"'{event.signal}' is set after '{place.completion}' has come", "it came in time")
 
     def _fired(self, event: Fired) -> None:
         if unknown := [name for name in event.transitions if name not in self.net.transition_index]:
@@ -156,8 +171,7 @@ class Replayer:
     def _entered(self, event: Fired, after: Marking) -> None:
         entered = self.net.names(after & ~self.marking)
         for place in entered:
-            if (completion := self.net.place(place).completion) is not None:
-                self.signals[completion] = False
+            self.signals.update(dict.fromkeys(self.net.place(place).cleared, False))
         if not self.header.commands:
             return
         left = self.net.names(self.marking & ~after)

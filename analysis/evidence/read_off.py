@@ -6,11 +6,12 @@ so each look ends with a deadline, as everything does that is checked.
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from typing import Final
 
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.refusal import in_time
-from firable.nets.net import Net
+from firable.nets.net import Net, SignalKind, Transition
 from firable.semantics.arbitration import Arbitration
 from firable.semantics.conflict import conflicts, gate_races, jointly_openable, structural_conflicts
 from firable.semantics.player import Player
@@ -61,21 +62,43 @@ def _races_have_an_order(net: Net, deadline: Deadline) -> bool:
 def eager_cycle(net: Net, deadline: Deadline = NEVER) -> frozenset[str] | None:
     """What fires for ever in the arbitrated run with all gates open; None where there is none, or it takes too long.
 
+    In it no time is ever over, so what fires only after one is counted with those that need not fire.
+
     Raises `InputError` F2013 where the arbiters do not fit the conflicts, and `TimeIsOverError`.
     """
     player, arbitration = Player(net), Arbitration.of(net)
     marking, turns = net.initial_marking, arbitration.first_turns
     seen = {(marking, turns): 0}
     fired: list[tuple[int, ...]] = []
+    timers = {signal.name for signal in net.signals if signal.kind is SignalKind.TIMER}
     for _ in in_time(range(STEPS_MAX), deadline):
-        enabled = player.may_fire(marking)
+        enabled = [t for t in player.may_fire(marking) if not _waits_for(net.transitions[t], timers)]
         if not enabled:
-            return frozenset()
+            return _never_called(net, timers)
         if not jointly_openable(net, enabled):
             return None
         step, turns = arbitration.decide(enabled, turns)
         marking = player.fire(marking, step)
         fired.append(tuple(step))
         if (start := seen.setdefault((marking, turns), len(fired))) < len(fired):
-            return frozenset(net.transitions[t].name for step in fired[start:] for t in step)
+            return frozenset(net.transitions[t].name for step in fired[start:] for t in step) | _never_called(
+                net, timers
+            )
     return None
+
+
+def _waits_for(transition: Transition, timers: AbstractSet[str]) -> bool:
+    return any(gate.wanted and gate.signal in timers for gate in transition.external)
+
+
+def _never_called(net: Net, timers: AbstractSet[str]) -> frozenset[str]:
+    """What cannot fire before a time is over: it needs a place full that nothing else fills."""
+    filled = {place.name for place in net.places if place.marked}
+    late = {t.name: t for t in net.transitions} if timers else {}
+    while more := [
+        t for t in late.values() if not _waits_for(t, timers) and filled.issuperset((*t.inputs, *t.permissive))
+    ]:
+        for t in more:
+            del late[t.name]
+            filled.update(t.outputs)
+    return frozenset(late)

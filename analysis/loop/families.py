@@ -166,7 +166,8 @@ def waiting(loop: ClosedLoop, marking: Sequence[str]) -> str:
         closed = [
             gate.signal + ("" if gate.wanted else " to drop")
             for gate in transition.external
-            if ((loop.shown[gate.signal][0] in held) == loop.shown[gate.signal][1]) != gate.wanted
+            if gate.signal in loop.shown  # a time can be over at any moment
+            and ((loop.shown[gate.signal][0] in held) == loop.shown[gate.signal][1]) != gate.wanted
         ]
         if closed:
             gates.append(f"{transition.name} waits for {listed(closed)}")

@@ -183,7 +183,7 @@ def _unclear(model: PlantModel, of: Property | TemporalProperty) -> bool:
     """Whether a property speaks of a deadlock in a way that a sensor which never rests would make empty."""
     if isinstance(of, Property) and of.kind is PropertyKind.NEVER and of.formula == Deadlock():
         return False
-    restless = any(sensor.may_flicker or sensor.may_linger for sensor in model.sensors.values())
+    restless = any(sensor.may_flicker or sensor.may_linger or sensor.acknowledges for sensor in model.sensors.values())
     return restless and _speaks_of_deadlock(of)
 
 

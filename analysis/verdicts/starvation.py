@@ -5,6 +5,9 @@ still pass it over for ever. With all external gates open, the arbitrated net is
 the arbiters choose one maximal set in each marking and remember finitely much, so the run from M0 ends in a deadlock
 or in a cycle, found by running it. A transition that is live in the net and does not fire on the cycle is starved.
 
+In that run no time limit is ever over: a timer is 0, and what fires only after a timeout (the fault transition, the way
+back from a fault place) does not starve there, for nothing calls for it.
+
 What this does and does not say: it is a verdict on one run, the one in which every machine answers at once. In another
 timing the transition may fire, or others may starve; the statement says so. Where two transitions that meet want a
 signal 1 and 0, no valuation opens all gates, that run does not exist, and the verdict is UNKNOWN, unless no
@@ -14,6 +17,7 @@ transition is live: then none starves in any run.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -23,6 +27,7 @@ from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import WitnessError, Witnesses
 from firable.analysis.verdicts.behaviour import Behaviour
 from firable.nets.net import Marking, Net
+from firable.nets.time_limits import only_after_a_timeout, waiting_for_a_timer
 from firable.nets.verdict import Verdict, Weight, Witness
 from firable.semantics.algebra import BOOL
 from firable.semantics.arbitration import Arbitration
@@ -83,7 +88,7 @@ def eager_run(net: Net, *, steps_max: int = STEPS_MAX, deadline: Deadline = NEVE
     marking, turns = net.initial_marking, arbitration.first_turns
     seen = {(marking, turns): 0}
     fired: list[tuple[str, ...]] = []
-    running = Enabled(net, marking)
+    running = Enabled(net, marking, waiting_for_a_timer(net))
     enabled = tuple(sorted(running.transitions))
     while len(fired) < steps_max and not deadline.over:
         if not enabled:
@@ -104,10 +109,10 @@ class Enabled:
 
     Of a transition that may not, one place is watched that keeps it from firing, and until that place changes nothing
     is asked again: the one that changed least so far. So a run costs what happens in it, and not the number of
-    transitions, nor that of their arcs, for each firing.
+    transitions, nor that of their arcs, for each firing. Those of `without` never may.
     """
 
-    def __init__(self, net: Net, marking: Marking) -> None:
+    def __init__(self, net: Net, marking: Marking, without: AbstractSet[int] = frozenset()) -> None:
         self.net, self.marking = net, marking
         self.transitions: set[int] = set()
         self.at: list[list[int]] = [[] for _ in net.places]
@@ -117,7 +122,7 @@ class Enabled:
             joined = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
             for place in {net.place_index[name] for name in joined}:
                 self.at[place].append(t)
-            if transition.openable:
+            if transition.openable and t not in without:
                 self._look(t)
 
     def after(self, marking: Marking) -> FiringSet:
@@ -194,7 +199,8 @@ def starvation_free(behaviour: Behaviour[Any]) -> Verdict:
                 return NONE_STARVES
             bound = f"{len(run.prefix):,} steps of the run"
             return unknown(bound, "the run has not come back to an earlier marking", "F3004")
-        hungry = starved(run, behaviour.live)
+        late = only_after_a_timeout(space.net)
+        hungry = starved(run, (name for name in behaviour.live if name not in late))
         if not hungry:
             return yes()
         return no(hungry, _witness(space.net, space.discipline, run, f"{hungry[0]} never fires in the cycle"))

@@ -101,7 +101,7 @@ class Competition:
         at: dict[Hashable, list[str]] = {}
         name_of: dict[Hashable, tuple[str, str]] = {}
         for n, (net, whole) in enumerate(nets):
-            for kind, table in (("from", net.consumers), ("to", net.producers)):
+            for kind, table in (("from", net.competitors), ("to", net.producers)):
                 for p, adjacent in enumerate(table):
                     if len(adjacent) < 2:
                         continue

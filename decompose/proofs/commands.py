@@ -28,5 +28,7 @@ def _of(net: Net) -> Iterator[str]:
             yield f"{place.name} sends {json.dumps(sent, ensure_ascii=True)}"
         if place.completion is not None:
             yield f"{place.name} waits until {place.completion}"
+        if place.within is not None:
+            yield f"{place.name} waits {place.within.milliseconds} ms, which {place.within.timer} tells"
     for signal in net.signals:
         yield f"{signal.name} is a {signal.kind.value}"

@@ -6,6 +6,9 @@ other, so it suffices that *at each shared place* all have one decider, of one p
 are handed on. So there is one obligation for each shared place and one for each global transition, and no component is
 computed; which makes this another reason than that of the split, which does compute them.
 
+The fault transition of a place with a time limit does not compete there, and may be left to its controller, because no
+valuation opens it beside one that does; which is claimed with the rest, over the signals.
+
 The variables: `G decides t`, that the group G of the table lists t; `t has a row`, that the coordinator's table has it;
 `G is central`, that the coordinator decides G. What the table says is assumed of them.
 """
@@ -18,6 +21,7 @@ from itertools import pairwise
 from firable.analysis.induction.smt import Term, Terms
 from firable.decompose.proofs.obligation import Obligation, claimed
 from firable.decompose.proofs.sides import Sides
+from firable.nets.net import Transition
 
 
 def deciders(sides: Sides) -> Iterator[Obligation]:
@@ -34,10 +38,12 @@ def deciders(sides: Sides) -> Iterator[Obligation]:
         owners |= {net.signal(gate.signal).owner for gate in transition.external}
         if len(owners) > 1:
             yield table.of_global(transition.name)
-    for p, place in enumerate(net.places):
-        sharing = [[net.transitions[t].name for t in at] for at in (net.consumers[p], net.producers[p]) if len(at) > 1]
-        if sharing:
-            yield table.of_place(place.name, sharing)
+    for p in range(len(net.places)):
+        sharing = [
+            [net.transitions[t].name for t in at] for at in (net.competitors[p], net.producers[p]) if len(at) > 1
+        ]
+        if sharing or p in net.fault_transitions:
+            yield table.of_place(p, sharing)
 
 
 class _Table:
@@ -49,6 +55,9 @@ class _Table:
     def row(self, terms: Terms, name: str) -> Term:
         return terms.variable(f"{name} has a row")
 
+    def open(self, terms: Terms, transition: Transition) -> Term:
+        return terms.conjunction(terms.literal(gate.signal, gate.wanted) for gate in transition.external)
+
     def of_global(self, name: str) -> Obligation:
         terms = Terms()
         row = self.row(terms, name)
@@ -56,8 +65,9 @@ class _Table:
         statement = f"'{name}', in which several controllers take part, is decided by the coordinator"
         return claimed(terms, f"o2.{name}", statement, row, subjects=(name,), assumptions=[stated])
 
-    def of_place(self, place: str, sharing: Sequence[Sequence[str]]) -> Obligation:
-        terms = Terms()
+    def of_place(self, p: int, sharing: Sequence[Sequence[str]]) -> Obligation:
+        terms, net = Terms(), self.sides.net
+        place = net.places[p].name
         members = list(dict.fromkeys(name for names in sharing for name in names))
         groups = list(dict.fromkeys(group for name in members for group in self.groups_of.get(name, ())))
         assumptions = [terms.literal(f"{name} has a row", name in self.rows) for name in members]
@@ -86,6 +96,13 @@ class _Table:
                     for group in groups
                 ]
         statement = f"the transitions that compete for '{place}' have one decider, the coordinator if one has a row"
+        if (fault := net.fault_transitions.get(p)) is not None:
+            late = self.open(terms, net.transitions[fault])
+            claims += [
+                terms.negation(terms.conjunction([late, self.open(terms, net.transitions[t])]))
+                for t in net.competitors[p]
+            ]
+            statement += f", and none of them is open beside '{net.transitions[fault].name}'"
         return claimed(
             terms,
             f"o2.{place}",

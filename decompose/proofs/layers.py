@@ -69,8 +69,8 @@ def _disturb(subnet: Net, t: Transition, u: Transition) -> bool:
     """Whether firing one part could change what the other one reads (O1)."""
 
     def moved(part: Transition) -> set[str]:
-        cleared = {subnet.place(place).completion for place in part.outputs}
-        return {*part.inputs, *part.outputs, *(name for name in cleared if name is not None)}
+        cleared = (signal for place in part.outputs for signal in subnet.place(place).cleared)
+        return {*part.inputs, *part.outputs, *cleared}
 
     def read(part: Transition) -> set[str]:
         gates = (gate.signal for gate in part.external)

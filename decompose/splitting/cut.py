@@ -174,6 +174,15 @@ def _problems(net: Net) -> Iterator[Diagnostic]:
             ("transitions", name),
         )
     for place in net.places:
+        if place.within is not None and place.owner is not None:
+            owner = net.signal(place.within.timer).owner
+            if owner not in {place.owner, None}:
+                yield Diagnostic(
+                    "F4001",
+                    f"'{place.name}' of '{place.owner}' is timed by '{place.within.timer}', which '{owner}' owns",
+                    "the controller that sends a command is the one that times it",
+                    ("places", place.name, "within"),
+                )
         if place.completion is None or place.owner is None:
             continue
         owner = net.signal(place.completion).owner

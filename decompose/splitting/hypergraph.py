@@ -1,11 +1,11 @@
 """The hypergraph of a net for those who look for owners: what belongs together, and what each transition joins.
 
 A vertex, here a *block*, is a set of places and signals that must have one owner: all places that command one machine,
-since commands to a machine come from one controller; a place and the completion signal it waits for; places that wait
-for the same completion. Its weight is how many they are. A hyperedge is a transition: the blocks of its inputs,
-outputs and gates, external ones too, for each of their owners takes part. A transition within one block is local
-whoever owns it, and left out. So a partition of the blocks is an ownership, the hyperedges it cuts are the global
-transitions, and the blocks that a cut one meets, counted by owner, are its votes.
+since commands to a machine come from one controller; a place, the completion signal it waits for, its timer and its
+fault place; places that wait for the same completion. Its weight is how many they are. A hyperedge is a transition: the
+blocks of its inputs, outputs and gates, external ones too, for each of their owners takes part. A transition within one
+block is local whoever owns it, and left out. So a partition of the blocks is an ownership, the hyperedges it cuts are
+the global transitions, and the blocks that a cut one meets, counted by owner, are its votes.
 
 Rejected: a graph with an edge for each pair of places that a transition joins, which every graph partitioner takes. It
 counts a transition of four places six times, and so prefers to cut two small ones where one large one would do.
@@ -83,9 +83,11 @@ def hypergraph(net: Net) -> Hypergraph:
     """
     together: list[Sequence[str]] = []
     machines: dict[str, list[str]] = {}
-    for place in net.places:
-        if place.completion is not None:
-            together.append((place.name, place.completion))
+    for p, place in enumerate(net.places):
+        fault = net.fault_transitions.get(p)
+        to = () if fault is None else net.transitions[fault].outputs
+        if place.cleared:
+            together.append((place.name, *place.cleared, *to))
         if place.command is not None:
             machines.setdefault(place.command.machine, []).append(place.name)
     blocks = _joined([*(p.name for p in net.places), *(s.name for s in net.signals)], [*together, *machines.values()])

@@ -2,9 +2,9 @@
 
 A net that comes from PNML has places and nobody who owns them; often their names tell. A rule gives a controller
 whatever its patterns match (`*`, `?` and `[...]`, as in file names, of the whole name). What is joined needs no rule of
-its own: a completion signal goes with the places that wait for it, and a sensor with the only controller whose
-transitions it gates. Everything else must be matched by exactly one rule: a place that two controllers own, or none,
-has no place in a split, and which of two rules was meant is not guessed by their order.
+its own: a completion signal goes with the places that wait for it, as do their timers and fault places, and a sensor
+with the only controller whose transitions it gates. Everything else must be matched by exactly one rule: a place that
+two controllers own, or none, has no place in a split, and which of two rules was meant is not guessed by their order.
 
 A file of rules is a mapping, one controller each:
 
@@ -77,14 +77,17 @@ def _subject(places: set[str], name: str) -> Subject:
 
 def _follow(net: Net, by_rule: dict[str, list[str]]) -> None:
     """Give what no rule matches to whom it is joined to, where that is one controller."""
-    waiting = {signal.name for signal in net.signals if not by_rule[signal.name]}
+    waiting = {name for name, owners in by_rule.items() if not owners}
     follows: dict[str, set[str]] = {name: set() for name in waiting}
-    for place in net.places:
-        if place.completion in waiting:
-            follows[place.completion].update(by_rule[place.name])
-    completions = {place.completion for place in net.places}
+    cleared = {signal for place in net.places for signal in place.cleared}
+    for p, place in enumerate(net.places):
+        fault = net.fault_transitions.get(p)
+        to = () if fault is None else net.transitions[fault].outputs
+        for name in waiting.intersection((*place.cleared, *to)):
+            follows[name].update(by_rule[place.name])
+    sensors = {signal.name for signal in net.signals} & waiting - cleared
     for transition in net.transitions:
-        gates = [gate.signal for gate in transition.external if gate.signal in waiting - completions]
+        gates = [gate.signal for gate in transition.external if gate.signal in sensors]
         for gate in gates:
             joined = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
             follows[gate].update(owner for name in joined for owner in by_rule[name])

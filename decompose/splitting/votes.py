@@ -9,6 +9,7 @@ So the transitions that could falsify a yes are found at its places and at those
 their arcs, and most of them are cleared at once:
 
 - one that needs a place empty which the yes needs full, or the other way about, is never firable while the yes stands;
+- one that wants a signal 0 which the yes wants 1 is never open then, as the transition of a time limit that is over;
 - one that needs two places full, with the yes, of a *unit* (`firable.analysis.structure.cover`) that holds one token
   can never be firable then either, and the unit is an invariant that a checker multiplies out;
 - one that can never fire at all falsifies nothing.
@@ -84,10 +85,10 @@ def needs(transition: Transition) -> tuple[frozenset[str], frozenset[str]]:
 
 
 def clears(net: Net, transition: Transition) -> frozenset[str]:
-    """The completion signals that a firing clears, as it sends their commands, and finds at 1 or may find so."""
-    sent = {net.place(place).completion for place in transition.outputs}
+    """The completions and timers that a firing clears, as it sends their commands, and finds at 1 or may find so."""
+    sent = {signal for place in transition.outputs for signal in net.place(place).cleared}
     bare = {gate.signal for gate in transition.external if not gate.wanted}
-    return frozenset(signal for signal in sent if signal is not None and signal not in bare)
+    return frozenset(sent - bare)
 
 
 def _accused(decomposition: Decomposition) -> Iterator[Vote]:
@@ -95,9 +96,10 @@ def _accused(decomposition: Decomposition) -> Iterator[Vote]:
     subnets = {subnet.name: subnet for subnet in decomposition.subnets}
     senders: dict[str, list[int]] = {}
     for i, place in enumerate(net.places):
-        if place.completion is not None:
-            senders.setdefault(place.completion, []).append(i)
+        for signal in place.cleared:
+            senders.setdefault(signal, []).append(i)
     required = [needs(transition) for transition in net.transitions]
+    bare = [{gate.signal for gate in transition.external if not gate.wanted} for transition in net.transitions]
     fires = [not full & empty and t.openable for t, (full, empty) in zip(net.transitions, required, strict=True)]
     for row in decomposition.coordinated:
         own = net.transition_index[row.name]
@@ -119,7 +121,7 @@ def _accused(decomposition: Decomposition) -> Iterator[Vote]:
                 continue
             found = {u for some in at for u in some}
             found |= {u for some in again for u in some if not awaited.isdisjoint(clears(net, net.transitions[u]))}
-            touching = sorted(u for u in found if u != own and fires[u])
+            touching = sorted(u for u in found if u != own and fires[u] and awaited.isdisjoint(bare[u]))
             accused = tuple(
                 net.transitions[u].name
                 for u in touching

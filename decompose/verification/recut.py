@@ -3,9 +3,10 @@
 Participants(t) are the owners of what t touches; more than one make it global. Each participant has a part, named by
 the number of its controller (0 the coordinator's own, the others from 1) and the number of the transition. Conflict is
 a shared input or output place, and a component of it is one group, the coordinator's where a global transition is in
-it: of the coordinators that are above all participants, the lowest. Where there are several coordinators, it decides
-with a transition all that disturbs it and could be promised together with it. All this is a function of the net, so
-there is one right decomposition; what a bundle holds is that one, or is refused with the first thing that differs.
+it: of the coordinators that are above all participants, the lowest. A transition that takes a token because it is late
+does not compete for it (`is_late`). Where there are several coordinators, it decides with a transition all that
+disturbs it and could be promised together with it. All this is a function of the net, so there is one right
+decomposition; what a bundle holds is that one, or is refused with the first thing that differs.
 
 Written for this purpose alone, and plainly: components grow by the places that their members share. It is the second
 text of these definitions; the first one, `firable.decompose.splitting`, is what it checks.
@@ -94,6 +95,8 @@ class Cut:
         for t in self.net.transitions:
             for kind, places in (("from", t.inputs), ("to", t.outputs)):
                 for place in places:
+                    if kind == "from" and is_late(self.net, t, place):
+                        continue
                     found.setdefault((kind, place), []).append(t.name)
         return {key: names for key, names in found.items() if len(names) > 1}
 
@@ -184,7 +187,7 @@ class Cut:
     def disturb(self, t: Transition, u: Transition) -> bool:
         """Whether one of two parts changes what the other one reads."""
         for one, other in ((t, u), (u, t)):
-            changed = {*one.inputs, *one.outputs, *(self.net.place(p).completion for p in one.outputs)} - {None}
+            changed = {*one.inputs, *one.outputs, *(s for p in one.outputs for s in self.net.place(p).cleared)}
             if changed & {*self.wants(other)}:
                 return True
         return False
@@ -263,6 +266,16 @@ class Cut:
         gates = tuple(gate for gate in t.external if self.owner[gate.signal] == part.controller)
         arcs = own(t.inputs), own(t.outputs)
         return Transition(part.name, *arcs, own(t.permissive), own(t.inhibitive), gates, number, t.description)
+
+
+def is_late(net: Net, t: Transition, place: str) -> bool:
+    """Whether a transition takes the token of a place because its completion has not come in time.
+
+    It wants the timer 1 and the completion 0, which all others there want 1: so it competes with none of them.
+    """
+    at = net.place(place)
+    wanted = {(gate.signal, gate.wanted) for gate in t.external}
+    return at.within is not None and {(at.within.timer, True), (str(at.completion), False)} <= wanted
 
 
 def check_cut(decomposition: Decomposition) -> Cut:

@@ -14,6 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from firable.decompose.verification.formulas import FALSE, TRUE, Formula, Formulas
+from firable.decompose.verification.recut import is_late
 from firable.decompose.verification.restating_facts import agreeing
 from firable.nets.decomposition import ArbitrationGroup
 from firable.nets.net import ArbitrationRule, Net
@@ -72,6 +73,8 @@ def _contest(nets: Iterable[tuple[Net, Callable[[str], str]]]) -> _Contest:
         for t in net.transitions:
             for kind, places in (("from", t.inputs), ("to", t.outputs)):
                 for place in places:
+                    if kind == "from" and is_late(net, t, place):
+                        continue
                     at.setdefault((kind, place), []).append(whole(t.name))
         for key in ((kind, place.name) for kind in ("from", "to") for place in net.places):
             names = at.get(key, [])

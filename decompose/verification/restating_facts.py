@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Final
 
 from firable.decompose.verification.formulas import Formula
+from firable.decompose.verification.recut import is_late
 from firable.nets.net import Net, Transition
 
 if TYPE_CHECKING:
@@ -68,8 +69,11 @@ def deciding(of: Restated) -> Iterator[Stated]:
             groups.setdefault(name, []).append(group.name)
     for place in of.net.places:
         competing = [of.cut.sharing[key] for key in (("from", place.name), ("to", place.name)) if key in of.cut.sharing]
-        if competing:
-            yield _one_decider(of, place.name, competing, groups, central)
+        late = [
+            t for t in of.net.transitions if place.within and place.name in t.inputs and is_late(of.net, t, place.name)
+        ]
+        if competing or late:
+            yield _one_decider(of, place.name, competing, groups, central, late)
 
 
 def _one_decider(
@@ -78,6 +82,7 @@ def _one_decider(
     competing: list[list[str]],
     groups_of: Mapping[str, list[str]],
     central: Mapping[str, bool],
+    late: list[Transition],
 ) -> Stated:
     members = list(dict.fromkeys(name for names in competing for name in names))
     groups = list(dict.fromkeys(group for name in members for group in groups_of.get(name, ())))
@@ -102,6 +107,11 @@ def _one_decider(
             claims.append(of.of.equal(row(names[i - 1]), row(names[i])))
             claims += [of.of.equal(decides(g, names[i - 1]), decides(g, names[i])) for g in groups]
     sentence = f"the transitions that compete for '{place}' have one decider, the coordinator if one has a row"
+    for fault in late:
+        for t in of.net.transitions:
+            if t is not fault and place in t.inputs:
+                claims.append(of.of.negation(of.of.all_of([of.open(fault), of.open(t)])))
+        sentence += f", and none of them is open beside '{fault.name}'"
     return of.claim(f"o2.{place}", sentence, of.of.all_of(claims), [place, *members], given)
 
 
@@ -137,6 +147,8 @@ def _commands(net: Net) -> Iterator[str]:
             yield f"{p.name} sends {json.dumps(words)}"
         if p.completion is not None:
             yield f"{p.name} waits until {p.completion}"
+        if p.within is not None:
+            yield f"{p.name} waits {p.within.milliseconds} ms, which {p.within.timer} tells"
     for signal in net.signals:
         yield f"{signal.name} is a {signal.kind.value}"
 

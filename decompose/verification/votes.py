@@ -2,8 +2,8 @@
 
 The yes of a part needs some places full and some empty (Eq. 1), and some signals at 1 (Eq. 2). Another transition can
 take it back only by taking a token from one of the first, by putting one on one of the second, or by entering a place
-whose completion is one of the third, which it does not itself need to be 0; and only if it can be firable while the yes
-stands. What machines do to a gate is no transition.
+whose completion or timer is one of the third; and only if it can be firable while the yes stands, and needs none of
+the third to be 0. What machines do to a gate is no transition.
 Where there is no such transition the verdict is shown by the arcs. Otherwise the question is whether a marking can be
 reached in which the yes stands and one of the accused is firable; the claim of a document must be exactly that.
 """
@@ -48,7 +48,8 @@ def votes(decomposition: Decomposition, formulas: Formulas) -> dict[str, Vote]:
                 if gate.wanted:
                     touching |= clearers.get(gate.signal, set())
             others = sorted(touching - {row.name}, key=net.transition_index.__getitem__)
-            accused = [name for name in others if _can_take_back(net.transition(name), full, empty)]
+            awaited = {gate.signal for gate in voted.external if gate.wanted}
+            accused = [name for name in others if _can_take_back(net.transition(name), full, empty, awaited)]
             stands = [formulas.literal(place, place in full) for place in (*sorted(full), *sorted(empty))]
             goal = formulas.all_of([*stands, formulas.any_of(formulas.variable(f"firable({u})") for u in accused)])
             sentence = f"once '{part.name}' votes yes, no transition but '{row.name}' takes the yes back"
@@ -66,11 +67,11 @@ def _at_places(net: Net, kind: str) -> dict[str, list[str]]:
 
 
 def _clearers(net: Net) -> dict[str, set[str]]:
-    """The transitions that clear each completion signal, and do not need it cleared."""
-    completion = {place.name: place.completion for place in net.places if place.completion is not None}
+    """The transitions that clear each completion signal and timer, and do not need it cleared."""
+    cleared = {place.name: place.cleared for place in net.places if place.cleared}
     found: dict[str, set[str]] = {}
     for t in net.transitions:
-        for signal in {completion[place] for place in t.outputs if place in completion}:
+        for signal in {signal for place in t.outputs for signal in cleared.get(place, ())}:
             if not any(gate.signal == signal and not gate.wanted for gate in t.external):
                 found.setdefault(signal, set()).add(t.name)
     return found
@@ -81,9 +82,11 @@ def _needs(t: Transition) -> tuple[set[str], set[str]]:
     return {*t.inputs, *t.permissive}, {*t.outputs, *t.inhibitive}
 
 
-def _can_take_back(t: Transition, full: set[str], empty: set[str]) -> bool:
-    """Whether a transition can be firable while these places are full and empty."""
+def _can_take_back(t: Transition, full: set[str], empty: set[str], awaited: set[str]) -> bool:
+    """Whether a transition can be firable, and open, while these places are full and empty and these signals 1."""
     needs_full, needs_empty = _needs(t)
+    if any(gate.signal in awaited and not gate.wanted for gate in t.external):
+        return False
     return t.openable and needs_full.isdisjoint(needs_empty | empty) and needs_empty.isdisjoint(full)
 
 

@@ -117,11 +117,18 @@ class _Finish:
 
 
 @dataclass(frozen=True, slots=True)
+class _Press:
+    """Somebody has come to a machine that was stopped, and presses the key."""
+
+    signal: str
+
+
+@dataclass(frozen=True, slots=True)
 class _Stick:
     """A sensor gets stuck."""
 
 
-_Event = _Arrival | _Departure | _Finish | _Stick
+_Event = _Arrival | _Departure | _Finish | _Press | _Stick
 
 
 @dataclass(slots=True)
@@ -155,6 +162,8 @@ class Plant:
         self.entered = 0
         self.delivered: list[Workpiece] = []
         self.shown = dict.fromkeys(model.sensors, False)
+        self.pressed: set[str] = set()
+        """The keys that somebody has pressed."""
         self.faulted = False
         self.arrival_due = False
         self.events: list[tuple[float, int, _Event]] = []
@@ -231,6 +240,9 @@ class Plant:
             case _Finish(machine, busy):
                 if self.machines[machine].busy is busy:
                     yield from self._finish(machine, busy)
+            case _Press(signal):
+                if self.machines[str(self.model.sensors[signal].acknowledges)].busy is None:
+                    self.pressed.add(signal)
             case _Stick():
                 pass  # `_seen` looks at the disturbances
 
@@ -266,12 +278,15 @@ class Plant:
             raise _FaultError(f"{name} does not know the command {busy.command}")
         machine.times[busy.command] = machine.times.get(busy.command, 0) + 1
         if isinstance(action, Stop):
+            for key, sensor in self._keys(name) if machine.busy is not None else ():
+                self._in(sensor.after_s, 0.0, _Press(key))
             machine.busy = None
             yield CommandDone(busy.ticket)
             return
         if machine.busy is not None:
             raise _FaultError(f"{name} is given {busy.command} while it is at {machine.busy.command}")
         machine.busy = busy
+        self.pressed.difference_update(key for key, _ in self._keys(name))
         match action:
             case Move():
                 self._position(machine, name, busy, "to")
@@ -370,6 +385,10 @@ class Plant:
         if station == self.model.departures.station:
             self._in(self.model.departures.after_s, 0.0, _Departure())
 
+    def _keys(self, machine: str) -> Iterator[tuple[str, Sensor]]:
+        """The keys that acknowledge a fault of a machine."""
+        return ((name, sensor) for name, sensor in self.model.sensors.items() if sensor.acknowledges == machine)
+
     def _sees(self, name: str, sensor: Sensor) -> bool:
         for disturbance in self.disturbances:
             if (
@@ -380,6 +399,8 @@ class Plant:
                 return disturbance.value
         if sensor.occupied is not None:
             return self.stations[sensor.occupied] is not None
+        if sensor.acknowledges is not None:
+            return name in self.pressed
         return self.machines[str(sensor.holding)].holding is not None
 
     def _seen(self) -> Iterator[PlantReport]:

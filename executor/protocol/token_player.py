@@ -2,8 +2,8 @@
 
 Places and signals of a net share one integer, the *word*: bit i is place i, bit n + j is signal j of a net of n places.
 A transition is enabled iff all bits of `needs` are set and none of `forbids`; it fires by clearing and setting bits.
-The completion signal of a command is cleared in the same act in which the token enters the place (SEMANTICS,
-"Completion gates"), so for the protocol a completion is one more thing that a transition writes, and a gate one more
+The completion signal of a command, and its timer, are cleared in the same act in which the token enters the place
+(SEMANTICS, "Completion gates"), so for the protocol they are more things that a transition writes, and a gate one more
 that it reads. Who clears a signal does not read it: two commands that one signal completes do not disturb each other by
 it, for cleared twice is cleared.
 
@@ -40,7 +40,7 @@ class Compiled:
 
     @property
     def writes(self) -> Word:
-        """The places that change and the completion signals that are cleared."""
+        """The places that change and the completions and timers that are cleared."""
         return self.takes | self.puts | self.clears
 
     @property
@@ -57,7 +57,7 @@ class Compiled:
         return word & self.needs & places == self.needs & places and not word & self.forbids & places
 
     def fire(self, word: Word) -> Word:
-        """Eq. (3)-(4), and the completion signals of the places entered cleared."""
+        """Eq. (3)-(4), and the completions and timers of the places entered cleared."""
         return word & ~(self.takes | self.clears) | self.puts
 
     def disturbs(self, writes: Word, reads: Word) -> bool:
@@ -83,14 +83,14 @@ class TokenPlayer:
             masks = net.masks[t]
             opening = sum({signal_bit[gate.signal] for gate in transition.external if gate.wanted})
             closing = sum({signal_bit[gate.signal] for gate in transition.external if not gate.wanted})
-            completions = {net.place(place).completion for place in transition.outputs}
+            cleared = {signal for place in transition.outputs for signal in net.place(place).cleared}
             compiled[transition.name] = Compiled(
                 transition.name,
                 needs=masks.inputs | masks.permissive | opening,
                 forbids=masks.outputs | masks.inhibitive | closing,
                 takes=masks.inputs,
                 puts=masks.outputs,
-                clears=sum(signal_bit[name] for name in completions if name is not None),
+                clears=sum(signal_bit[name] for name in cleared),
                 openable=transition.openable,
             )
         return cls(net, compiled, (1 << len(net.places)) - 1)

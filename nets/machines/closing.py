@@ -9,13 +9,15 @@ decides it, and its firing rule is the one there is.
   the machine (SEMANTICS, "Output signal", "Completion gates"). What it does depends on the plant (the bit was 0 or 1, a
   stopped machine was idle or busy), and a firing is one transition, so a transition of the cell becomes several
   *variants*, of which at most one is firable. `variants` maps each back to the cell's own transition.
-- *A machine moves*: a command is done, a workpiece comes or goes, a sensor that is not exact drops.
+- *A machine moves*: a command is done, a workpiece comes or goes, a sensor that is not exact drops, somebody presses a
+  key. A time limit may be over at any moment while its place holds the token and the completion has not come; so the
+  fault transition asks for no more, and its timer is a place only where something else reads it.
 - *An accident* ends the run: the executor stops every machine where it is. Nothing fires afterwards.
 
 A variant has exactly the arcs and internal gates of its transition among the places of the cell, and a move of a
-machine has none there. So each run of the loop, without the moves, is a run of the open net: what never happens with
-gates free never happens here. The converse fails, which is the point. An arbiter is left out, as from every verdict on
-what can happen.
+machine has none there, but that a time passes where there is a token. So each run of the loop, without the moves, is a
+run of the open net: what never happens with gates free never happens here. The converse fails, which is the point. An
+arbiter is left out, as from every verdict on what can happen.
 
 A sensor that is exact is no place: it is true iff its station is not empty. One that may flicker or linger is a bit of
 its own. A failure is a place for each machine: while it is marked nothing that the machine is at gets done.
@@ -71,14 +73,29 @@ class _Closing:
         completions = [signal.name for signal in net.signals if signal.kind is SignalKind.COMPLETION]
         self.sharing = {name: sum(place.completion == name for place in net.places) > 1 for name in completions}
         self.inexact = [name for name, sensor in model.sensors.items() if sensor.may_flicker or sensor.may_linger]
+        self.timers = self.timers_read()
+        self.keys = [name for name, sensor in model.sensors.items() if sensor.acknowledges is not None]
         self.acknowledged = {name: f"{PLANT}.{name}.acknowledged" for name in completions if name in model.sensors}
         self.shown = {
             signal.name: (signal.name, True) if signal.name in self.sharing else self.sensor(signal.name)
             for signal in net.signals
+            if signal.kind is not SignalKind.TIMER or signal.name in self.timers
         }
         self.failing = self.may_fail(faults)
         self.repaired = faults is Faults.REPAIRED
         self.failed = {name: f"{PLANT}.{name}.failed" for name in model.machines if name in self.failing.values()}
+
+    def timers_read(self) -> dict[str, Place]:
+        """The timers that some other transition reads than the fault transition, with their places."""
+        faults = {(p, t) for p, t in self.net.fault_transitions.items()}
+        found = {}
+        for p, place in enumerate(self.net.places):
+            if place.within is None:
+                continue
+            for t, transition in enumerate(self.net.transitions):
+                if (p, t) not in faults and any(gate.signal == place.within.timer for gate in transition.external):
+                    found[place.within.timer] = place
+        return found
 
     def may_fail(self, faults: Faults) -> dict[str, str]:
         """The places whose command may fail, each with its machine."""
@@ -96,11 +113,12 @@ class _Closing:
         variants = {transition.name: tuple(self.of_cell(transition)) for transition in self.net.transitions}
         for transition in self.net.transitions:
             _assert_projects(self.net, transition, variants[transition.name])
-        moves = tuple(self.moves())
-        _assert_apart(self.net, moves)
+        moves, times = tuple(self.moves()), tuple(self.times())
+        _assert_apart(self.net, moves, times)
+        moves += times
         net = Net(
             self.net.name,
-            (*(replace(place, completion=None) for place in self.net.places), *self.places()),
+            (*(replace(place, completion=None, within=None) for place in self.net.places), *self.places()),
             (*chain.from_iterable(variants.values()), *moves),
             controllers=(*self.net.controllers, Controller(PLANT, description="Machines and workpieces")),
             description=f"{self.net.description} (with its machines)",
@@ -127,8 +145,12 @@ class _Closing:
         for signal in self.net.signals:
             if signal.kind is SignalKind.COMPLETION:
                 yield Place(signal.name, signal.owner, description="completion")
-        for name in self.inexact:
+            elif signal.name in self.timers:
+                yield Place(signal.name, signal.owner, description="timer")
+        for name in (*self.inexact, *self.keys):
             yield self.bit(name)
+        for name in self.keys:
+            yield fact(self.let_go(name), f"{name} is not pressed", marked=True)
         for name, acknowledged in self.acknowledged.items():
             yield fact(acknowledged, f"the command of {name} is acknowledged, and its sensor does not show it yet")
         for name, unsent in self.unsent.items():
@@ -136,6 +158,10 @@ class _Closing:
         yield from self.laws.places()
         for name, failed in self.failed.items():
             yield fact(failed, f"{name} has failed")
+
+    def let_go(self, key: str) -> str:
+        """The place that holds a token iff a key is not pressed."""
+        return f"{PLANT}.{key}.released"
 
     def bit(self, sensor: str) -> Place:
         """The place of a sensor that is not exact, under the name of its signal where that is no completion."""
@@ -145,7 +171,7 @@ class _Closing:
 
     def sensor(self, name: str) -> Literal:
         """The place that shows a sensor, and whether a token means 1."""
-        if name in self.inexact:
+        if name in self.inexact or name in self.keys:
             return self.bit(name).name, True
         return (self.reality(name), False) if name in self.model.sensors else (name, True)
 
@@ -158,7 +184,7 @@ class _Closing:
 
     def of_cell(self, transition: Transition) -> Iterator[Transition]:
         """The variants of a transition of the cell."""
-        gates = [(self.shown[gate.signal], gate.wanted) for gate in transition.external]
+        gates = [(self.shown[gate.signal], gate.wanted) for gate in transition.external if gate.signal in self.shown]
         own = Case(
             (
                 (ACCIDENT, False),
@@ -176,7 +202,7 @@ class _Closing:
             place = self.net.place(name)
             if place.command is None or name in self.unsent:
                 continue
-            moments = each(moments, self.cleared(place))
+            moments = each(each(moments, self.cleared(place)), self.timed_anew(place))
             ended += each(moments, self.laws.refused(place))
             moments = each(moments, self.laws.sent(place))
             if len(moments) + len(ended) > VARIANTS_MAX:
@@ -206,6 +232,15 @@ class _Closing:
             yield Case(
                 ((signal, False), (waiting, True)), ((waiting, False),), f"forgets-{signal}", f"forgets {signal}"
             )
+
+    def timed_anew(self, place: Place) -> Iterator[Case]:
+        """Sending a command starts its time."""
+        if place.within is None or place.within.timer not in self.timers:
+            yield Case()
+            return
+        timer = place.within.timer
+        yield Case(((timer, False),))
+        yield Case(((timer, True),), ((timer, False),), f"clears-{timer}", f"clears {timer}")
 
     def accident(self, name: str, description: str, moment: Moment) -> Transition:
         self.accidents[name] = moment.says[-1]
@@ -250,7 +285,7 @@ class _Closing:
         for name, unsent in self.unsent.items():
             place = self.net.place(name)
             sending = each(start, [Case(((unsent, True),), ((unsent, False),))])
-            cleared = each(sending, self.cleared(place))
+            cleared = each(each(sending, self.cleared(place)), self.timed_anew(place))
             sent = chain.from_iterable(map(self.seen, each(cleared, self.laws.sent(place))))
             yield from self.named(f"sent/{name}", f"{self.words(place)} is sent", sent)
             yield from self.ended(f"sent/{name}", each(cleared, self.laws.refused(place)))
@@ -278,6 +313,23 @@ class _Closing:
                 case = Case(((empty, True), (bit, True)), ((bit, False),))
                 words = f"the sensor of {name} sees that the workpiece has gone"
                 yield from self.named(f"{name}/clears", words, each(start, [case]))
+
+        for name in self.keys:
+            pressed = Case(((name, False), (self.let_go(name), True)), ((name, True), (self.let_go(name), False)))
+            yield from self.named(f"{name}/pressed", f"{name} is pressed", each(start, [pressed]))
+            # The next command to the machine releases it: so it holds until what waits for it has fired (O4).
+            idle = self.laws.idle(str(self.model.sensors[name].acknowledges))
+            released = Case(((idle, False), *pressed.leaves), pressed.wants)
+            yield from self.named(f"{name}/released", f"{name} is released", each(start, [released]))
+
+    def times(self) -> Iterator[Transition]:
+        """Any time can be over while a token waits for a completion that has not come: nothing is known of times."""
+        for timer, place in self.timers.items():
+            waits = ((place.name, True), (str(place.completion), False), (ACCIDENT, False), (OVERRUN, False))
+            sent = ((self.unsent[place.name], False),) if place.name in self.unsent else ()
+            over = Case((*waits, *sent, (timer, False)), ((timer, True),))
+            words = f"the time of {place.name} is over, and {place.completion} has not come"
+            yield from self.named(f"{timer}/over", words, each([NOTHING], [over]))
 
     def named(self, name: str, description: str, moments: Iterable[Moment]) -> Iterator[Transition]:
         for moment in moments:
@@ -353,7 +405,10 @@ def _assert_projects(net: Net, transition: Transition, variants: Iterable[Transi
             raise RuntimeError(f"the variant '{variant.name}' does not do what '{transition.name}' does")
 
 
-def _assert_apart(net: Net, moves: Iterable[Transition]) -> None:
+def _assert_apart(net: Net, moves: Iterable[Transition], times: Iterable[Transition]) -> None:
     for move in moves:
         if not {*move.inputs, *move.outputs, *move.permissive, *move.inhibitive}.isdisjoint(net.place_index):
             raise RuntimeError(f"the machines' '{move.name}' touches a place of the cell")
+    for time in times:
+        if not {*time.inputs, *time.outputs}.isdisjoint(net.place_index):
+            raise RuntimeError(f"'{time.name}' moves a token of the cell")

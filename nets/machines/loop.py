@@ -37,7 +37,8 @@ class ClosedLoop:
     """The net of a cell with its machines, and what its names mean.
 
     `variants` holds, for each transition of the cell, its transitions in the loop; `accidents` those transitions after
-    which nothing fires; `shown` for each signal the place that shows it, and whether a token there means 1; `at` for
+    which nothing fires; `shown` for each signal the place that shows it, and whether a token there means 1 (of timers,
+    those that more than a fault transition reads); `at` for
     each place with a command the place that says that the machine is at it; `failed` the place of each machine that
     can fail; `acknowledged`, for a completion that waits for its sensor, the place that says so; `unsent`, where
     commands are sent late, the place that says that the command of a place is still to be sent.

@@ -164,14 +164,18 @@ class Departures(_Model):
 
 
 class Sensor(_Model):
-    """What a sensor sees: a workpiece on a station, or one in the hand of a machine.
+    """What a sensor sees: a workpiece on a station, one in the hand of a machine, or an operator who presses a key.
 
     One that may flicker can drop while the workpiece is there, and come back; one that may linger can stay for a while
-    when the workpiece has gone.
+    when the workpiece has gone. A key acknowledges a fault: in a simulated run it is pressed `after_s` after the
+    machine was stopped in the midst of a command; a model of the machines leaves open when and how often. The next
+    command to the machine releases it.
     """
 
     occupied: Name | None = None
     holding: Name | None = None
+    acknowledges: Name | None = None
+    after_s: Seconds = 0.0
     may_flicker: bool = False
     may_linger: bool = False
 
@@ -247,11 +251,17 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[tuple[str, ...], str, 
                 case Clamp(station=at) | Process(station=at) | Release(station=at):
                     yield from station((*inner, "station"), at)
     for name, sensor in model.sensors.items():
-        if (sensor.occupied is None) == (sensor.holding is None):
-            yield ("sensors", name), "a sensor sees one thing", "write `occupied: STATION` or `holding: MACHINE`"
+        if sum(seen is not None for seen in (sensor.occupied, sensor.holding, sensor.acknowledges)) != 1:
+            hint = "write `occupied: STATION`, `holding: MACHINE` or `acknowledges: MACHINE`"
+            yield ("sensors", name), "a sensor sees one thing", hint
+        if sensor.acknowledges is not None and (sensor.may_flicker or sensor.may_linger):
+            yield ("sensors", name), "a key is pressed or not", "leave out `may_flicker` and `may_linger`"
+        if sensor.acknowledges is None and sensor.after_s:
+            yield ("sensors", name, "after_s"), "a sensor sees at once", "`after_s` belongs to `acknowledges`"
         yield from station(("sensors", name, "occupied"), sensor.occupied)
-        if sensor.holding is not None and sensor.holding not in model.machines:
-            yield ("sensors", name, "holding"), f"there is no machine '{sensor.holding}'", "see `machines`"
+        for key, machine_seen in (("holding", sensor.holding), ("acknowledges", sensor.acknowledges)):
+            if machine_seen is not None and machine_seen not in model.machines:
+                yield ("sensors", name, key), f"there is no machine '{machine_seen}'", "see `machines`"
 
 
 def misfits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
@@ -282,7 +292,19 @@ def misfits(model: PlantModel, net: Net) -> tuple[Diagnostic, ...]:
             problems.append(
                 Diagnostic("F5003", f"no sensor of the plant drives '{signal.name}'", hint, ("signals", signal.name))
             )
-    for name in model.sensors:
+    for name, sensor in model.sensors.items():
+        if name in net.signal_index and net.signal(name).kind is SignalKind.TIMER:
+            hint = "a timer is set by its controller: rename the sensor"
+            problems.append(Diagnostic("F5003", f"'{name}' is a timer of the net", hint, ("sensors", name)))
+        if (
+            sensor.acknowledges is not None
+            and name in net.signal_index
+            and net.signal(name).kind is SignalKind.COMPLETION
+        ):
+            hint = "declare it under `inputs`, and write it as `if` of a transition"
+            problems.append(
+                Diagnostic("F5003", f"the key '{name}' is a completion of the net", hint, ("sensors", name))
+            )
         if name not in net.signal_index:
             hint = did_you_mean(name, [signal.name for signal in net.signals]) + "sensors bear the names of signals"
             problems.append(Diagnostic("F5003", f"the net has no signal '{name}'", hint, ("sensors", name)))

@@ -13,6 +13,7 @@ from support.examples import examples
 from support.lively_nets import lively_nets
 from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
+from support.timed_nets import timed_nets
 from support.whole_nets import formulas
 
 from firable.analysis.check import check
@@ -29,7 +30,7 @@ from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import holds_in
 
-SMALL_NETS = st.one_of(lively_nets(), dense_nets(signals=True), ring_nets(signals=True))
+SMALL_NETS = st.one_of(lively_nets(), dense_nets(signals=True), ring_nets(signals=True), timed_nets())
 SECONDS = 1.0  # a bounded search goes on as long as it may where there is nothing to find
 
 

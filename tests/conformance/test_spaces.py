@@ -15,6 +15,7 @@ from support.examples import seeds
 from support.lively_nets import lively_net, lively_nets
 from support.naive_space import Markings, NaiveSpace
 from support.ring_nets import ring_nets
+from support.timed_nets import timed_nets
 
 from firable.analysis.goal import Limits
 from firable.analysis.methods import SPACES, Method
@@ -58,7 +59,7 @@ class Pairing:
 
 
 @pytest.mark.parametrize("name", HELD)
-@given(net=st.one_of(lively_nets(), dense_nets(signals=True), ring_nets(signals=True)), data=st.data())
+@given(net=st.one_of(lively_nets(), dense_nets(signals=True), ring_nets(signals=True), timed_nets()), data=st.data())
 def test_a_space_has_the_sets_of_the_oracle(name: str, net: Net, data: st.DataObject) -> None:
     space = HELD[name](net)
     both = Pairing(space)

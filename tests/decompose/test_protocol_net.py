@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from support.examples import examples
 from support.owned_nets import owned_nets
 from support.reference import load_net
+from support.timed_nets import timed_nets
 
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import Deadline
@@ -214,7 +215,7 @@ def test_no_faults_add_no_steps() -> None:
 
 
 @examples(6)
-@given(owned_nets())
+@given(st.one_of(owned_nets(), timed_nets()))
 def test_protocol_of_random_nets_refines_and_loses_nothing(net: Net) -> None:
     found = explore_protocol(net, limits=Limits(Deadline.after(2)))
     assert Status.VIOLATED not in statuses(found)

@@ -102,7 +102,7 @@ TEMPORAL = {"name": "x", "kind": "ctl", "formula": "EF start", "then": None, "fa
 @pytest.mark.parametrize(
     ("path", "value", "code"),
     [
-        (("format",), "firable-net/3", "F1015"),
+        (("format",), "firable-net/4", "F1015"),
         (("places", 0, "marked"), 1, "F1015"),
         (("transitions", 0, "number"), True, "F1015"),
         (("properties", 0, "formula"), "a and", "F1012"),

@@ -57,7 +57,7 @@ def _changes(net: Net, item: Any) -> Iterator[tuple[str, Any]]:
         case Place():
             yield from _place_changes(net, item)
         case Signal():
-            other = SignalKind.SENSOR if item.kind is SignalKind.COMPLETION else SignalKind.COMPLETION
+            other = SignalKind.COMPLETION if item.kind is SignalKind.SENSOR else SignalKind.SENSOR
             yield "other kind", replace(item, kind=other)
             yield from (("other owner", replace(item, owner=c.name)) for c in net.controllers if c.name != item.owner)
             yield "no owner", replace(item, owner=None)

@@ -2,6 +2,7 @@
 
 from hypothesis import strategies as st
 from support.temporal_formulas import ctl_formulas, ltl_formulas
+from support.timed_nets import waiting, with_limits
 
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Or, Start
 from firable.nets.net import (
@@ -56,7 +57,10 @@ def formulas(places: list[str], transitions: list[str]) -> st.SearchStrategy[For
 
 @st.composite
 def whole_nets(draw: st.DrawFn) -> Net:
-    """Nets with controllers, unowned places, commands, completions, gates, arbiters and properties; no self-loops."""
+    """Nets with controllers, unowned places, commands, completions, time limits, gates, arbiters and properties.
+
+    No self-loops: the format refuses them.
+    """
     controllers = [
         Controller(name, draw(st.booleans()) and i == 0, draw(_TEXTS))
         for i, name in enumerate(draw(st.lists(st.sampled_from(["robot", "mc", "off", "12"]), unique=True)))
@@ -119,7 +123,7 @@ def whole_nets(draw: st.DrawFn) -> Net:
         for i, logic in enumerate(draw(st.lists(st.sampled_from(Logic), max_size=1))):
             some_of = {Logic.CTL: ctl_formulas, Logic.LTL: ltl_formulas}[logic]
             properties.append(TemporalProperty(f"l{i}", logic, draw(some_of(list(places), names))))
-    return Net(
+    net = Net(
         draw(_TEXTS),
         tuple(places.values()),
         tuple(transitions),
@@ -129,3 +133,4 @@ def whole_nets(draw: st.DrawFn) -> Net:
         tuple(properties),
         draw(_TEXTS),
     )
+    return with_limits(net, draw(_some(waiting(net))), draw(st.integers(1, 24 * 60 * 60 * 1000)))

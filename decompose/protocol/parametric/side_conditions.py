@@ -10,7 +10,7 @@ central net, in time linear in arcs and gates:
 - *locals*: every other transition stands in one subnet, whole (the function `home`);
 - *strangers*: the subnets have no transition that is neither, and none stands for two;
 - *gates*: the external gates of the parts are those of the transition, each at the owner of its signal, and commands
-  are completed by the same signals (`signal`, `clears`);
+  are completed and timed by the same signals (`signal`, `clears`);
 - *start*: a place is marked in its subnet as in the central net.
 
 Nothing is asked of arbitration groups. Promises alone keep conflicting transitions apart, whichever rounds ask for
@@ -49,7 +49,8 @@ class _Split:
     net: Net
     subnets: dict[str, Net]
     owner_of: dict[str, str | None]
-    completion_of: dict[str, str | None]
+    cleared_of: dict[str, tuple[str, ...]]
+    """The signals that a token clears when it enters a place."""
     part_of: dict[tuple[str, str], list[str]]
     """By controller and name of a part: the coordinated transitions that list it."""
     coordinated: frozenset[str]
@@ -65,7 +66,7 @@ class _Split:
             decomposition.net,
             {subnet.name: subnet for subnet in decomposition.subnets},
             {place.name: place.owner for place in decomposition.net.places},
-            {place.name: place.completion for place in decomposition.net.places},
+            {place.name: place.cleared for place in decomposition.net.places},
             part_of,
             frozenset(row.name for row in decomposition.coordinated),
         )
@@ -191,8 +192,8 @@ def _gates(split: _Split) -> Iterator[_Problem]:
             if owner_of.get(signal.name) != subnet.name:
                 yield _Problem(signal.name, f"'{signal.name}' is read by '{subnet.name}', which does not own it")
         for place in subnet.places:
-            if place.completion != split.completion_of.get(place.name):
-                words = f"the command of '{place.name}' is completed by another signal at '{subnet.name}'"
+            if place.cleared != split.cleared_of.get(place.name):
+                words = f"the command of '{place.name}' is completed, or timed, by another signal at '{subnet.name}'"
                 yield _Problem(place.name, words)
     for row in split.decomposition.coordinated:
         if row.name not in split.net.transition_index:
