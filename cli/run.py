@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from firable.cli import text
+from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
 from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
@@ -38,6 +39,7 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
 )
 @click.option("--trace", metavar="FILE", help="Write what happens to a file, for `firable replay`.")
 @trust_option
+@host_options
 @click.option("--step", is_flag=True, help="Fire one transition at a time, by the keys above.")
 @format_option
 def run(
@@ -50,6 +52,7 @@ def run(
     trust: tuple[str, ...],
     step: bool,
     format_: str,
+    **host: Any,
 ) -> int:
     """Run BUNDLE: a coordinator and a controller for each subnet, on a simulated cell of machines and workpieces.
 
@@ -59,7 +62,14 @@ def run(
     With --step, Enter fires the next transition, r runs on, e stops at the end of the cycle, when the cell is empty,
     and s stops now. In real time (--speed 1 or 10) the machines end what they are at while you think, and Enter pauses
     a run that runs on.
+
+    With --controller, only these controllers run here, on machines that --bind names, and the others on hosts that are
+    linked to this one by --listen and --join, or by --serial. A host that holds another bundle is refused. The run ends
+    by Ctrl-C; `firable replay` joins the traces of all hosts. Without machines, --dry-run tries all that.
     """
+    options = HostOptions(**host)
+    if not options.is_one_of_several:
+        options.refuse_alone()
 
     def make() -> Report:
         from firable.cli.stepping import stepping
@@ -67,6 +77,10 @@ def run(
         from firable.executor import run as run_bundle
 
         loaded = load(bundle, trust)
+        if options.is_one_of_several:
+            if trace is not None:
+                _refuse_to_overwrite(trace, bundle, *filter(None, (options.bind, options.journal)))
+            return run_host_of(bundle, loaded, options, trace, _notes(loaded.net))
         plant_file = _plant_file(loaded, plant)
         model = read_plant(plant_file)
         if trace is not None:
@@ -174,6 +188,9 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
 def _show(report: Report) -> None:
     for note in report.notes:
         text.show_diagnostic(note)
+    if "machines" in report.run:
+        show_host(report)
+        return
     text.heading(report.net, report.input)
     done = report.run
     click.echo(

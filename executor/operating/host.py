@@ -187,6 +187,8 @@ class Host:
         """What waits for another machine, in a sentence each."""
         if self.coordinator is not None:
             for opened in self.coordinator.rounds.values():
+                if opened.decided and opened.committed is None:
+                    continue  # nothing has fired, and nothing needs to
                 what = opened.committed or " or ".join(opened.transitions)
                 for name in opened.participants:
                     if opened.decided and name not in opened.acknowledged:

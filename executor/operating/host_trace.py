@@ -97,9 +97,10 @@ class HostTrace:
         self._add(Noted(self.now_seconds(), note, data))
 
     def end(self, marking: tuple[str, ...], reason: str) -> None:
-        """The last line, of a host in which nothing is open."""
+        """The last line, of a host in which nothing is open; what happens while the host closes its link is none."""
         self._add(End(self.now_seconds(), marking, reason))
         self.flush()
+        self.path = None
 
     def keep(self) -> list[Effect]:
         """What the journal keeps of the lines that are not in the file yet."""

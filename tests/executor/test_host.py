@@ -159,6 +159,33 @@ def test_commands_without_an_answer_keep_the_host_held_until_somebody_knows(tmp_
     run_in_virtual_time(main())
 
 
+def test_nothing_stands_behind_the_last_line(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path, TOGETHER)
+        await asyncio.sleep(5)
+        await cell.stop()
+        for host in cell.hosts.values():
+            host.lost("robot")
+            host.trace.flush()
+        assert cell.replayed().firings > 3
+
+    run_in_virtual_time(main())
+
+
+def test_a_round_that_was_aborted_keeps_nobody_waiting(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(7.3)
+        cell.exchange.cut(cell.links[ROBOT])
+        await asyncio.sleep(5)
+        coordinator = cell.hosts[CENTRE].coordinator
+        assert coordinator is not None
+        coordinator.permit(0)
+        assert not any("robot" in sentence for sentence in cell.hosts[CENTRE].waits())
+
+    run_in_virtual_time(main())
+
+
 def test_a_trace_says_who_was_lost_and_who_came_back(tmp_path: Path) -> None:
     async def main() -> None:
         cell = Cell(tmp_path)

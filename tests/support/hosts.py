@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from firable.decompose import split
-from firable.executor.drivers.rehearsal import RehearsalDriver
+from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import COORDINATOR, Greeting
@@ -52,7 +52,7 @@ class Cell:
         host = self.hosts[machines] = Host(
             self.decomposition,
             machines,
-            RehearsalDriver(subnets, 1.0, shown),
+            DryRunDriver(subnets, 1.0, shown),
             link,
             trace,
             journal,

@@ -1,4 +1,4 @@
-"""A driver without machines, to rehearse a cell: every command is done after a while, and every sensor shows what it is
+"""A driver for a dry run, without machines: every command is done after a while, and every sensor shows what it is
 told to.
 
 It lets the hosts of a cell be started, linked, cut off and started anew before a machine is connected, over the real
@@ -17,8 +17,8 @@ from firable.executor.drivers.driver import Answer, Clock, Listener, Quality, Re
 from firable.nets.net import Net, Place, SignalKind
 
 
-class RehearsalDriver:
-    """The driver of a rehearsal of the subnets given: commands take `seconds`, and `shown` says what sensors show."""
+class DryRunDriver:
+    """The driver of a dry run of the subnets given: commands take `seconds`, and `shown` says what sensors show."""
 
     def __init__(self, subnets: Iterable[Net], seconds: float, shown: Mapping[str, bool] | None = None) -> None:
         self.seconds = seconds

@@ -1,0 +1,220 @@
+"""`firable run --controller NAME`: run some controllers of a bundle on this host, linked to the others."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from firable.cli import text
+from firable.cli.report import Report
+
+if TYPE_CHECKING:
+    from firable.executor.drivers.driver import Driver
+    from firable.executor.links.link import Link
+    from firable.executor.operating.host import Host
+    from firable.executor.operating.situation import Situation
+    from firable.nets.bundle import Bundle
+    from firable.nets.diagnostics import Diagnostic
+    from firable.nets.verdict import Verdict
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class HostOptions:
+    """What the options say of the host, if anything."""
+
+    controller: tuple[str, ...]
+    coordinator: bool
+    listen: tuple[str, ...]
+    join: tuple[str, ...]
+    tls: tuple[str, str, str] | None
+    serial: str | None
+    baud: int
+    lease: float
+    journal: str | None
+    resume: bool
+    dry_run: float | None
+    bind: str | None
+
+    @property
+    def is_one_of_several(self) -> bool:
+        """Whether only a part of the cell runs here."""
+        return bool(self.controller) or self.coordinator
+
+    def refuse_alone(self) -> None:
+        """Refuse what only a host among others has use for."""
+        given = {
+            "--listen": self.listen,
+            "--join": self.join,
+            "--tls": self.tls,
+            "--serial": self.serial,
+            "--journal": self.journal,
+            "--resume": self.resume,
+            "--dry-run": self.dry_run is not None,
+            "--bind": self.bind,
+        }
+        if names := [name for name, value in given.items() if value]:
+            raise click.UsageError(f"{names[0]} is for a host among others: say with --controller what runs here")
+
+
+def host_options(command: F) -> F:
+    """The options of a host; they come as the keywords of `HostOptions`."""
+    for option in reversed(
+        (
+            click.option(
+                "--controller",
+                metavar="NAME",
+                multiple=True,
+                help="Run only this controller here, with its coordinator if the net calls it one; may be repeated.",
+            ),
+            click.option("--coordinator", is_flag=True, help="Run the coordinator here, of a net that names none."),
+            click.option(
+                "--listen", metavar="ADDRESS", multiple=True, help="Let hosts join here, such as tcp/127.0.0.1:7447."
+            ),
+            click.option("--join", metavar="ADDRESS", multiple=True, help="Join the host that listens there."),
+            click.option(
+                "--tls",
+                nargs=3,
+                metavar="CA CERT KEY",
+                help="The files of the site's authority, and of this host's certificate and key, for tls/ addresses.",
+            ),
+            click.option(
+                "--serial", metavar="PORT", help="Reach the others over a serial line, polled by the coordinator."
+            ),
+            click.option("--baud", type=click.IntRange(min=1200), default=115_200, show_default=True, metavar="N"),
+            click.option(
+                "--lease",
+                type=click.FloatRange(min=0.05, max=600),
+                default=1.0,
+                show_default=True,
+                metavar="SECONDS",
+                help="A host that is silent for so long is lost.",
+            ),
+            click.option("--journal", metavar="FILE", help="Keep what a restart needs; without, a crash loses it."),
+            click.option("--resume", is_flag=True, help="After a restart go on as soon as the machines are known."),
+            click.option("--bind", metavar="FILE", help="Where the machines and sensors of this host are."),
+            click.option(
+                "--dry-run",
+                type=click.FloatRange(min=0.0),
+                metavar="SECONDS",
+                help="Run without machines: each command is done after so long, each sensor shows 1.",
+            ),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+def run_host_of(
+    path: str, bundle: Bundle, options: HostOptions, trace: str | None, notes: tuple[Diagnostic, ...]
+) -> Report:
+    """Run this host until it is stopped or fails, and report how it ended."""
+    from firable.executor.operating.hosting import machines_of, run_host
+
+    machines = machines_of(bundle.net, options.controller, coordinator=options.coordinator)
+    driver = _driver(bundle, machines, options)
+    link, warnings = _link(bundle, machines, options)
+    for warning in warnings:
+        text.show_diagnostic(warning)
+    hosts: list[Host] = []
+    situation = run_host(
+        bundle,
+        machines,
+        driver,
+        link,
+        trace_path=trace,
+        journal_path=options.journal,
+        resume=options.resume,
+        tell=_told,
+        started=hosts.append,
+    )
+    (host,) = hosts
+    return Report(
+        "run",
+        path,
+        bundle.net,
+        (_verdict(situation, machines),),
+        files=(trace,) if trace else (),
+        notes=notes,
+        run={
+            "state": situation.state.value,
+            "message": situation.message,
+            "marking": list(situation.marking),
+            "blocked": [str(blocked) for blocked in situation.blocked],
+            "machines": list(machines),
+            "messages": host.messages,
+            "repeats": host.repeats,
+        },
+    )
+
+
+def show_host(report: Report) -> None:
+    """How a host ended."""
+    text.heading(report.net, report.input)
+    done = report.run
+    names = ", ".join(name or "the coordinator" for name in done["machines"])
+    click.echo(f"  {names}: {done['state']}")
+    click.echo(f"  {text.counted(done['messages'], 'message')}, {done['repeats']:,} of them repeated")
+    text.show_verdicts(report.net, report.verdicts)
+    for file in report.files:
+        click.echo(f"  trace {file}; `firable replay` judges it together with those of the other hosts")
+
+
+def _told(kind: str, sentence: str) -> None:
+    """One line of what happens, as it happens."""
+    click.echo(f"{time.strftime('%H:%M:%S')} {kind}: {sentence}", err=True)
+
+
+def _driver(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> Driver:
+    from firable.executor.operating.hosting import own_net
+
+    if options.bind is not None and options.dry_run is not None:
+        raise click.UsageError("--bind is for machines and --dry-run for none: give one of them")
+    if options.bind is not None:
+        from firable.executor.drivers.binding import read_binding
+        from firable.executor.drivers.bound import bound_driver
+
+        return bound_driver(read_binding(options.bind), own_net(bundle.decomposition, machines))
+    net = own_net(bundle.decomposition, machines)
+    if options.dry_run is None and (net.signals or any(place.command for place in net.places)):
+        raise click.UsageError("say with --bind where the machines of this host are, or --dry-run without any")
+    from firable.executor.drivers.dry_run import DryRunDriver
+
+    return DryRunDriver([net], options.dry_run or 0.0)
+
+
+def _link(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> tuple[Link, tuple[Diagnostic, ...]]:
+    from firable.executor.operating.hosting import Network, SerialLine, make_link
+
+    if options.serial is not None:
+        if options.listen or options.join or options.tls:
+            raise click.UsageError("--serial is one link, and --listen, --join and --tls are of another: give one")
+        return make_link(bundle, machines, SerialLine(options.serial, options.baud, options.lease)), ()
+    if not options.listen and not options.join:
+        raise click.UsageError("say with --listen, --join or --serial how this host is linked to the others")
+    link = make_link(bundle, machines, Network(options.listen, options.join, options.tls, options.lease))
+    from firable.executor.links.zenoh_link import open_to_the_network
+
+    return link, open_to_the_network(options.listen)
+
+
+def _verdict(situation: Situation, machines: tuple[str, ...]) -> Verdict:
+    from firable.executor import State
+    from firable.nets.verdict import Status, Verdict
+
+    fault = situation.state is State.FAULT
+    status = Status.VIOLATED if fault else Status.UNKNOWN if situation.message else Status.PROVED
+    return Verdict(
+        "host-ended-in-order",
+        status,
+        "the host ran until it was stopped, and left nothing open",
+        "run of one host",
+        bound="" if fault else situation.message,
+        hint=situation.message if fault else "",
+        subjects=tuple(name or "coordinator" for name in machines),
+    )

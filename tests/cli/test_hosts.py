@@ -1,0 +1,97 @@
+"""`firable run --controller`: hosts of a cell as processes, and what is refused before one starts."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from support.link_rigs import free_port
+
+from firable.cli.main import main
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("bundle") / "cell.bundle"
+    assert main(["bundle", "catalogue:one_robot", "-o", str(path)]) == 0
+    return str(path)
+
+
+MISTAKES: dict[str, tuple[list[str], str]] = {
+    "an option of a host alone": (["--join", "tcp/127.0.0.1:1"], "--join is for a host among others"),
+    "no link": (["--controller", "robot", "--dry-run", "1"], "--listen, --join or --serial"),
+    "two links": (["--controller", "robot", "--dry-run", "1", "--serial", "x", "--join", "tcp/[::1]:1"], "one link"),
+    "no machines": (["--controller", "robot", "--join", "tcp/127.0.0.1:1"], "--bind"),
+    "both": (["--controller", "robot", "--join", "tcp/[::1]:1", "--dry-run", "1", "--bind", "x"], "one of them"),
+    "an unknown controller": (["--controller", "robt", "--dry-run", "1", "--join", "tcp/[::1]:1"], "'robot'"),
+    "no such line": (["--controller", "robot", "--dry-run", "1", "--serial", "/dev/no-line"], "F5021"),
+    "one file for two": (["--controller", "mc", "--trace", "{bundle}", "--journal", "x"], "overwrite"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_clear_error(mistake: str, bundle: str, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments, said = MISTAKES[mistake]
+    assert main(["run", bundle, *(argument.format(bundle=bundle) for argument in arguments)]) == 2
+    errors = capsys.readouterr().err
+    assert said in errors
+    assert "Traceback" not in errors
+
+
+def test_two_hosts_run_a_cell_and_end_in_order(bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    at = f"tcp/127.0.0.1:{free_port()}"
+    hosts = {
+        "system": ["--controller", "system", "--controller", "mc", "--listen", at],
+        "robot": ["--controller", "robot", "--controller", "conveyor", "--join", at, "--format", "json"],
+    }
+    run = [sys.executable, "-m", "firable.cli", "run", bundle, "--dry-run", "0"]
+    traces = {name: tmp_path / f"{name}.trace" for name in hosts}
+    processes = {
+        name: subprocess.Popen(
+            [*run, *more, "--trace", str(traces[name])],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for name, more in hosts.items()
+    }
+    try:
+        end = time.monotonic() + 60
+        while not (traces["system"].exists() and traces["system"].read_text().count('"round"') > 20):
+            assert time.monotonic() < end
+            time.sleep(0.05)
+    finally:
+        for process in processes.values():
+            process.send_signal(signal.SIGINT if process is processes["robot"] else signal.SIGTERM)
+    said = {name: process.communicate(timeout=60) for name, process in processes.items()}
+    assert [process.returncode for process in processes.values()] == [0, 0], said
+    assert "is connected" in said["system"][1]
+    report = json.loads(said["robot"][0])["reports"][0]
+    assert report["run"]["machines"] == ["robot", "conveyor"]
+    assert report["verdicts"][0]["name"] == "host-ended-in-order"
+    assert main(["replay", *map(str, traces.values()), "--net", bundle]) == 0
+    capsys.readouterr()
+
+
+def test_a_host_with_another_bundle_is_refused_by_name(bundle: str, tmp_path: Path) -> None:
+    other = str(tmp_path / "other.bundle")
+    assert main(["bundle", "catalogue:two_robots_separate", "-o", other]) == 0
+    at = f"tcp/127.0.0.1:{free_port()}"
+    run = [sys.executable, "-m", "firable.cli", "run"]
+    here = subprocess.Popen(
+        [*run, bundle, "--controller", "system", "--listen", at, "--dry-run", "0"], stderr=subprocess.PIPE, text=True
+    )
+    there = subprocess.Popen(
+        [*run, other, "--controller", "mc", "--join", at, "--dry-run", "0"], stderr=subprocess.PIPE, text=True
+    )
+    try:
+        for process in (here, there):
+            assert process.stderr is not None
+            assert "holds another bundle" in process.stderr.readline()
+    finally:
+        for process in (here, there):
+            process.kill()
+            process.communicate()
