@@ -17,6 +17,7 @@ from firable.cli.options import (
     net_argument,
     page_option,
     with_page,
+    write_folder,
     write_text,
 )
 from firable.cli.report import Report
@@ -24,6 +25,7 @@ from firable.cli.report import Report
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from firable.analysis.goal import Limits
     from firable.analysis.spaces.reachability import Budget
     from firable.decompose.refinement.closed import BlockProof
     from firable.decompose.refinement.refining import Refinement
@@ -53,6 +55,12 @@ _METHODS = ("exploration of the task, closed", "the arcs and gates of the concep
     default=None,
     help="Compare both nets by exploring them, whatever their size or not at all; by default where they are small.",
 )
+@click.option(
+    "--evidence",
+    "evidence_dir",
+    metavar="DIR",
+    help="Write what shows the conditions of each task and the verdicts on NET, for `firable verify`.",
+)
 @analysis_options
 @page_option
 @format_option
@@ -62,6 +70,7 @@ def refine(
     output: str | None,
     cell: str,
     confirm: bool | None,
+    evidence_dir: str | None,
     max_markings: int,
     max_memory: int,
     max_seconds: float | None,
@@ -77,15 +86,22 @@ def refine(
     if output == "-":
         raise click.UsageError("the net cannot go to standard output, where the report goes: name a file")
     most = budget(max_markings, max_memory, max_seconds)
-    make = with_page(lambda: _report(net, files, output, cell, confirm, most), page)
+    make = with_page(lambda: _report(net, files, output, cell, confirm, most, evidence_dir), page)
     return answer("refine", format_, make, _show)
 
 
 def _report(
-    argument: str, files: tuple[str, ...], output: str | None, cell: str, confirm: bool | None, most: Budget
+    argument: str,
+    files: tuple[str, ...],
+    output: str | None,
+    cell: str,
+    confirm: bool | None,
+    most: Budget,
+    evidence_dir: str | None,
 ) -> Report:
     from firable.analysis.check import check
     from firable.decompose.refinement.carrying import carried, not_carried
+    from firable.decompose.refinement.evidence import refinement_evidence
     from firable.decompose.refinement.refining import proved_tasks
     from firable.decompose.refinement.refining import refine as refine_net
     from firable.nets.printing import format_net
@@ -99,26 +115,38 @@ def _report(
             return _refused(argument, unsound)
         refinement = refine_net(loaded.net, catalogue, cell)
     report = check(loaded.net, budget=most)
-    verdicts = [
+    verdicts: Sequence[Verdict] = [
         *refinement.conditions,
         _contact_free(report.verdict("contact-free")),
         *carried(refinement.correspondence, blocks, report),
         *_confirmed(refinement, report.verdict("contact-free"), confirm, most),
     ]
     table, more = _table(refinement.net)
+    written: tuple[str, ...] = ()
+    if evidence_dir is not None:
+        verdicts, documents = refinement_evidence(blocks, report, verdicts, _limits(most))
+        written = write_folder(evidence_dir, documents)
     if output is not None:
         write_text(output, format_net(refinement.net))
     return Report(
         "refine",
         argument,
         refinement.net,
-        verdicts,
+        tuple(verdicts),
         discipline="interleaving",
         course=(*_told(refinement), f"of the detailed net alone, `firable check` decides: {not_carried()}"),
         notes=(*loaded.notes, *refinement.notes, *more),
         table=table,
-        files=() if output is None else (output,),
+        files=written if output is None else (output, *written),
     )
+
+
+def _limits(most: Budget) -> Limits:
+    """How long evidence is looked for, in all documents together: as long as the verdicts, or 30 seconds."""
+    from firable.analysis.deadline import Deadline
+    from firable.analysis.goal import Limits
+
+    return Limits(Deadline.after(30.0 if most.seconds is None else most.seconds), most.memory_bytes)
 
 
 def _catalogue(files: tuple[str, ...]) -> Catalogue:
@@ -235,4 +263,7 @@ def _show(report: Report) -> None:
     text.show_verdicts(report.net, [verdict for verdict in report.verdicts if verdict.name not in shown])
     text.show_summary(report)
     for file in report.files:
-        click.echo(f"  the detailed net is in {file}")
+        if file.endswith((".evidence.json", ".evidence.json.gz")):
+            click.echo(f"  evidence: firable verify {file}")
+        else:
+            click.echo(f"  the detailed net is in {file}")

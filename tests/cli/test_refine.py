@@ -114,6 +114,19 @@ def test_a_violated_property_of_the_conceptual_net_is_told_in_the_detailed_one(
     assert any(player.deadlocked(marking) for marking in player.reachable())
 
 
+def test_evidence_is_written_and_verified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "evidence"
+    code, said = refined(capsys, "catalogue:conceptual_one_robot", "--evidence", str(folder), "--no-confirm")
+    assert code == 0
+    documents = sorted(folder.iterdir())
+    assert [file.name.partition(".")[0] for file in documents] == [
+        *("carry_in", "carry_out", "conceptual-one-robot", "load", "process", "unload")
+    ]
+    assert said.replace("\n", "").count("evidence: firable verify") == 6
+    assert main(["verify", *map(str, documents)]) == 0
+    assert "✓ shown     property.ends-clean" in capsys.readouterr().out
+
+
 def test_the_schema_of_files_of_tasks_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", "tasks"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "firable file of tasks"
