@@ -53,8 +53,6 @@ class HostOptions:
             "--join": self.join,
             "--tls": self.tls,
             "--serial": self.serial,
-            "--journal": self.journal,
-            "--resume": self.resume,
             "--dry-run": self.dry_run is not None,
             "--bind": self.bind,
         }
@@ -95,8 +93,16 @@ def host_options(command: F) -> F:
                 metavar="SECONDS",
                 help="A host that is silent for so long is lost.",
             ),
-            click.option("--journal", metavar="FILE", help="Keep what a restart needs; without, a crash loses it."),
-            click.option("--resume", is_flag=True, help="After a restart go on as soon as the machines are known."),
+            click.option(
+                "--journal",
+                metavar="FILE",
+                help="Keep what a restart needs; a run that was killed is taken up from it.",
+            ),
+            click.option(
+                "--resume",
+                is_flag=True,
+                help="After a restart go on as soon as it is known what became of each command.",
+            ),
             click.option("--bind", metavar="FILE", help="Where the machines and sensors of this host are."),
             click.option(
                 "--dry-run",

@@ -14,7 +14,7 @@ from firable.cli.report import Report
 from firable.cli.sign import trust_option
 
 if TYPE_CHECKING:
-    from firable.executor import RunReport
+    from firable.executor import Answer, RunReport
     from firable.nets.bundle import Bundle
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
@@ -40,6 +40,12 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
 @click.option("--trace", metavar="FILE", help="Write what happens to a file, for `firable replay`.")
 @trust_option
 @host_options
+@click.option(
+    "--say",
+    metavar="PLACE=WHAT",
+    multiple=True,
+    help="Of a command whose machine cannot tell, after a restart: done, working, or not-received.",
+)
 @click.option("--step", is_flag=True, help="Fire one transition at a time, by the keys above.")
 @format_option
 def run(
@@ -50,6 +56,7 @@ def run(
     speed: str,
     trace: str | None,
     trust: tuple[str, ...],
+    say: tuple[str, ...],
     step: bool,
     format_: str,
     **host: Any,
@@ -58,6 +65,10 @@ def run(
 
     A bundle that is changed or not proved is refused, and with --trust one that none of these keys has signed. Ctrl-C
     stops the machines, and the run ends in order, with its report and its trace.
+
+    With --journal, all that the run needs is stored before anything leaves it. If it is killed, the same command takes
+    it up: it says what became of each command, and moves nothing. With --resume, or by the keys, it goes on; where no
+    machine can tell whether it has done a command, --say does. The simulated cell is kept beside the journal.
 
     With --step, Enter fires the next transition, r runs on, e stops at the end of the cycle, when the cell is empty,
     and s stops now. In real time (--speed 1 or 10) the machines end what they are at while you think, and Enter pauses
@@ -70,6 +81,8 @@ def run(
     options = HostOptions(**host)
     if not options.is_one_of_several:
         options.refuse_alone()
+    elif say:
+        raise click.UsageError("--say is of a run of the whole cell, and not of one host among others")
 
     def make() -> Report:
         from firable.cli.stepping import stepping
@@ -84,7 +97,7 @@ def run(
         plant_file = _plant_file(loaded, plant)
         model = read_plant(plant_file)
         if trace is not None:
-            _refuse_to_overwrite(trace, bundle, plant_file)
+            _refuse_to_overwrite(trace, bundle, plant_file, *_files_beside(options.journal))
         report = run_bundle(
             loaded,
             model,
@@ -92,6 +105,9 @@ def run(
             seed=seed,
             speed=_SPEEDS[speed],
             trace_path=trace,
+            journal_path=options.journal,
+            resume=options.resume,
+            said=_said(loaded.net, say, options.journal),
             operator=stepping(_SPEEDS[speed], to_stderr=format_ == "json") if step else None,
         )
         return Report(
@@ -105,6 +121,32 @@ def run(
         )
 
     return answer("run", format_, make, _show)
+
+
+def _files_beside(journal: str | None) -> tuple[str, ...]:
+    return (journal, f"{journal}.cell", f"{journal}.generation") if journal else ()
+
+
+def _said(net: Net, say: tuple[str, ...], journal: str | None) -> dict[str, Answer]:
+    """What the operator says of commands, by place."""
+    from firable.executor import Answer
+    from firable.nets.diagnostics import did_you_mean
+
+    if say and journal is None:
+        raise click.UsageError("--say is of a run that is taken up: name its --journal")
+    words = {answer.value.replace(" ", "-"): answer for answer in Answer if answer is not Answer.UNKNOWN}
+    said: dict[str, Answer] = {}
+    for option in say:
+        place, _, word = option.partition("=")
+        commanding = [p.name for p in net.places if p.command is not None]
+        if place not in commanding:
+            raise click.UsageError(
+                f"--say {option}: no place '{place}' sends a command; {did_you_mean(place, commanding)}"
+            )
+        if word not in words:
+            raise click.UsageError(f"--say {option}: say {', '.join(words)}")
+        said[place] = words[word]
+    return said
 
 
 def _notes(net: Net) -> tuple[Diagnostic, ...]:
@@ -148,13 +190,16 @@ def _refuse_to_overwrite(trace: str, *inputs: Path | str) -> None:
     if trace == "-":
         message = "-: the trace cannot go to standard output, where the report goes"
         raise InputError([Diagnostic("F1017", message, "name a file; one that is called so is ./-")])
-    try:
-        is_input = any(Path(trace).samefile(path) for path in inputs)
-    except (OSError, ValueError):  # no such file yet, or one that will not open either, and is told of then
-        is_input = False
-    if is_input:
+    if any(_is_same(Path(trace), Path(path)) for path in inputs):
         message = f"{printable(trace)}: the trace would overwrite what the run reads"
         raise InputError([Diagnostic("F1017", message, "name another file for the trace")])
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    try:
+        return one.resolve() == other.resolve() or one.samefile(other)
+    except (OSError, ValueError):  # no such file yet, or one that will not open either, and is told of then
+        return False
 
 
 def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, ...]:
@@ -163,7 +208,9 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
 
     method = f"run on the simulated cell, seed {seed}"
     through = len(report.delivered)
-    ended = {State.DONE: Status.PROVED, State.STOPPED: Status.UNKNOWN}.get(report.state, Status.VIOLATED)
+    ended = {State.DONE: Status.PROVED, State.STOPPED: Status.UNKNOWN, State.HELD: Status.UNKNOWN}.get(
+        report.state, Status.VIOLATED
+    )
     intact = not report.lost and not report.doubled
     return (
         Verdict(
@@ -206,5 +253,8 @@ def _show(report: Report) -> None:
     if refuted:
         text.show_verdicts(report.net, refuted)
     text.show_summary(report)
+    if done["state"] == "held":
+        for line in done["message"].split("; "):
+            click.echo(f"  {line}")
     for file in report.files:
         click.echo(f"  trace {file}")

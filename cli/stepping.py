@@ -19,15 +19,17 @@ from typing import Protocol
 import click
 
 from firable.executor import Execution, Operator
+from firable.executor.operating.restart import uncertain
 
 _PROMPT = "  [Enter] next, [r] run on, [e] stop at the end of the cycle, [s] stop now: "
+_TAKE_UP = "  [r] take the run up, [s] stop now: "
 _POLL_SECONDS = 0.05
 
 
 class _Typed(Protocol):
     """What the operator types."""
 
-    async def asked(self) -> str | None:
+    async def asked(self, prompt: str) -> str | None:
         """The next line, after a prompt; None where there are no more."""
         ...
 
@@ -42,11 +44,11 @@ class _TypedAtPrompt:
     def __init__(self, *, to_stderr: bool) -> None:
         self.to_stderr = to_stderr
 
-    async def asked(self) -> str | None:
+    async def asked(self, prompt: str) -> str | None:
         """The next line, after a prompt; None at the end of the input and at Ctrl-C."""
         handler = signal.signal(signal.SIGINT, signal.default_int_handler)
         try:
-            click.echo(_PROMPT, nl=False, err=self.to_stderr)
+            click.echo(prompt, nl=False, err=self.to_stderr)
             return input()
         except (EOFError, KeyboardInterrupt):
             return None
@@ -67,9 +69,9 @@ class _TypedMeanwhile:
         self.ended = threading.Event()
         threading.Thread(target=self._read, daemon=True).start()
 
-    async def asked(self) -> str | None:
+    async def asked(self, prompt: str) -> str | None:
         """The next line, after a prompt; None at the end of the input."""
-        click.echo(_PROMPT, nl=False, err=self.to_stderr)
+        click.echo(prompt, nl=False, err=self.to_stderr)
         while not self.lines:
             if self.ended.is_set() and not self.lines:  # the last lines come before the end
                 return None
@@ -94,9 +96,9 @@ class _TypedMeanwhile:
 def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
     """The operator of a run at a speed (None: virtual time), who talks on standard output or on standard error."""
 
-    async def key(typed: _Typed) -> str:
+    async def key(typed: _Typed, prompt: str = _PROMPT) -> str:
         while True:
-            line = await typed.asked()
+            line = await typed.asked(prompt)
             if line is None:
                 click.echo(err=to_stderr)
                 return "s"
@@ -126,8 +128,24 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
             await asyncio.sleep(_POLL_SECONDS)
         return False
 
+    async def taken_up(execution: Execution, typed: _Typed) -> bool:
+        """After a restart: say what became of the commands, and go on only if the operator wants it and it can be."""
+        while (found := execution.taking_up) is not None:
+            if not found.is_final:
+                await asyncio.sleep(_POLL_SECONDS)
+                continue
+            for line in execution.situation().message.split("; "):
+                click.echo(f"  {line}", err=to_stderr)
+            if uncertain(execution) or await key(typed, _TAKE_UP) == "s":
+                return False
+            execution.resume()
+        return True
+
     async def operate(execution: Execution) -> None:
         typed: _Typed = (_TypedAtPrompt if speed is None else _TypedMeanwhile)(to_stderr=to_stderr)
+        if not await taken_up(execution, typed):
+            execution.stop()
+            return
         execution.pause()
         while await stepped(execution):
             match await key(typed):

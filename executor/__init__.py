@@ -3,7 +3,8 @@
 What a program imports from here: `load` reads a bundle that may run, `read_plant` the file of a simulated cell, and
 `run` carries workpieces through it and returns a `RunReport`, whose `Situation` has a `State` and says with `Blocked`
 what waits for what. `execute` runs a decomposition that need not be proved, for simulation and tests. An `Operator`
-beside the run is given its `Execution`, with the controls pause, step, resume and stop; `StuckSensor` and
+beside the run is given its `Execution`, with the controls pause, step, resume and stop; an `Answer` says what became
+of a command, of a run that is taken up from its journal; `StuckSensor` and
 `NeverCompletes` disturb the cell. Other machines than simulated ones are reached by a `Driver`.
 
     from firable.executor import load, read_plant, run
@@ -19,9 +20,11 @@ from firable.executor.drivers.driver import Driver
 from firable.executor.operating.execution import Execution
 from firable.executor.operating.running import Operator, RunReport, execute, load, run
 from firable.executor.operating.situation import Blocked, Situation, State
+from firable.executor.protocol.commands import Answer
 from firable.nets.machines.plant_file import PlantModel, read_plant
 
 __all__ = [
+    "Answer",
     "Blocked",
     "Disturbance",
     "Driver",

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from firable.executor.protocol.commands import Answer as Answer
 from firable.nets.net import Place
 
 
@@ -51,15 +52,6 @@ class Reading:
     quality: Quality = Quality.BAD
     why: str = "not read yet"
     coalesced: int = 0
-
-
-class Answer(StrEnum):
-    """What became of a command that was sent before a restart."""
-
-    DONE = "done"
-    WORKING = "working"
-    NOT_RECEIVED = "not received"
-    UNKNOWN = "unknown"
 
 
 class Listener(Protocol):

@@ -3,6 +3,10 @@
 Each command goes out under a ticket of its own, which the plant gives back when the command is done, so that a late
 acknowledgement is never taken for that of a later command. There is no link here that could be lost; a driver of points
 and connections that reaches a simulated cell through them is `in_process.py`.
+
+With a log, the cell outlives the process, as machines do: all inputs of the past are given to it again, and it is where
+it was, forming the completions that it was forming. A stop interrupts the commands that machines are at; whether such a
+command is to be given anew only a person can say, so it is unknown.
 """
 
 from __future__ import annotations
@@ -10,28 +14,58 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Mapping
 
+from firable.executor.cell.cell_log import CellLog
 from firable.executor.cell.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.driver import Answer, Clock, Listener, Quality, Reading
 from firable.nets.net import Net, Place, SignalKind
 
 
-class SimulatedDriver:
-    """The driver of a simulated cell."""
+class _Nobody:
+    """Whom a cell tells of its past."""
 
-    def __init__(self, plant: Plant, net: Net) -> None:
+    def signal(self, name: str, value: bool, entry: int | None) -> None:
+        """It was told in its time."""
+
+    def driver_fault(self, machine: str, message: str) -> None:
+        """It was told in its time."""
+
+    def driver_note(self, machine: str, message: str) -> None:
+        """It was told in its time."""
+
+    def moved(self) -> None:
+        """It was told in its time."""
+
+
+class SimulatedDriver:
+    """The driver of a simulated cell, which begins anew or where its log ends."""
+
+    def __init__(self, plant: Plant, net: Net, log: CellLog | None = None) -> None:
         self.plant = plant
+        self.net = net
         self.sensors = {signal.name for signal in net.signals if signal.kind is SignalKind.SENSOR}
         self.image = {name: Reading(value, 0.0, Quality.GOOD, "") for name, value in plant.shown.items()}
         self.completions = Completions({name: plant.shown[name] for name in plant.shown if name not in self.sensors})
         self.tickets: dict[int, tuple[Place, int]] = {}
         """The commands that the plant is at, with their entry numbers."""
+        self.received: dict[str, int] = {}
+        """Of each place, the entry that was received last."""
         self.done: dict[str, int] = {}
         """Of each place, the entry that was acknowledged last."""
+        self.interrupted: set[tuple[str, int]] = set()
+        """The commands that a stop has ended."""
+        self.stopped = False
+        self.failed = False
         self.next_ticket = 0
         self.clock: Clock | None = None
-        self.listener: Listener | None = None
+        self.listener: Listener = _Nobody()
         self.awake: asyncio.Event = asyncio.Event()
+        self.log: CellLog | None = None
+        for at_seconds, what, arguments in log.past if log is not None else ():
+            self._input(at_seconds, what, *arguments)
+        self.log = log
+        if log is not None and log.past:
+            self._input(log.end_seconds, "start")
 
     @property
     def at_rest(self) -> bool:
@@ -46,8 +80,13 @@ class SimulatedDriver:
         """Let the plant's events happen when they are due."""
         self.clock, self.listener = clock, listener
         loop = asyncio.get_running_loop()
+        if self.log is not None and self.log.past:
+            for signal in self.sensors & self.image.keys():
+                listener.signal(signal, bool(self.image[signal].value), None)
         while True:
-            self._tell(self.plant.advance(clock.now_seconds()))
+            due = self.plant.next_seconds
+            if due is not None and due <= (now := clock.now_seconds()):
+                self._input(now, "advance")
             listener.moved()
             self.awake.clear()
             due = self.plant.next_seconds
@@ -58,61 +97,88 @@ class SimulatedDriver:
 
     def send(self, place: Place, entry: int) -> None:
         """Give the machine its command, under a new ticket."""
-        command = place.command
-        if command is None or self.clock is None:
+        if place.command is None or self.clock is None:
             raise RuntimeError(f"'{place.name}' sends no command, or the driver does not run yet")
-        ticket = self.next_ticket
-        self.next_ticket += 1
-        if place.completion is not None:
-            self.tickets[ticket] = (place, entry)
-            self.completions.commanded(place.completion, entry)
-        now = self.clock.now_seconds()
-        self._tell(self.plant.command(now, command.machine, command.command, dict(command.parameters), ticket))
+        self._input(self.clock.now_seconds(), "send", place.name, entry)
         self.awake.set()
 
     async def ask(self, place: Place, entry: int) -> Answer:
         """What the plant knows of a command: nothing is ever lost on the way to it."""
-        if place.completion is None:
+        if (place.name, entry) in self.interrupted:
             return Answer.UNKNOWN
-        if self.done.get(place.name) == entry:
-            return Answer.WORKING if place.completion in self.completions.awaited else Answer.DONE
-        return Answer.WORKING if (place, entry) in self.tickets.values() else Answer.NOT_RECEIVED
+        if self.received.get(place.name) != entry:
+            return Answer.NOT_RECEIVED
+        if place.completion is None:
+            return Answer.DONE
+        is_done = self.done.get(place.name) == entry and place.completion not in self.completions.awaited
+        return Answer.DONE if is_done else Answer.WORKING
 
     def stop(self) -> None:
         """Stop every machine of the plant where it is."""
-        self.plant.halt()
+        self._input(self.clock.now_seconds() if self.clock is not None else 0.0, "stop")
 
     def close(self) -> None:
         """Let no more workpieces come."""
-        self.plant.close()
+        self._input(self.clock.now_seconds() if self.clock is not None else 0.0, "close")
 
-    def _tell(self, reports: list[PlantReport]) -> None:
+    def _input(self, at_seconds: float, what: str, *arguments: str | int) -> None:
+        """Do something to the cell, after it is in the log."""
+        if self.log is not None:
+            self.log.add(at_seconds, what, *arguments)
+        match what, arguments:
+            case "send", (str(place), int(entry)):
+                self._send(at_seconds, self.net.place(place), entry)
+            case "advance", ():
+                self._tell(at_seconds, self.plant.advance(at_seconds))
+            case "close", ():
+                self.plant.close()
+            case "stop", ():
+                self.stopped = True
+                self.plant.halt()
+                self.interrupted |= {(place.name, entry) for place, entry in self.tickets.values()}
+                self.tickets.clear()
+            case "start", ():
+                if self.stopped and not self.failed:
+                    self.plant.faulted = False
+                self.stopped = False
+            case _:
+                raise ValueError(f"a simulated cell knows no '{what}'")
+
+    def _send(self, at_seconds: float, place: Place, entry: int) -> None:
+        command = place.command
+        if command is None:
+            raise RuntimeError(f"'{place.name}' sends no command")
+        ticket = self.next_ticket
+        self.next_ticket += 1
+        self.received[place.name] = entry
+        self.interrupted.discard((place.name, entry))
+        if place.completion is not None:
+            self.tickets[ticket] = (place, entry)
+            self.completions.commanded(place.completion, entry)
+        sent = self.plant.command(at_seconds, command.machine, command.command, dict(command.parameters), ticket)
+        self._tell(at_seconds, sent)
+
+    def _tell(self, at_seconds: float, reports: list[PlantReport]) -> None:
         for report in reports:
             match report:
                 case SensorChanged(signal, value):
-                    self._sensor(signal, value)
+                    self._sensor(at_seconds, signal, value)
                 case CommandDone(ticket):
                     if (sent := self.tickets.pop(ticket, None)) is not None:
                         place, entry = sent
                         self.done[place.name] = entry
                         self._formed(str(place.completion), self.completions.acknowledged(str(place.completion), entry))
                 case PlantFault(machine, message):
-                    self._listener.driver_fault(machine, message)
+                    self.failed = True
+                    self.listener.driver_fault(machine, message)
 
-    def _sensor(self, signal: str, value: bool) -> None:
-        at_seconds = self.clock.now_seconds() if self.clock is not None else 0.0
+    def _sensor(self, at_seconds: float, signal: str, value: bool) -> None:
         self.image[signal] = Reading(value, at_seconds, Quality.GOOD, "")
         if signal in self.sensors:
-            self._listener.signal(signal, value, None)
+            self.listener.signal(signal, value, None)
         else:
             self._formed(signal, self.completions.shows(signal, value))
 
     def _formed(self, signal: str, entry: int | None) -> None:
         if entry is not None:
-            self._listener.signal(signal, value=True, entry=entry)
-
-    @property
-    def _listener(self) -> Listener:
-        if self.listener is None:
-            raise RuntimeError("the driver does not run yet")
-        return self.listener
+            self.listener.signal(signal, value=True, entry=entry)

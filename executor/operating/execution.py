@@ -9,6 +9,10 @@ When the last mailbox is empty the execution is *quiescent*: that is when markin
 and an operator's step is over. Rejected: threads. They would add every interleaving of two lines of Python to those of
 the protocol, for no gain in one process.
 
+What leaves the process waits for the journal: the acts write to it what they keep, and when the last mailbox is empty,
+or many acts have passed, it is synced once for all of them; then the lines of the trace are written and the commands
+sent. Messages between the tasks do not wait, see `journal`. What a restart then does is in `restart.py`.
+
 Operator's controls. *Pause*: no further firing; rounds that are not decided are aborted, machines end the command they
 are at. *Step*: while paused, one firing. *Stop*: no further firing, ever; what is decided is applied and commanded,
 which takes no time in one process, then the driver drives the safe outputs, which stop every machine where it is.
@@ -18,14 +22,20 @@ which takes no time in one process, then the driver drives the safe outputs, whi
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections import deque
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final, assert_never
 
 from firable.executor.drivers.driver import Driver
+from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.links.link import COORDINATOR
+from firable.executor.operating import restart
 from firable.executor.operating.mailbox import Continue, Mailbox, SignalRead
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import Situation, State, blocked, is_deadlock
+from firable.executor.operating.taken_up import TRACE
+from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.messages import (
@@ -45,8 +55,8 @@ from firable.executor.protocol.messages import (
 )
 from firable.nets.decomposition import Decomposition
 
-COORDINATOR: Final = ""
-"""The mailbox of the coordinator; no controller has the empty name."""
+LINES_AT_ONCE_MAX: Final = 64
+"""So many events, and the commands among them, wait for a sync where acts follow each other without end."""
 
 FIRINGS_AT_ONCE_MAX: Final = 100_000
 """More firings at one instant of virtual time are a net that runs in circles without its cell."""
@@ -82,6 +92,10 @@ class Execution:
         overdue_seconds: float = 120.0,
         is_complete: Callable[[], bool] = lambda: False,
         operator: Callable[[Execution], Awaitable[None]] | None = None,
+        journal: Journal | None = None,
+        resume: bool = False,
+        said: Mapping[str, Answer] | None = None,
+        begin_seconds: float = 0.0,
     ) -> None:
         self.net = decomposition.net
         self.driver = driver
@@ -90,8 +104,19 @@ class Execution:
         self.is_complete = is_complete
         self.operator = operator
         self.speed = speed
-        self.coordinator = Coordinator(decomposition)
-        self.controllers = {s.name: LocalController(decomposition, s.name) for s in decomposition.subnets}
+        self.begin_seconds = begin_seconds
+        self.journal = journal or MemoryJournal()
+        self.coordinator = Coordinator.restored(decomposition, self.journal.kept(COORDINATOR))
+        self.controllers = {
+            s.name: LocalController.restored(decomposition, s.name, self.journal.kept(s.name))
+            for s in decomposition.subnets
+        }
+        self.taking_up: restart.TakingUp | None = None
+        """What a restart has found out, as long as the controllers are held."""
+        if any(controller.held for controller in self.controllers.values()):
+            self.taking_up = restart.TakingUp(said or {}, resume=resume)
+        self.leaving: deque[Sending] = deque()
+        """The commands that wait for the journal."""
         self.owner_of = {signal.name: subnet.name for subnet in decomposition.subnets for signal in subnet.signals}
         self.mailboxes = {name: Mailbox() for name in (COORDINATOR, *self.controllers)}
         self.under_way = 0
@@ -115,13 +140,18 @@ class Execution:
     async def main(self) -> Situation:
         """Run until the work is done, or nothing can go on, or the operator stops; returns how it ended."""
         loop = asyncio.get_running_loop()
-        self.clock = RunClock(loop, loop.time(), self.speed)
+        self.clock = RunClock(loop, loop.time() - self.begin_seconds / self.speed, self.speed)
         self.outcome = loop.create_future()
+        self._act(COORDINATOR, self.coordinator.start())
+        for name, controller in self.controllers.items():
+            self._act(name, controller.start())
         tasks = [
             asyncio.create_task(self._coordinate(), name="coordinator"),
             *(asyncio.create_task(self._control(name), name=name) for name in self.controllers),
             asyncio.create_task(self.driver.run(self.clock, self), name="driver"),
         ]
+        if self.taking_up is not None:
+            tasks.append(asyncio.create_task(restart.take_up(self, self.taking_up), name="restart"))
         if self.operator is not None:
             tasks.append(asyncio.create_task(self._operate(self.operator), name="operator"))
         for task in tasks:
@@ -134,7 +164,8 @@ class Execution:
             self.stop()  # Ctrl-C is the operator's stop: the run ends in order, with its report and its trace
             return await self.outcome
         finally:
-            self.driver.stop()
+            if self.taking_up is None or self.stopping:  # to look at a run that is held changes nothing
+                self.driver.stop()
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -161,6 +192,8 @@ class Execution:
             return Situation(State.FAULT, shown, tuple(blocked(player, word)), self.fault)
         if self.under_way and not self.paused:
             return Situation(State.RUNNING, shown)
+        if self.taking_up is not None:
+            return Situation(State.HELD, shown, (), restart.told(self, self.taking_up))
         if is_deadlock(player, word):
             message = "no transition can fire any more, whatever the signals do"
             return Situation(State.DEADLOCK, shown, tuple(blocked(player, word)), message)
@@ -175,14 +208,17 @@ class Execution:
         if not self.paused:
             self.paused = True
             self.recorder.note(self.now_seconds(), "paused")
-            self._perform(self.coordinator.permit(0))
+            self._act(COORDINATOR, self.coordinator.permit(0))
+            self._settle()
 
     def resume(self) -> None:
-        """Let transitions fire again after a pause."""
+        """Let transitions fire again after a pause, or after a restart once nothing about it is uncertain."""
+        if self.taking_up is not None and not restart.release(self, self.taking_up):
+            return
         if self.paused and not self.stopping:
             self.paused = False
             self.recorder.note(self.now_seconds(), "resumed")
-            self._perform(self.coordinator.permit(None))
+            self._act(COORDINATOR, self.coordinator.permit(None))
             for name in self.controllers:
                 self._post(name, Continue())
 
@@ -200,13 +236,14 @@ class Execution:
             if not self.paused or self.stopping:
                 return None
             if name == COORDINATOR:
-                self._perform(self.coordinator.permit(1))
+                self._act(COORDINATOR, self.coordinator.permit(1))
                 await self.quiet()
                 if self.paused:
-                    self._perform(self.coordinator.permit(0))
+                    self._act(COORDINATOR, self.coordinator.permit(0))
             else:
-                self._perform(self.controllers[name].fire())
-                self._perform(self.controllers[name].report())
+                self._act(name, self.controllers[name].fire())
+                self._act(name, self.controllers[name].report())
+            self._settle()
             await self.quiet()
             fired = [t for t, count in self.recorder.firings.items() if count > before[t]]
             if fired:
@@ -224,7 +261,7 @@ class Execution:
             return
         self.stopping = self.paused = True
         self.recorder.note(self.now_seconds(), "stopped by the operator")
-        self._perform(self.coordinator.permit(0))
+        self._act(COORDINATOR, self.coordinator.permit(0))
         self._settle()
 
     async def quiet(self) -> None:
@@ -233,6 +270,23 @@ class Execution:
             waiter = asyncio.get_running_loop().create_future()
             self.quiet_waiters.append(waiter)
             await waiter
+
+    # A restart (`restart.py`)
+
+    def answered(self, name: str, place: str, entry: int, answer: Answer) -> None:
+        """A driver, or an operator, has said what became of a command from before the restart."""
+        self._act(name, self.controllers[name].answer(place, entry, answer))
+        if answer is Answer.WORKING:
+            self.watch(place)
+        self._settle()
+
+    def released(self) -> None:
+        """The operator has resumed the run after a restart: what is owed is sent, and what is enabled fires."""
+        self.taking_up = None
+        self.recorder.note(self.now_seconds(), "taken up")
+        for name, controller in self.controllers.items():
+            self._act(name, controller.resume())
+            self._post(name, Continue())
 
     # What the driver tells
 
@@ -262,7 +316,7 @@ class Execution:
             await box.wait()
             match box.items.popleft():
                 case Report() | Vote() | Acknowledgement() as message:
-                    self._perform(self.coordinator.receive(message))
+                    self._act(COORDINATOR, self.coordinator.receive(message))
                 case unknown:
                     raise ProtocolError(f"the coordinator was sent {unknown!r}")
             self._handled()
@@ -273,18 +327,18 @@ class Execution:
             await box.wait()
             match box.items.popleft():
                 case VoteRequest() | Decision() | Hello() as message:
-                    self._perform(controller.receive(message))
+                    self._act(name, controller.receive(message))
                 case SignalRead(signal, value, entry):
-                    self._perform(controller.read(signal, value, entry))
+                    self._act(name, controller.read(signal, value, entry))
                 case Continue():
                     pass  # to fire is what every message leads to
                 case unknown:
                     raise ProtocolError(f"'{name}' was sent {unknown!r}")
             fired = [] if self.paused else controller.fire()
             if fired:
-                self._perform(fired)
+                self._act(name, fired)
                 self._post(name, Continue())
-            self._perform(controller.report())
+            self._act(name, controller.report())
             self._handled()
             if fired:
                 await asyncio.sleep(0)  # the others' turn, and the operator's, even where firing never ends
@@ -305,15 +359,21 @@ class Execution:
 
     # Effects
 
-    def _perform(self, effects: list[Effect]) -> None:
+    def _act(self, machine: str, effects: list[Effect]) -> None:
+        """Do what an act of a machine wants done: what it keeps goes before what it says."""
+        self.journal.write(machine, effects)
         for effect in effects:
             match effect:
                 case Firing(transition):
                     self._fired(transition)
                 case Taken(signal, value):
                     self.recorder.signal(self.now_seconds(), signal, value)
-                case Sending(place, entry):
-                    self._send(place, entry)
+                case Sending(place, again=again):
+                    if again:  # its line stands in the trace since before the restart
+                        self.recorder.note(self.now_seconds(), "sent again", place=place)
+                    else:
+                        self.recorder.sent(self.now_seconds(), place)
+                    self.leaving.append(effect)
                 case VoteRequest() | Decision() | Hello():
                     self.messages += 1
                     self._post(effect.controller, effect)
@@ -321,7 +381,7 @@ class Execution:
                     self.messages += 1
                     self._post(COORDINATOR, effect)
                 case Keep():
-                    pass  # without a journal, what a crash would lose is lost
+                    pass  # the journal has it
                 case _:
                     assert_never(effect)
 
@@ -333,17 +393,35 @@ class Execution:
         if self.fired_at_once > FIRINGS_AT_ONCE_MAX:
             self._fail(f"'{transition}' and others fire without end, and no time passes: no gate ever holds them")
 
-    def _send(self, place: str, entry: int) -> None:
-        # The line comes first: what the machine answers is written behind it.
-        self.recorder.sent(self.now_seconds(), place)
-        sender = self.net.place(place)
-        if sender.completion is not None:
-            if (earlier := self.overdue.pop(sender.completion, None)) is not None:
+    def _commit(self) -> None:
+        """Make durable what the machines have done; only then does anything of it leave."""
+        if self.recorder.waiting:
+            self.journal.write(TRACE, self.recorder.keeping)
+        try:
+            self.journal.sync()
+        except BaseException:
+            self.leaving.clear()  # the run ends, and nothing of this is ever sent
+            raise
+        self.recorder.flush()
+        while self.leaving:
+            self._send(self.leaving.popleft())
+
+    def _send(self, sending: Sending) -> None:
+        sender = self.net.place(sending.place)
+        self.watch(sending.place)
+        self.driver.send(sender, sending.entry)
+        owner = str(sender.owner)
+        self._act(owner, self.controllers[owner].sent(sending.place, sending.entry))
+
+    def watch(self, place: str) -> None:
+        """Give the alarm where the command of a place is not completed in time, from now on."""
+        completion = self.net.place(place).completion
+        if completion is not None:
+            if (earlier := self.overdue.pop(completion, None)) is not None:
                 earlier.cancel()
-            self.overdue[sender.completion] = asyncio.get_running_loop().call_later(
+            self.overdue[completion] = asyncio.get_running_loop().call_later(
                 self.overdue_seconds / self.speed, self._alarm, place, self.now_seconds()
             )
-        self.driver.send(sender, entry)
 
     def _alarm(self, place: str, sent_at: float) -> None:
         try:
@@ -364,7 +442,7 @@ class Execution:
             self.fault = message
             self.stopping = self.paused = True  # first, so that nothing fires whatever happens to the trace
             self.recorder.note(self.now_seconds(), "fault", message=message)
-            self._perform(self.coordinator.permit(0))
+            self._act(COORDINATOR, self.coordinator.permit(0))
             self._settle()
 
     def _post(self, mailbox: str, item: Message | SignalRead | Continue) -> None:
@@ -373,13 +451,18 @@ class Execution:
 
     def _handled(self) -> None:
         self.under_way -= 1
+        if self.recorder.waiting >= LINES_AT_ONCE_MAX or len(self.leaving) >= LINES_AT_ONCE_MAX:
+            self._commit()
         self._settle()
 
     # Quiescence
 
     def _settle(self) -> None:
-        """At quiescence, wake who waits for it, and end the run if nothing more will happen."""
-        if self.under_way or self.outcome is None or self.outcome.done():
+        """At quiescence, let leave what waits for it, wake who waits for it, and end the run if nothing will happen."""
+        if not self._is_quiet():
+            return
+        self._commit()
+        if not self._is_quiet() or self.outcome is None:  # a machine has answered at once
             return
         for waiter in self.quiet_waiters:
             if not waiter.done():
@@ -387,15 +470,19 @@ class Execution:
         self.quiet_waiters.clear()
         ended = self._ended()
         if ended is not None:
+            self._commit()
             self.outcome.set_result(ended)
-        else:
-            self.recorder.flush()
+
+    def _is_quiet(self) -> bool:
+        return not self.under_way and self.outcome is not None and not self.outcome.done()
 
     def _ended(self) -> Situation | None:
         if self.fault:
             return self.situation()
         if self.stopping:
             return replace(self.situation(), state=State.STOPPED, message="stopped by the operator")
+        if self.taking_up is not None:
+            return self.situation() if self.taking_up.is_final and not self.operated else None
         # What a pause holds back still has to fire before the cycle, or the work, is at its end.
         if self.at_rest and self.draining and not self.paused:
             return replace(self.situation(), state=State.STOPPED, message="stopped at the end of the cycle")

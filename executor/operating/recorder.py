@@ -5,16 +5,24 @@ coordinator's decision, a local one where it occurs. That order is a trace of th
 recorder plays it along and is where a running executor is asked for its marking. It is flushed whenever the
 run waits, so that who follows the file sees what has happened; a line that a killed run leaves half written is no line
 of the trace.
+
+A line is written to its file only once what it tells is durable, or a trace could show what a restart has forgotten.
+Then a process that is killed between the two leaves a trace without its last lines. So the journal keeps, with each
+group of acts, the lines of that group and where in the file they begin: a restart cuts the file there and writes them
+again, and the trace goes on as if nothing had happened. The last line is not kept: it stands there until the run is
+taken up again.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Protocol
+from typing import Final, Protocol
 
+from firable.executor.protocol.messages import Keep, Stored
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
@@ -35,12 +43,21 @@ class LineStream(Protocol):
 
 
 class TraceFile:
-    """A trace on disk, opened anew: whatever fails here is `InputError` F1017, and no other error is taken for it."""
+    """A trace on disk, opened anew, or cut after `size_bytes` bytes: what fails is `InputError` F1017, nothing else."""
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(self, path: Path | str, size_bytes: int = 0) -> None:
         self.path = path
         with self._failures():
-            self.stream = Path(path).open("w", encoding="utf-8")  # noqa: SIM115 - open as long as this object is
+            self.stream = Path(path).open("r+" if size_bytes else "w", encoding="utf-8")  # noqa: SIM115 - kept open
+            if size_bytes:
+                self._cut(size_bytes)
+
+    def _cut(self, size_bytes: int) -> None:
+        if self.stream.seek(0, os.SEEK_END) < size_bytes:
+            self.stream.close()
+            raise ValueError("it is shorter than its journal says; was it changed, or the power cut?")
+        self.stream.truncate(size_bytes)
+        self.stream.seek(size_bytes)
 
     def write(self, line: str, /) -> None:
         """Write a line with its end."""
@@ -67,17 +84,49 @@ class TraceFile:
             raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
 
 
-class Recorder:
-    """The trace so far, its marking and its counts."""
+KEY: Final = "trace"
+"""Under which the journal keeps what a restart needs to go on with a trace."""
 
-    def __init__(self, net: Net, digest: str, stream: LineStream | None) -> None:
+
+class Recorder:
+    """The trace so far, its marking and its counts, which are of this process.
+
+    `kept` is what `keeping` gave the journal before a restart; the stream then stands at `size_bytes_of(kept)`.
+    """
+
+    def __init__(self, net: Net, digest: str, stream: LineStream | None, kept: Stored | None = None) -> None:
         self.player = TokenPlayer.of(net)
         self.word = net.initial_marking
         self.stream = stream
         self.firings: dict[str, int] = {transition.name: 0 for transition in net.transitions}
         self.commands = 0
-        self.unflushed = False
-        self._write(Header(net.name, digest, signals=True, commands=True))
+        self.size_bytes = 0
+        """Of the stream without the lines that are not written yet."""
+        self.at_seconds = 0.0
+        self.unwritten: list[str] = []
+        self.waiting = 0
+        """How many events were recorded since the last flush."""
+        if isinstance(kept, Mapping):
+            self.word = int(str(kept["word"]), 16)
+            self.at_seconds = float(str(kept["at"]))
+            if stream is not None:
+                self.size_bytes = size_bytes_of(kept)
+                self.unwritten = str(kept["lines"]).splitlines(keepends=True)
+            self.note(self.at_seconds, "restarted")
+        else:
+            self._write(Header(net.name, digest, signals=True, commands=True))
+
+    @property
+    def keeping(self) -> list[Keep]:
+        """What the journal keeps, together with the acts that the unwritten lines tell."""
+        lines = "".join(self.unwritten)
+        now: dict[str, Stored] = {
+            "at": repr(self.at_seconds),
+            "word": f"{self.word:x}",
+            "size_bytes": self.size_bytes,
+            "lines": lines,
+        }
+        return [Keep(KEY, now)]
 
     @property
     def marking(self) -> Marking:
@@ -108,15 +157,26 @@ class Recorder:
     def end(self, at_seconds: float, reason: str) -> None:
         """The last line."""
         self._write(End(at_seconds, self.player.net.names(self.marking), reason))
-        self.flush()
+        self.flush()  # not kept: a run that is taken up again goes on before it
 
     def flush(self) -> None:
-        """Hand the lines so far over to who follows the file."""
-        if self.stream is not None and self.unflushed:
+        """Write the lines so far, and hand them over to who follows the file."""
+        if self.stream is not None and self.unwritten:
+            for line in self.unwritten:
+                self.stream.write(line)
+                self.size_bytes += len(line)
+            self.unwritten.clear()
             self.stream.flush()
-            self.unflushed = False
+        self.waiting = 0
 
     def _write(self, item: Header | Event | End) -> None:
+        self.waiting += 1
+        if not isinstance(item, Header):
+            self.at_seconds = item.at_seconds
         if self.stream is not None:
-            self.stream.write(json.dumps(item.to_json()) + "\n")
-            self.unflushed = True
+            self.unwritten.append(json.dumps(item.to_json()) + "\n")  # in ASCII: as many bytes as characters
+
+
+def size_bytes_of(kept: Stored | None) -> int:
+    """Where the stream has to stand for a recorder to go on."""
+    return int(str(kept["size_bytes"])) if isinstance(kept, Mapping) else 0

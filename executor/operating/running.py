@@ -13,7 +13,7 @@ import asyncio
 import signal
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
-from contextlib import closing, nullcontext, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,12 +22,13 @@ from firable.executor.cell.plant import Disturbance, Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.operating.execution import Execution
-from firable.executor.operating.recorder import LineStream, Recorder, TraceFile
+from firable.executor.operating.recorder import LineStream
 from firable.executor.operating.situation import Situation, State
+from firable.executor.operating.taken_up import opened
+from firable.executor.protocol.commands import Answer
 from firable.nets.bundle import Bundle, read_bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.interchange import net_digest
 from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.nets.net import Net
 from firable.nets.right_to_run import unproved
@@ -99,27 +100,38 @@ def run(
     overdue_seconds: float = 120.0,
     disturbances: Iterable[Disturbance] = (),
     operator: Operator | None = None,
+    journal_path: Path | str | None = None,
+    resume: bool = False,
+    said: Mapping[str, Answer] | None = None,
 ) -> RunReport:
     """Run a bundle on the simulated cell of a plant until `workpieces` workpieces have gone through.
 
+    With a journal, a run whose process was killed is taken up where it was. It is held then, and ends at once as
+    `State.HELD`, unless an operator is there, or `resume` says beforehand that it may go on as soon as each command is
+    accounted for; `said` gives the operator's word on those that no machine can tell of, by place.
+
     `speed` None is virtual time, 1.0 real time, 10.0 ten times as fast. A command that is not completed within
     `overdue_seconds` (of the cell's time) is a fault. Raises `InputError` F5002 where the bundle is not proved, F5003
-    where the plant does not fit it, both before a file is touched; F1017 where the trace cannot be written.
+    where the plant does not fit it, both before a file is touched; F1017 where the trace cannot be written, and F5031
+    to F5035 where the journal or the simulated cell cannot be gone on with.
     """
     # A run that is refused has touched no file.
     _check(plant, bundle.net, workpieces, speed, overdue_seconds, unproved(bundle))
-    with nullcontext() if trace_path is None else closing(TraceFile(trace_path)) as trace:
-        return execute(
-            bundle.decomposition,
-            plant,
-            workpieces=workpieces,
-            seed=seed,
-            speed=speed,
-            trace=trace,
-            overdue_seconds=overdue_seconds,
-            disturbances=disturbances,
-            operator=operator,
-        )
+    return execute(
+        bundle.decomposition,
+        plant,
+        workpieces=workpieces,
+        seed=seed,
+        speed=speed,
+        trace=trace_path,
+        overdue_seconds=overdue_seconds,
+        disturbances=disturbances,
+        operator=operator,
+        journal_path=journal_path,
+        digest=bundle.digest,
+        resume=resume,
+        said=said,
+    )
 
 
 def execute(
@@ -129,30 +141,38 @@ def execute(
     workpieces: int,
     seed: int = 0,
     speed: float | None = None,
-    trace: LineStream | None = None,
+    trace: LineStream | Path | str | None = None,
     overdue_seconds: float = 120.0,
     disturbances: Iterable[Disturbance] = (),
     operator: Operator | None = None,
+    journal_path: Path | str | None = None,
+    digest: str = "",
+    resume: bool = False,
+    said: Mapping[str, Answer] | None = None,
 ) -> RunReport:
     """Run a decomposition, proved or not, on the simulated cell of a plant; parameters as for `run`.
 
-    Raises `InputError` F5003 where the plant does not fit the net.
+    `digest` names what runs, in the journal. Raises `InputError` F5003 where the plant does not fit the net.
     """
     _check(plant, decomposition.net, workpieces, speed, overdue_seconds)
     cell = Plant(plant, workpieces=workpieces, seed=seed, disturbances=disturbances)
-    recorder = Recorder(decomposition.net, net_digest(decomposition.net), trace)
-    execution = Execution(
-        decomposition,
-        SimulatedDriver(cell, decomposition.net),
-        recorder,
-        speed=1.0 if speed is None else speed,
-        overdue_seconds=overdue_seconds,
-        is_complete=lambda: len(cell.delivered) == workpieces,
-        operator=operator,
-    )
-    main = _terminable(execution)
-    situation = run_in_virtual_time(main) if speed is None else asyncio.run(main)
-    recorder.end(execution.now_seconds(), situation.state.value)
+    with opened(decomposition, digest, plant, workpieces, seed, journal_path, trace) as files:
+        execution = Execution(
+            decomposition,
+            SimulatedDriver(cell, decomposition.net, files.cell),
+            files.recorder,
+            speed=1.0 if speed is None else speed,
+            overdue_seconds=overdue_seconds,
+            is_complete=lambda: len(cell.delivered) == workpieces,
+            operator=operator,
+            journal=files.journal,
+            resume=resume,
+            said=said,
+            begin_seconds=files.begin_seconds,
+        )
+        main = _terminable(execution)
+        situation = run_in_virtual_time(main) if speed is None else asyncio.run(main)
+        files.recorder.end(execution.now_seconds(), situation.state.value)
     delivered = tuple(workpiece.id for workpiece in cell.delivered)
     seen = Counter((*delivered, *cell.inside))
     return RunReport(
@@ -161,8 +181,8 @@ def execute(
         cell.inside,
         lost=tuple(i for i in range(1, cell.entered + 1) if i not in seen),
         doubled=tuple(sorted(i for i, times in seen.items() if times > 1)),
-        firings=recorder.firings,
-        commands=recorder.commands,
+        firings=files.recorder.firings,
+        commands=files.recorder.commands,
         messages=execution.messages,
         simulated_seconds=execution.now_seconds(),
     )

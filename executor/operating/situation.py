@@ -5,6 +5,8 @@ Asked at quiescence, when no message is under way, the joint marking and the pro
 - *deadlock*: no transition is firable and openable. Nothing that a machine or an operator does will change that;
 - *waiting*: some transition is firable and an external gate of it is closed, because a machine is at work or a sensor
   has seen nothing;
+- *held*: after a restart; nothing moves until an operator resumes, and nothing can be resumed while it is unknown what
+  became of a command;
 - *fault*: the driver reported one, or a command is overdue: sent longer ago than its limit and not completed. A net
   cannot tell a slow machine from a dead one; only time does, so a fault is never concluded from the marking.
 """
@@ -26,6 +28,7 @@ class State(StrEnum):
     DEADLOCK = "deadlock"
     FAULT = "fault"
     PAUSED = "paused"
+    HELD = "held"
     STOPPED = "stopped"
     DONE = "done"
 

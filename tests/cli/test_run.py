@@ -187,3 +187,61 @@ def test_a_trace_does_not_go_to_standard_output(
     assert list(tmp_path.iterdir()) == []
     assert main(["run", bundle, "--workpieces", "1", "--trace", "./-"]) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["-"]
+
+
+def killed(bundle: str, folder: Path) -> tuple[str, ...]:
+    """The options of a run in real time that was killed after some of its commands."""
+    options = ("--workpieces", "2", "--journal", str(folder / "cell.journal"), "--trace", str(folder / "trace"))
+    command = [sys.executable, "-m", "firable.cli", "run", bundle, "--speed", "10", *options]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as running:
+        try:
+            while not (folder / "trace").exists() or (folder / "trace").read_text().count("command") < 8:
+                assert running.poll() is None
+                time.sleep(0.02)
+        finally:
+            running.kill()
+    return options
+
+
+def test_a_run_that_was_killed_is_held_until_the_operator_takes_it_up(bundle: str, tmp_path: Path) -> None:
+    options = killed(bundle, tmp_path)
+    held = typed("", bundle, *options)
+    assert held.returncode == 3
+    assert "nothing moves until it is resumed" in held.stdout
+    assert "0 commands to machines" in held.stdout
+    left = typed("s\n", bundle, *options, "--step", "--format", "json")
+    assert "nothing moves until it is resumed" in left.stderr
+    assert json.loads(left.stdout)["reports"][0]["run"]["state"] == "stopped"
+
+
+def test_a_run_that_was_killed_goes_on_by_the_operators_key(bundle: str, tmp_path: Path) -> None:
+    options = killed(bundle, tmp_path)
+    done = typed("r\nr\n", bundle, *options, "--step")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "2 workpieces carried through, 0 lost, 0 doubled" in done.stdout
+    assert {"restarted", "taken up"} <= set(notes_of(tmp_path / "trace"))
+
+
+def test_a_trace_in_the_file_of_the_journal_is_refused(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    journal = str(tmp_path / "cell.journal")
+    for trace in (journal, f"{journal}.cell"):
+        assert main(["run", bundle, "--journal", journal, "--trace", trace]) == 2
+        assert "the trace would overwrite what the run reads" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--say", "mc.fix=done"), "name its --journal"),
+        (("--say", "mc.fi=done", "--journal", "j"), "did you mean 'mc.fix'?"),
+        (("--say", "mc.fix=perhaps", "--journal", "j"), "say done, working, not-received"),
+    ],
+)
+def test_a_word_on_no_command_is_refused(
+    options: tuple[str, ...], words: str, bundle: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", bundle, *options]) == 2
+    assert words in capsys.readouterr().err

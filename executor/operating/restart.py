@@ -1,0 +1,84 @@
+"""Taking up a run after a restart: what became of each command is asked, and nothing moves before an operator says so.
+
+The controllers come back from the journal *held* (`protocol.controller`). For every command that was issued and is not
+known to be over, the driver is asked. *Done*: the completion is taken in. *Working*: it will come. *Not received*: it
+is sent when the run is resumed, under the number it has. *Unknown*: only a person who looks at the machine can tell,
+and until somebody has, the run cannot be resumed. A guess would be a command given twice, or never.
+
+What a person says counts only where the driver does not know: machines are believed before people.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+from firable.executor.protocol.commands import Answer
+
+if TYPE_CHECKING:
+    from firable.executor.operating.execution import Execution
+
+_TELLS: Final = {
+    Answer.DONE: "is done",
+    Answer.WORKING: "is being done",
+    Answer.NOT_RECEIVED: "has not reached its machine, and will be sent when the run is resumed",
+    Answer.UNKNOWN: "was issued, and nobody knows what became of it",
+}
+
+
+@dataclass
+class TakingUp:
+    """What the operator has said beforehand, and what the drivers have answered."""
+
+    said: Mapping[str, Answer]
+    resume: bool
+    """Whether to resume as soon as nothing is uncertain."""
+    answers: dict[str, Answer] = field(default_factory=dict)
+    """For each place whose command was asked after."""
+    is_final: bool = False
+    """Whether everything has been asked."""
+
+
+async def take_up(run: Execution, found: TakingUp) -> None:
+    """Ask after each command; then resume, if that was said beforehand and nothing is uncertain."""
+    for name, controller in run.controllers.items():
+        for place, entry in controller.commands.questions:
+            answer = await run.driver.ask(run.net.place(place), entry)
+            if answer is Answer.UNKNOWN:
+                answer = found.said.get(place, answer)
+            found.answers[place] = answer
+            run.recorder.note(run.now_seconds(), "asked after", place=place, answer=answer.value)
+            run.answered(name, place, entry, answer)
+    await run.quiet()
+    found.is_final = True
+    if found.resume:
+        release(run, found)
+    run.moved()
+
+
+def release(run: Execution, found: TakingUp) -> bool:
+    """End the hold, which sends what is owed; False where something is uncertain, and everything stays as it is."""
+    if not found.is_final or uncertain(run):
+        return False
+    run.released()
+    return True
+
+
+def uncertain(run: Execution) -> list[str]:
+    """The places with a command of which nobody knows what became of it."""
+    return [place for controller in run.controllers.values() for place, _ in controller.commands.questions]
+
+
+def told(run: Execution, found: TakingUp) -> str:
+    """The hold in words: each command that is not over, and what there is to do."""
+    lines = ["the run was interrupted, and is taken up where it was; nothing moves until it is resumed"]
+    for place, answer in found.answers.items():
+        lines.append(f"'{run.net.place(place).command}' of '{place}' {_TELLS[answer]}")
+    owed = [place for controller in run.controllers.values() for place, _ in controller.commands.owed]
+    for place in owed:
+        if place not in found.answers:
+            lines.append(f"'{run.net.place(place).command}' of '{place}' was decided and not sent; it will be")
+    if open_ := uncertain(run):
+        lines.append(f"look at the machine and say what it did: --say {open_[0]}=done, =working or =not-received")
+    return "; ".join(lines)

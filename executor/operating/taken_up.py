@@ -1,0 +1,113 @@
+"""The files of a run that can be taken up: its journal, its simulated cell, and its trace, opened so that they agree.
+
+    cell.journal               what the machines keep, in SQLite
+    cell.journal.generation    how many syncs it has seen: it notices what SQLite does not
+    cell.journal.cell          what was done to the simulated cell: it outlives the process, as machines do
+
+Whatever cannot go on from where the last process was is refused, rather than begun anew beside machines that are
+somewhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from firable.executor.cell.cell_log import CellLog
+from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.journal.sqlite_journal import SqliteJournal
+from firable.executor.links.link import COORDINATOR
+from firable.executor.operating.recorder import KEY, LineStream, Recorder, TraceFile, size_bytes_of
+from firable.executor.protocol.messages import Stored
+from firable.executor.protocol.token_player import TokenPlayer
+from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.interchange import net_digest
+from firable.nets.machines.plant_file import PlantModel
+from firable.nets.net import Marking
+from firable.nets.source import printable
+
+TRACE = "\ntrace"
+"""The name under which the journal keeps the trace; no machine has it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Files:
+    """What a run writes, and where it goes on."""
+
+    journal: Journal
+    recorder: Recorder
+    cell: CellLog | None
+    begin_seconds: float
+
+
+@contextmanager
+def opened(
+    decomposition: Decomposition,
+    digest: str,
+    plant: PlantModel,
+    workpieces: int,
+    seed: int,
+    journal_path: Path | str | None,
+    trace: LineStream | Path | str | None,
+) -> Iterator[Files]:
+    """The files of a run, for as long as it lasts; without a journal nothing is taken up.
+
+    Raises `InputError` F5031-F5034 for a journal that cannot be gone on with, F5035 for a simulated cell of another
+    run, F1017 for a trace that cannot be written or does not go on where it was.
+    """
+    net = decomposition.net
+    with ExitStack() as stack:
+        journal: Journal = MemoryJournal()
+        cell = None
+        if journal_path is not None:
+            names = [COORDINATOR, *(subnet.name for subnet in decomposition.subnets)]
+            journal = stack.enter_context(closing(SqliteJournal(journal_path, digest, names)))
+            cell = stack.enter_context(closing(CellLog(f"{journal_path}.cell", plant, workpieces, seed)))
+        kept = journal.kept(TRACE).get(KEY)
+        begun = any(journal.kept(subnet.name) for subnet in decomposition.subnets)
+        if cell is not None and begun and kept is not None and not cell.past:
+            _refuse_lost_cell(cell.path)
+        if isinstance(trace, Path | str):
+            if begun:
+                _demand_the_same(trace, kept)
+            trace = stack.enter_context(closing(TraceFile(trace, size_bytes_of(kept))))
+        recorder = Recorder(net, net_digest(net), trace, kept)
+        if begun and kept is None:
+            recorder.word = _joint(decomposition, journal)
+        yield Files(journal, recorder, cell, max(recorder.at_seconds, cell.end_seconds if cell is not None else 0.0))
+
+
+def _demand_the_same(path: Path | str, kept: Stored | None) -> None:
+    """A trace goes on in the file in which it was begun, or it would not be a trace of the net."""
+    if size_bytes_of(kept) or _lines_of(kept):
+        if Path(path).exists() or not size_bytes_of(kept):
+            return
+        message = f"{printable(str(path))}: the trace of this run is not there, and cannot be begun in the middle"
+        hint = "name the file in which the trace was begun, or leave --trace out"
+    else:
+        message = f"{printable(str(path))}: this run was begun without a trace, which cannot be begun in the middle"
+        hint = "leave --trace out, or begin with a new journal"
+    raise InputError([Diagnostic("F1017", message, hint)])
+
+
+def _lines_of(kept: Stored | None) -> str:
+    return str(kept["lines"]) if isinstance(kept, dict) else ""
+
+
+def _refuse_lost_cell(path: Path) -> None:
+    message = f"{printable(str(path))}: the simulated cell of this journal is empty or gone"
+    hint = "put it back, or begin with a new journal: its machines would not be where the journal left them"
+    raise InputError([Diagnostic("F5035", message, hint)])
+
+
+def _joint(decomposition: Decomposition, journal: Journal) -> Marking:
+    """The marking that the controllers have kept, where no trace tells it: after a takeover."""
+    held: list[str] = []
+    for subnet in decomposition.subnets:
+        word = journal.kept(subnet.name).get("word")
+        marking = subnet.initial_marking if word is None else TokenPlayer.of(subnet).marking(int(str(word), 16))
+        held += subnet.names(marking)
+    return decomposition.net.marking(held)

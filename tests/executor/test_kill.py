@@ -1,0 +1,199 @@
+"""Runs that are killed (SIGKILL) at any moment and taken up: nothing is lost, nothing done twice, nothing guessed."""
+
+import asyncio
+import json
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.cells import decomposition_of, plant_of
+from support.examples import seeds
+
+from firable.executor import State, execute
+from firable.executor.operating.running import Operator, RunReport
+from firable.executor.protocol.commands import Answer
+from firable.nets.diagnostics import InputError
+from firable.semantics.replaying import replay
+from firable.semantics.trace import CommandSent, Fired, Noted, Trace, read_trace
+
+TESTS = Path(__file__).parent.parent
+
+
+def lives(folder: Path, cell: str, workpieces: int, seed: int) -> dict[str, Any]:
+    """What `support/killing.py` says at the end of many processes."""
+    arguments = [str(folder), cell, str(workpieces), str(seed)]
+    command = [sys.executable, str(TESTS / "support" / "killing.py"), *arguments]
+    path = {"PYTHONPATH": ":".join([str(TESTS), *sys.path])}
+    ended = subprocess.run(command, capture_output=True, text=True, env=path, check=False, timeout=300)
+    assert ended.returncode == 0, ended.stderr
+    said: dict[str, Any] = json.loads(ended.stdout.splitlines()[-1])
+    assert said["code"] == 0, ended.stderr
+    return said
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("cell", ["one_robot", "two_robots_shared"])
+def test_cell_whose_controllers_are_killed_again_and_again_does_all_its_work_once(cell: str, tmp_path: Path) -> None:
+    for seed in seeds(2):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        ended = lives(folder, cell, 4, seed)
+        assert ended["killed"] > 2
+        assert (ended["state"], ended["delivered"], ended["lost"], ended["doubled"]) == ("done", [1, 2, 3, 4], [], [])
+        trace = read_trace(folder / "trace.jsonl")
+        replayed = replay(decomposition_of(cell).net, trace)  # each command once for each entry, too
+        assert replayed.complete
+        fired = Counter(t for event in trace.events if isinstance(event, Fired) for t in event.transitions)
+        assert set(fired.values()) == {4}
+        told = [event.place for event in trace.events if isinstance(event, CommandSent)]
+        inputs = [json.loads(line) for line in (folder / "cell.journal.cell").read_text("utf-8").splitlines()[1:]]
+        received = [(place, entry) for _, what, *rest in inputs if what == "send" for place, entry in [rest]]
+        assert len(set(received)) == len(received), "a machine was commanded twice for one entry"
+        assert Counter(place for place, _ in received) == Counter(told)
+
+
+def run_here(
+    folder: Path,
+    *,
+    seconds: float | None = None,
+    operator: Operator | None = None,
+    trace: str | None = "trace.jsonl",
+    workpieces: int = 2,
+    **options: Any,
+) -> tuple[RunReport, Trace | None]:
+    """A run with a journal, or its taking up; with `seconds`, the operator stops it then."""
+
+    async def stops(execution: Any) -> None:
+        await asyncio.sleep(seconds or 0)
+        execution.stop()
+
+    report = execute(
+        decomposition_of("one_robot"),
+        plant_of("one_robot"),
+        workpieces=workpieces,
+        trace=folder / trace if trace else None,
+        journal_path=folder / "cell.journal",
+        digest="d",
+        operator=operator or (stops if seconds is not None else None),
+        **options,
+    )
+    return report, read_trace(folder / trace) if trace else None
+
+
+def refused(folder: Path, **options: Any) -> tuple[str, str]:
+    with pytest.raises(InputError) as caught:
+        run_here(folder, **options)
+    (diagnostic,) = caught.value.diagnostics
+    return diagnostic.code, diagnostic.message
+
+
+def test_restart_moves_nothing_and_says_what_became_of_each_command(tmp_path: Path) -> None:
+    run_here(tmp_path, seconds=20.0)
+    report, trace = run_here(tmp_path)
+    assert report.state is State.HELD
+    assert "nothing moves until it is resumed" in report.situation.message
+    assert "was issued, and nobody knows what became of it" in report.situation.message
+    assert trace is not None
+    notes = [i for i, event in enumerate(trace.events) if isinstance(event, Noted) and event.note == "restarted"]
+    assert not [event for event in trace.events[notes[0] :] if isinstance(event, Fired | CommandSent)]
+
+
+def test_run_is_not_resumed_on_a_guess_and_goes_on_when_the_operator_has_said(tmp_path: Path) -> None:
+    run_here(tmp_path, seconds=20.0)
+    report, _ = run_here(tmp_path, resume=True)
+    assert report.state is State.HELD
+    unknown = [part.split("'")[3] for part in report.situation.message.split("; ") if "nobody knows" in part]
+    assert f"--say {unknown[0]}=done" in report.situation.message
+    said = dict.fromkeys(unknown, Answer.NOT_RECEIVED)
+    report, trace = run_here(tmp_path, resume=True, said=said)
+    assert (report.state, report.delivered) == (State.DONE, (1, 2))
+    assert trace is not None
+    assert replay(decomposition_of("one_robot").net, trace).complete
+    again = [event.data["place"] for event in trace.events if isinstance(event, Noted) and event.note == "sent again"]
+    assert again == unknown
+
+
+def test_operator_who_is_there_resumes_a_run(tmp_path: Path) -> None:
+    async def resumes(execution: Any) -> None:
+        await execution.quiet()
+        assert execution.situation().state is State.HELD
+        while execution.situation().state is State.HELD:
+            await asyncio.sleep(0.1)
+            execution.resume()
+
+    left = half_done(tmp_path)
+    looked = run_here(left)[0].situation  # to look changes nothing
+    assert looked.state is State.HELD
+    assert run_here(left)[0].situation.marking == looked.marking
+    report, _ = run_here(left, operator=resumes)
+    assert (report.state, report.delivered) == (State.DONE, (1, 2))
+
+
+def half_done(folder: Path) -> Path:
+    """What a run leaves that is killed after a while."""
+    killed = folder / "killed"
+    killed.mkdir()
+    arguments = [str(killed), "one_robot", "2", "0", "600"]
+    program = (
+        "import sys; from pathlib import Path; from support.killing import live;"
+        "live(Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), int(sys.argv[5]))"
+    )
+    path = {"PYTHONPATH": ":".join([str(TESTS), *sys.path])}
+    ended = subprocess.run([sys.executable, "-c", program, *arguments], env=path, check=False, timeout=60)
+    assert ended.returncode == -9
+    return killed
+
+
+def test_run_that_is_done_is_done_when_it_is_taken_up(tmp_path: Path) -> None:
+    run_here(tmp_path)
+    report, trace = run_here(tmp_path, resume=True)
+    assert (report.state, report.delivered) == (State.DONE, (1, 2))
+    assert trace is not None
+    assert replay(decomposition_of("one_robot").net, trace).complete
+
+
+def test_cell_of_other_workpieces_is_not_taken_up(tmp_path: Path) -> None:
+    run_here(tmp_path, seconds=5.0)
+    code, message = refused(tmp_path, workpieces=3)
+    assert code == "F5035"
+    assert "not of 3 workpieces" in message
+
+
+def test_journal_whose_cell_is_gone_is_not_taken_up(tmp_path: Path) -> None:
+    run_here(tmp_path, seconds=5.0)
+    (tmp_path / "cell.journal.cell").unlink()
+    assert refused(tmp_path)[0] == "F5035"
+
+
+def test_log_of_a_cell_that_is_damaged_is_refused(tmp_path: Path) -> None:
+    run_here(tmp_path, seconds=5.0)
+    log = tmp_path / "cell.journal.cell"
+    log.write_text(log.read_text("utf-8") + "[1.0]\n", "utf-8")
+    code, message = refused(tmp_path)
+    assert code == "F5035"
+    assert "'[1.0]' is no line of it" in message
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "says"),
+    [
+        ("trace.jsonl", "other.jsonl", "cannot be begun in the middle"),
+        (None, "trace.jsonl", "begun without a trace"),
+    ],
+)
+def test_trace_is_not_begun_in_the_middle(tmp_path: Path, first: str | None, then: str, says: str) -> None:
+    run_here(tmp_path, seconds=5.0, trace=first)
+    code, message = refused(tmp_path, trace=then)
+    assert code == "F1017"
+    assert says in message
+
+
+def test_trace_that_has_lost_lines_is_not_gone_on_with(tmp_path: Path) -> None:
+    run_here(tmp_path, seconds=20.0)
+    (tmp_path / "trace.jsonl").write_text("")
+    code, message = refused(tmp_path)
+    assert code == "F1017"
+    assert "shorter than its journal says" in message
