@@ -16,7 +16,8 @@ for the cell, and none where no good order of the places is known; it knows noth
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -185,7 +186,10 @@ def effect(t: Transition) -> dict[str, bool]:
     return {**dict.fromkeys(t.inputs, False), **dict.fromkeys(t.outputs, True)}
 
 
-def touching(sentences: Iterable[Sentence], *, by: Iterable[Literal]) -> list[Sentence]:
-    """The sentences in which one of these literals stands."""
-    literals = set(by)
-    return [one for one in sentences if any(literal in literals for term in one for literal in term)]
+def touched(sentences: Iterable[Sentence]) -> Mapping[Literal, Sequence[Sentence]]:
+    """The sentences in which each literal stands; none for one that stands in no sentence."""
+    found = defaultdict[Literal, list[Sentence]](list)
+    for one in sentences:
+        for literal in {literal for term in one for literal in term}:
+            found[literal].append(one)
+    return found

@@ -20,7 +20,6 @@ central net alone, by a text of its own, and compares byte by byte (`firable.dec
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -42,7 +41,7 @@ from firable.decompose.protocol.inductive import (
     may_go_on,
     negated,
     still_to_be_done,
-    touching,
+    touched,
 )
 from firable.decompose.protocol.rounds import decided
 from firable.nets.net import Transition
@@ -170,13 +169,10 @@ class Obligations:
             yield _block("divergence", "divergence", [f"(not {all_of(self._falling())})"])
 
     def _keeping(self) -> Iterator[str]:
-        touched = defaultdict[Literal, list[str]](list)
-        for one in self.invariant:
-            for of in {of for term in one for of in term}:
-                touched[of].append(sentence(one))
+        texts, at = {one: sentence(one) for one in self.invariant}, touched(self.invariant)
         for t in self.steps:
             changes = effect(t)
-            goals = (text for of in changes.items() for text in touched[negated(of)])
+            goals = (texts[one] for of in changes.items() for one in at[negated(of)])
             asked = [all_of(map(literal, demands(t))), f"(not {after(changes, all_of(goals))})"]
             yield _block(f"keeps.{t.name}", "keeps", asked)
 
@@ -228,12 +224,13 @@ class Obligations:
         steps = sorted(homeward(self.protocol), key=lambda one: one.step.name)
         possible = [all_of(map(literal, (*demands(one.step), *one.where))) for one in steps]
         yield _block("home", "home", [*ceased, OPEN, f"(not {any_of(possible)})"])
+        before, now, at = self.facts, {fact: sentence(fact) for fact in self.facts}, touched(self.facts)
         for one, text in zip(steps, possible, strict=True):
             changes = effect(one.step)
-            risen = touching(self.facts, by=changes.items())
-            fallen = touching(self.facts, by=map(negated, changes.items()))
-            none_more = [f"(or {self.facts[fact]} (not {sentence(fact)}))" for fact in risen]
-            one_less = any_of(f"(and {self.facts[fact]} (not {sentence(fact)}))" for fact in fallen)
+            risen = (fact for of in changes.items() for fact in at[of])
+            fallen = (fact for of in changes.items() for fact in at[negated(of)])
+            none_more = [f"(or {before[fact]} (not {now[fact]}))" for fact in risen]
+            one_less = any_of(f"(and {before[fact]} (not {now[fact]}))" for fact in fallen)
             less = after(changes, all_of([*none_more, one_less]))
             yield _block(f"homeward.{one.step.name}", "homeward", [text, f"(not {less})"])
 
