@@ -44,6 +44,7 @@ class Formulas:
         self._numbers: dict[tuple[object, ...], Formula] = {("true",): TRUE, ("false",): FALSE}
         self._negated: dict[Formula, Formula] = {TRUE: FALSE, FALSE: TRUE}
         self._negations: set[Formula] = set()
+        self._variables: set[Formula] = set()
 
     def _number(self, key: tuple[object, ...]) -> Formula:
         return self._numbers.setdefault(key, len(self._numbers))
@@ -54,7 +55,13 @@ class Formulas:
 
     def symbol(self, text: str) -> Formula:
         """The variable that a file spells so."""
-        return self._number(("variable", text))
+        made = self._number(("variable", text))
+        self._variables.add(made)
+        return made
+
+    def is_variable(self, formula: Formula) -> bool:
+        """Whether a formula is a variable."""
+        return formula in self._variables
 
     def negation(self, operand: Formula) -> Formula:
         """The NOT of a formula."""

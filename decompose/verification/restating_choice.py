@@ -3,6 +3,10 @@
 The choice goes through the considered transitions one after the other: under rotation and order the sequence, entered
 at a variable turn, then the sequence again; then the rest. Each is granted if it is enabled, its turn has come and none
 of the places that it competes for has been taken; what is granted takes them. docs/bundle.md has the formulas.
+
+What is claimed of the table's choice is claimed of each consideration, by the places of the net. That they are free
+adds nothing to what grants it now: so of all that is granted at a place one at most is. That it is enabled, and that
+they were free when it was considered last, adds nothing to what grants it at all: so nothing could be added.
 """
 
 from __future__ import annotations
@@ -91,16 +95,16 @@ def _contest(nets: Iterable[tuple[Net, Callable[[str], str]]]) -> _Contest:
 
 
 class _Steps:
-    """A variable `step(i)` for each OR that grows by one operand at a time; the same OR has the same one."""
+    """A variable `step(i)` for each OR that grows with the competitors; the same OR has the same one."""
 
     def __init__(self, of: Formulas) -> None:
         self.of = of
         self.variables: dict[Formula, Formula] = {}
 
-    def either(self, before: Formula, more: Formula) -> Formula:
-        """Its variable; the one operand, where there is but one."""
-        made = self.of.any_of([before, more])
-        if made in (before, more):
+    def either(self, operands: Iterable[Formula]) -> Formula:
+        """Its variable, also of one operand; what is true, false or a variable already needs none."""
+        made = self.of.any_of(operands)
+        if made in (TRUE, FALSE) or self.of.is_variable(made):
             return made
         return self.variables.setdefault(made, self.of.variable(f"step({len(self.variables)})"))
 
@@ -109,32 +113,42 @@ class _Steps:
         return [self.of.equal(variable, made) for made, variable in self.variables.items()]
 
 
-def _granted(of: Formulas, group: ArbitrationGroup, contest: _Contest, steps: _Steps) -> dict[str, Formula]:
+@dataclass(frozen=True)
+class _Chosen:
+    """What a group grants at all, and what it takes to be granted at each of its considerations."""
+
+    granted: Mapping[str, Formula]
+    now: Sequence[tuple[str, Sequence[Formula]]]
+
+
+def _chosen(of: Formulas, group: ArbitrationGroup, contest: _Contest, steps: _Steps) -> _Chosen:
     """What the group grants, for whatever is enabled and whatever the turn is."""
     considered: list[tuple[str, Formula]] = []
     if group.by is not ArbitrationRule.PRIORITY:
         begun = FALSE
         for i, name in enumerate(group.sequence):
-            begun = steps.either(begun, of.variable(f"turn({i})"))
+            begun = steps.either([begun, of.variable(f"turn({i})")])
             considered.append((name, begun))
     considered += [(name, TRUE) for name in (*group.sequence, *group.rest)]
-    granted: dict[str, Formula] = {}
     taken: dict[_Key, Formula] = {}
+    at_any_time: dict[str, list[Formula]] = {}
+    needs: list[tuple[str, Sequence[Formula]]] = []
     for name, its_turn in considered:
         places = contest.for_what.get(name, ())
-        free = of.negation(of.any_of(taken.get(place, FALSE) for place in places))
-        now = of.all_of([of.variable(f"enabled({name})"), its_turn, free])
-        granted[name] = of.any_of([granted.get(name, FALSE), now])
+        free = [of.negation(taken.get(place, FALSE)) for place in places]
+        needs.append((name, [of.variable(f"enabled({name})"), its_turn, *free]))
+        now = of.all_of(needs[-1][1])
+        at_any_time.setdefault(name, []).append(now)
         for place in places:
-            taken[place] = steps.either(taken.get(place, FALSE), now)
-    return granted
+            taken[place] = steps.either([taken.get(place, FALSE), now])
+    return _Chosen({name: of.any_of(nows) for name, nows in at_any_time.items()}, needs)
 
 
-def _winning(of: Formulas, granted: Mapping[str, Formula], contest: _Contest) -> dict[str, Formula]:
+def _winning(of: Formulas, granted: Mapping[str, Formula], contest: _Contest, steps: _Steps) -> dict[str, Formula]:
     """Who wins an input conflict: it is granted, and one that is enabled and shares an input with it is not."""
     losing: dict[_Key, Formula] = {}
     for place in dict.fromkeys(place for name in granted for place in contest.inputs.get(name, ())):
-        losing[place] = of.any_of(
+        losing[place] = steps.either(
             of.all_of([of.variable(f"enabled({name})"), of.negation(granted[name])])
             for name in contest.who[place]
             if name in granted
@@ -148,21 +162,30 @@ def _winning(of: Formulas, granted: Mapping[str, Formula], contest: _Contest) ->
 def _choice(
     of: Restated, group: ArbitrationGroup, in_table: ArbitrationGroup, central: _Contest, in_subnets: _Contest
 ) -> Stated:
-    steps = _Steps(of.of)
-    wanted, given = (_granted(of.of, *at, steps) for at in ((group, central), (in_table, in_subnets)))
-    winning, won = _winning(of.of, wanted, central), _winning(of.of, given, in_subnets)
+    formulas, steps = of.of, _Steps(of.of)
+    wanted = _chosen(formulas, group, central, steps)
+    winning = _winning(formulas, wanted.granted, central, steps)
+    given = _chosen(formulas, in_table, in_subnets, steps)
+    won = _winning(formulas, given.granted, in_subnets, steps)
     claims = []
-    for name in wanted:
-        claims += [of.of.equal(given[name], wanted[name]), of.of.equal(won[name], winning[name])]
+    for name in wanted.granted:
+        claims.append(formulas.equal(given.granted[name], wanted.granted[name]))
+        claims.append(formulas.equal(won[name], winning[name]))
     taken: dict[_Key, Formula] = {}
-    for name in wanted:
-        for place in central.for_what.get(name, ()):
-            before = taken.get(place, FALSE)
-            claims.append(of.of.negation(of.of.all_of([before, given[name]])))
-            taken[place] = steps.either(before, given[name])
-    for name in wanted:
-        against = [taken[place] for place in central.for_what.get(name, ())]
-        not_enabled = of.of.negation(of.of.variable(f"enabled({name})"))
-        claims.append(of.of.any_of([not_enabled, of.of.any_of([given[name], *against])]))
+    nows: dict[str, list[Formula]] = {}
+    last: dict[str, Formula] = {}
+    for name, needs in given.now:
+        now = formulas.all_of(needs)
+        places = central.for_what.get(name, ())
+        free = [formulas.negation(taken.get(place, FALSE)) for place in places]
+        claims.append(formulas.equal(formulas.all_of([*needs, *free]), now))
+        for place in places:
+            taken[place] = steps.either([taken.get(place, FALSE), now])
+        nows.setdefault(name, []).append(now)
+        last[name] = formulas.all_of([formulas.variable(f"enabled({name})"), *free])
+    for name in wanted.granted:
+        claims.append(formulas.equal(formulas.any_of([*nows[name], last[name]]), given.granted[name]))
     sentence = f"whatever is enabled, '{group.name}' grants a maximal set without conflict, as the central arbiter does"
-    return of.claim(f"arbitration.{group.name}", sentence, of.of.all_of(claims), tuple(wanted), steps.given())
+    return of.claim(
+        f"arbitration.{group.name}", sentence, formulas.all_of(claims), tuple(wanted.granted), steps.given()
+    )

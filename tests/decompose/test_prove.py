@@ -385,8 +385,8 @@ def test_net_and_table_share_every_step_of_the_choice_and_no_step_is_an_or_of_or
     assert all(len(sides.central_groups[name].rest) > 20 for name in sides.groups)
     for obligation in list(arbitration(sides))[1:]:
         for claim in obligation.claim.operands:
-            if claim.operator is Operator.EQUAL:
-                assert claim.operands[0] is claim.operands[1]
+            assert claim.operator is Operator.EQUAL
+            assert claim.operands[0] is claim.operands[1]
         assert obligation.definitions
         for definition in obligation.definitions:
             assert all(operand.operator is not Operator.OR for operand in definition.operands[1].operands)
