@@ -29,9 +29,12 @@ machines_option = click.option(
 
 def read_machines(argument: str) -> PlantModel:
     """The plant that an argument names: a plant file, or `catalogue:NAME`; raises `InputError` as its reader does."""
-    from firable.nets.machines.plant_file import read_plant
+    from firable.nets.machines.plant_file import parse_plant, read_plant
 
-    return read_plant(_plant_file(argument))
+    file = _plant_file(argument)
+    if argument.startswith(CATALOGUE):
+        return parse_plant(Path(file).read_text("utf-8"), argument)
+    return read_plant(file)
 
 
 def plant_text(argument: str) -> str:

@@ -101,7 +101,9 @@ def load_net(argument: str) -> Loaded:
         return load(argument)
     name = argument.removeprefix(CATALOGUE)
     if name in catalogue_names():
-        return load(catalogue_file(argument, ""))
+        loaded = load(catalogue_file(argument, ""))
+        # Where it is installed says nothing to whoever wrote the argument; lines and columns are those of its file.
+        return replace(loaded, positions=loaded.positions and loaded.positions.called(argument))
     try:
         return Loaded(family_net(name))
     except KeyError:

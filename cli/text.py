@@ -7,8 +7,9 @@ NO_COLOR; the words say everything that the colours say.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -23,10 +24,39 @@ WORDS: Mapping[str, str] = {"proved": "proved", "unknown": "unknown"}
 _HEADINGS = {"required": "must hold", "warning": "warnings", "information": "for information"}
 
 
+ALIKE_SHOWN: Final = 2
+"""Of how many errors with one cause each is told in full; of more, the first is, and the others are counted."""
+_NAMES_SHOWN: Final = 4
+_QUOTED: Final = re.compile(r"'[^']*'")
+
+
 def show_errors(diagnostics: Iterable[Diagnostic]) -> None:
-    """Print why an input is refused, to standard error."""
+    """Print why an input is refused, to standard error: what differs in names alone once, with how many there are."""
+    causes: dict[tuple[str, ...], list[Diagnostic]] = {}
     for diagnostic in diagnostics:
-        show_diagnostic(diagnostic)
+        causes.setdefault(_cause(diagnostic), []).append(diagnostic)
+    for alike in causes.values():
+        for diagnostic in alike if len(alike) <= ALIKE_SHOWN else alike[:1]:
+            show_diagnostic(diagnostic)
+        if len(alike) > ALIKE_SHOWN:
+            click.echo(f"  {_further(alike)}", err=True)
+
+
+def _cause(diagnostic: Diagnostic) -> tuple[str, ...]:
+    """What diagnostics with the same cause share: all words but the names."""
+    words = (diagnostic.message, diagnostic.hint)
+    return (diagnostic.code, diagnostic.severity.value, *(_QUOTED.sub("''", text) for text in words))
+
+
+def _further(alike: Sequence[Diagnostic]) -> str:
+    """How many more there are of one cause, and the first names of them."""
+    told = [_QUOTED.findall(diagnostic.message) for diagnostic in alike]
+    at = next((i for i, names in enumerate(zip(*told, strict=False)) if len(set(names)) > 1), None)
+    if at is None:  # the same words, at several places
+        return f"and {counted(len(alike) - 1, 'more place')} with the same error"
+    names = list(dict.fromkeys(names[at] for names in told[1:]))
+    more = f", and {len(names) - _NAMES_SHOWN} others" if len(names) > _NAMES_SHOWN else ""
+    return f"the same of {len(alike) - 1} more: {', '.join(names[:_NAMES_SHOWN])}{more}"
 
 
 def show_diagnostic(diagnostic: Diagnostic) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
-from firable.cli.options import answer_all, format_option, load_net, write_folder
+from firable.cli.options import CATALOGUE, answer_all, format_option, load_net, write_folder
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
 
@@ -66,6 +67,8 @@ def verify(
     Exit codes: 0 all that is claimed is shown, 3 some is only claimed, or the time was over, 2 evidence was damaged or
     edited, is about another net, or does not show what it claims. What a bundle itself leaves undecided claims nothing.
     """
+    for file in evidence:
+        _refuse_a_net(file)
     milliseconds = max(1, round(timeout * 1000))
     net = None if of is None else load_net(of).net
     many = len(evidence) > 1
@@ -74,6 +77,18 @@ def verify(
         raise click.UsageError("--trust is for bundles: documents of evidence are not signed, and need not be")
     makers = [partial(_of_bundle if _is_bundle(file) else _report, file, asked) for file in evidence]
     return answer_all("verify", format_, makers, _show)
+
+
+def _refuse_a_net(file: str) -> None:
+    """A net is no evidence: say how a bundle is made of it."""
+    from firable.nets.loading import PNML_SUFFIXES, TEXT_SUFFIXES
+
+    if file.startswith(CATALOGUE) or Path(file).suffix.lower() in PNML_SUFFIXES | TEXT_SUFFIXES:
+        bundle = f"{Path(file.removeprefix(CATALOGUE)).name.partition('.')[0] or 'net'}.bundle"
+        raise click.UsageError(
+            f"'{file}' is a net, and what is verified is evidence of one: make a bundle by "
+            f"`firable bundle {file} -o {bundle}`, then `firable verify {bundle}`"
+        )
 
 
 @dataclass(frozen=True)
@@ -119,7 +134,8 @@ def _of_bundle(file: str, asked: _Asked) -> Report:
         signers = demand_signature(bundle, file, asked.trust)
     if asked.of is not None:
         _refuse_another_net(file, bundle.net, asked.of)
-    checked = check_bundle(bundle, solver=asked.solver, timeout_ms=asked.timeout_ms)
+    with _named(file):
+        checked = check_bundle(bundle, solver=asked.solver, timeout_ms=asked.timeout_ms)
     verdicts = [_told(one.verdict, one.method, one.only_claimed, shown=one.shown) for one in checked]
     files = asked.write(file, {name: text for name, text in bundle.evidence.items() if name.endswith(".smt2")})
     of = {"digest": bundle.digest, "solver": asked.solver, **({"signed_by": ", ".join(signers)} if signers else {})}
@@ -179,6 +195,19 @@ def _told(verdict: Verdict, method: str, only_claimed: str, *, shown: bool) -> V
         bound=only_claimed,
         hint="allow more time" if only_claimed.endswith("gave up") else "",
     )
+
+
+@contextmanager
+def _named(file: str) -> Generator[None]:
+    """Name the file in what is found to be wrong with it in this block."""
+    from firable.nets.diagnostics import InputError, Span
+    from firable.nets.source import printable
+
+    try:
+        yield
+    except InputError as error:
+        at = Span(printable(file), 1, 1)
+        raise InputError([replace(one, span=one.span or at) for one in error.diagnostics]) from None
 
 
 def _refuse_another_net(file: str, net: Net, of: Net) -> None:

@@ -21,7 +21,7 @@ from firable.nets.source import Source
 from firable.nets.time_limits import fault_transition_name, timer_name
 from firable.nets.yaml_tree import Mapping, Node, Scalar, Sequence, node_span, nodes_along
 
-DIAGNOSTICS_MAX: Final = 20
+DIAGNOSTICS_MAX: Final = 80
 
 _SECOND: Final = frozenset({"F2001", "F2006", "F2007", "F2022"})
 """What is about the second of two equal names."""
@@ -47,6 +47,10 @@ class Positions:
     def __init__(self, source: Source, tree: Node) -> None:
         self.source = source
         self.tree = tree
+
+    def called(self, file: str) -> Positions:
+        """The same positions in a file that goes by another name."""
+        return Positions(replace(self.source, file=file), self.tree)
 
     def place(self, problems: Iterable[Diagnostic]) -> list[Diagnostic]:
         """The diagnostics with their spans, in the order of the text, joined and bounded."""

@@ -11,6 +11,7 @@ import pytest
 
 import firable.analysis.check
 from firable.cli.main import main
+from firable.nets.catalogue import catalogue_path
 
 NET = """\
 firable: 1
@@ -251,3 +252,19 @@ def test_colours_are_for_terminals_and_switched_off_by_no_color() -> None:
     assert b"\x1b[32m" in on_a_terminal()
     assert b"\x1b[" not in on_a_terminal(NO_COLOR="1")
     assert b"\x1b[" not in subprocess.run(command, env=clean, capture_output=True, check=True).stdout
+
+
+def test_errors_that_differ_in_names_alone_are_told_once_and_counted(capsys: pytest.CaptureFixture[str]) -> None:
+    said = refused(capsys, "split", "catalogue:one_robot", "--own", "robot=robot.*")
+    assert said.count("error[F2011]") == 1
+    assert "no rule gives 'system.carrying_in' an owner" in said
+    assert "the same of 23 more: 'system.loading', 'system.processing', 'system.unloading', " in said
+
+
+def test_a_net_of_the_catalogue_goes_by_the_name_that_was_written(capsys: pytest.CaptureFixture[str]) -> None:
+    said = refused(capsys, "split", "catalogue:one_robot", "--own", "robot=robot.*")
+    lines = catalogue_path("one_robot").read_text("utf-8").splitlines()
+    line = next(i for i, text in enumerate(lines, 1) if text.strip().startswith("carrying_in:"))
+    column = lines[line - 1].index("carrying_in") + 1
+    assert said.startswith(f"catalogue:one_robot:{line}:{column}: error")
+    assert str(catalogue_path("one_robot").parent) not in said

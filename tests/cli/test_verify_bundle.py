@@ -96,7 +96,9 @@ def test_a_bundle_without_evidence_on_its_net_is_refused_and_not_run(
     write_bundle(tmp_path / "bare", replace(whole, verdicts=bare, evidence=kept))
     for command in ("verify", "run"):
         assert main([command, str(tmp_path / "bare")]) == 2
-        assert "'deadlock-free' is said to be proved, without evidence" in capsys.readouterr().err
+        said = capsys.readouterr().err
+        assert "'contact-free' is said to be proved, without evidence" in said
+        assert "the same of 8 more: 'deadlock-free', " in said
 
 
 def test_a_warning_that_nothing_shows_is_only_claimed(
@@ -150,3 +152,29 @@ def test_a_missing_second_solver_is_named(
     assert main(["verify", str(bundle)]) == 2
     assert "pip install 'firable[verify]'" in capsys.readouterr().err
     assert main(["verify", str(bundle), "--solver", "z3"]) == 0
+
+
+def test_a_bundle_without_a_theorem_is_refused_with_one_message_and_all_in_json(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = read_bundle(bundle)
+    verdicts = tuple(verdict for verdict in whole.verdicts if not verdict.name.startswith("protocol."))
+    evidence = {name: text for name, text in whole.evidence.items() if name != "protocol.smt2"}
+    old = tmp_path / "old.bundle"
+    write_bundle(old, replace(whole, verdicts=verdicts, evidence=evidence))
+    lacking = len(whole.verdicts) - len(verdicts)
+    assert main(["verify", str(old)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("error[") == 1
+    assert f"{old}:1:1: error[F5002]: there is no verdict on 'protocol.starts'" in said
+    assert f"the same of {lacking - 1} more: 'protocol.keeps.ask', " in said
+    assert main(["verify", str(old), "--format", "json"]) == 2
+    errors = json.loads(capsys.readouterr().out)["errors"]
+    assert [error["code"] for error in errors] == ["F5002"] * lacking
+
+
+@pytest.mark.parametrize("net", ["catalogue:one_robot", "cells/one_robot.firable.yaml"])
+def test_a_net_is_no_evidence_and_is_told_how_to_become_a_bundle(net: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["verify", net]) == 2
+    said = capsys.readouterr().err
+    assert f"`firable bundle {net} -o one_robot.bundle`, then `firable verify one_robot.bundle`" in said
