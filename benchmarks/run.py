@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final
 
 import explicit
+import linking
 import public_nets
 import reading
 import splitting
@@ -23,6 +24,7 @@ BENCHMARKS: Final = {
     "whole_spaces": whole_spaces.tables,
     "reading": reading.tables,
     "splitting": splitting.tables,
+    "linking": linking.tables,
     "public_nets": public_nets.tables,
 }
 

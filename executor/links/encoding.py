@@ -1,9 +1,9 @@
 """Messages as canonical JSON, for links that carry bytes: `{"Vote":{"controller":...,"promised":[...],...}}`.
 
 The encoding is derived from the dataclasses of `protocol.messages`, so a message that is added there can be sent
-without a line here. One message has one spelling, keys and sets in order, and nothing else is read: what is decoded is
-encoded again and compared, so an unknown key, a doubled entry or a number written otherwise is refused.
-What arrives from a line is not trusted to be a message only because a checksum agrees.
+without a line here. One message has one spelling, keys and sets in order, no blanks, UTF-8, and nothing else is read:
+what is decoded is encoded again and compared, so an unknown key, a doubled entry or a number written otherwise is
+refused. What arrives from a line is not trusted to be a message only because a checksum agrees.
 
 Rejected: pickle, which runs what it reads; a binary schema, which would be a second description of each message, and
 save time that a line of any kind spends many times over.
@@ -11,14 +11,15 @@ save time that a line of any kind spends many times over.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from types import UnionType
-from typing import Any, Final, get_args
+from typing import Any, Final, get_args, get_origin, get_type_hints
 
 from pydantic import TypeAdapter
+from pydantic_core import to_json
 
 from firable.executor.protocol.messages import Message
-from firable.nets.interchange import canonical_json
 
 MESSAGE_BYTES_MAX: Final = 1 << 20
 """More than any message of a net that can be bundled needs."""
@@ -50,7 +51,8 @@ def encode(message: Message) -> bytes:
     >>> encode(Acknowledgement("robot", 7, Readiness(3, frozenset({"G2", "G1"}))))[:60]
     b'{"Acknowledgement":{"controller":"robot","readiness":{"seque'
     """
-    return canonical_json({type(message).__name__: _plain(message)})
+    kind = type(message)
+    return to_json({kind.__name__: _WRITERS[kind](message)})
 
 
 def decode(data: bytes) -> Message:
@@ -77,16 +79,27 @@ def decode(data: bytes) -> Message:
     return message
 
 
-def _plain(value: Any) -> Any:
-    """A value of a message as JSON."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
-    match value:
-        case frozenset():
-            return sorted(map(_plain, value))
-        case tuple():
-            return list(map(_plain, value))
-        case None | bool() | int() | float() | str():
-            return value
-        case _:
-            raise TypeError(f"{value!r} cannot be part of a message")
+def _writer(hint: Any) -> Callable[[Any], Any]:
+    """What turns a value of this type into JSON; raises `TypeError` for a type that no message may have.
+
+    Made once for each kind, and not asked of each value: a message is on its way of every command.
+    """
+    if is_dataclass(hint):
+        hints = get_type_hints(hint)
+        writers = [(name, _writer(hints[name])) for name in sorted(field.name for field in fields(hint))]
+        return lambda value: {name: write(getattr(value, name)) for name, write in writers}
+    if get_origin(hint) is frozenset and get_args(hint) == (str,):
+        return sorted
+    if get_origin(hint) is tuple and get_args(hint) == (str, ...):
+        return list
+    parts = get_args(hint) if isinstance(hint, UnionType) else (hint,)
+    if all(part in (str, int, bool, float, type(None)) for part in parts):
+        return _as_it_is
+    raise TypeError(f"{hint} cannot be part of a message")
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+_WRITERS: Final = {kind: _writer(kind) for kind in KINDS.values()}

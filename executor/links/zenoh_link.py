@@ -26,8 +26,10 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final
 from urllib.parse import quote, unquote
 
@@ -45,6 +47,8 @@ LEASE_SECONDS: Final = 1.0
 _OPENING_SECONDS: Final = 2.0
 _NAMELESS: Final = "%"  # which no name is quoted to
 _REST: Final = "**"
+
+_Act = Callable[[str, bytes, bool], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +80,11 @@ class ZenohLink:
         self.session: zenoh.Session | None = None
         self.listener: LinkListener | None = None
         self.identity = ""
+        self.broken: asyncio.Future[None] | None = None
         self.claims: dict[str, list[str]] = {}
         """For each peer the sessions that say they are it; the first is."""
+        self.publishers: dict[tuple[str, str, str], zenoh.Publisher] = {}
+        """For each sender here, receiver and session of the receiver."""
         self.damaged = 0
 
     async def run(self, listener: LinkListener) -> None:
@@ -93,16 +100,18 @@ class ZenohLink:
             kept: list[object] = []
             for name in self.greeting.names:
                 at = f"{ours}/to/{_spelled(name)}/{self.identity}/{_REST}"
-                kept.append(session.declare_subscriber(at, lambda s: _on(loop, self._message, s)))
+                kept.append(session.declare_subscriber(at, lambda s: self._on(loop, self._message, s)))
             for name in self.greeting.names:
                 kept.append(session.liveliness().declare_token(f"{ours}/alive/{_spelled(name)}/{self.identity}"))
             alive = "firable/*/*/alive/*/*"
             tokens = session.liveliness()
-            kept.append(tokens.declare_subscriber(alive, lambda s: _on(loop, self._token, s), history=True))
-            await loop.create_future()
+            kept.append(tokens.declare_subscriber(alive, lambda s: self._on(loop, self._token, s), history=True))
+            self.broken = loop.create_future()
+            await self.broken
         finally:
             self.session = self.listener = None
             self.claims.clear()
+            self.publishers.clear()
             await asyncio.to_thread(session.close)
 
     def send(self, sender: str, receiver: str, message: Message) -> None:
@@ -110,12 +119,15 @@ class ZenohLink:
         sessions = self.claims.get(receiver)
         if self.session is None or not sessions:
             return
-        key = (
-            f"{self._key(self.greeting.version, self.greeting.digest)}/to/{_spelled(receiver)}/{sessions[0]}"
-            f"/from/{_spelled(sender)}/{self.identity}"
-        )
-        drop = zenoh.CongestionControl.DROP
-        self.session.put(key, encode(message), congestion_control=drop, express=True)
+        to = (sender, receiver, sessions[0])
+        publisher = self.publishers.get(to)
+        if publisher is None:
+            ours = self._key(self.greeting.version, self.greeting.digest)
+            key = f"{ours}/to/{_spelled(receiver)}/{sessions[0]}/from/{_spelled(sender)}/{self.identity}"
+            drop = zenoh.CongestionControl.DROP
+            publisher = self.session.declare_publisher(key, congestion_control=drop, express=True)
+            self.publishers[to] = publisher
+        publisher.put(encode(message))
 
     def _configuration(self) -> zenoh.Config:
         settings: dict[str, Any] = {
@@ -154,7 +166,22 @@ class ZenohLink:
     def _key(version: int, digest: str) -> str:
         return f"firable/{version}/{_spelled(digest)}"
 
-    def _token(self, key: str, _payload: bytes, *, gone: bool) -> None:
+    def _on(self, loop: asyncio.AbstractEventLoop, act: _Act, sample: zenoh.Sample) -> None:
+        """Hand a sample over to the event loop, from a thread of Zenoh; after the loop's end nobody hears it."""
+        gone = sample.kind == zenoh.SampleKind.DELETE
+        key, payload = str(sample.key_expr), sample.payload.to_bytes()
+        with suppress(RuntimeError):  # the loop has been closed
+            loop.call_soon_threadsafe(self._guarded, act, key, payload, gone)
+
+    def _guarded(self, act: _Act, key: str, payload: bytes, gone: bool) -> None:
+        """A callback of the loop has no caller: what fails in it ends `run`."""
+        try:
+            act(key, payload, gone)
+        except Exception as error:
+            if self.broken is not None and not self.broken.done():
+                self.broken.set_exception(error)
+
+    def _token(self, key: str, _payload: bytes, gone: bool) -> None:
         """A host has come or gone."""
         if self.listener is None:
             return
@@ -178,22 +205,22 @@ class ZenohLink:
                 self.listener.refused(peer, _required(objection(twice, twice)))
         if claims[:1] != first:
             if first:
+                self.publishers = {to: kept for to, kept in self.publishers.items() if to[1:] != (peer, *first)}
                 self.listener.lost(peer)
             if claims:
                 self.listener.connected(peer)
 
-    def _message(self, key: str, payload: bytes, *, gone: bool) -> None:
-        *_, receiver, _, _, sender, session = key.split("/")
-        peer = _read(sender)
+    def _message(self, key: str, payload: bytes, gone: bool) -> None:
+        receiver, peer, session = _parsed(key)
         # Only from the process that is known to run the machine: another one, or one not yet met, is not heard.
-        if self.listener is None or gone or self.claims.get(peer, [""])[0] != session:
+        if self.listener is None or gone or self.claims.get(peer, [])[:1] != [session]:
             return
         try:
             message = decode(payload)
         except EncodingError:
             self.damaged += 1
             return
-        self.listener.arrived(peer, _read(receiver), message)
+        self.listener.arrived(peer, receiver, message)
 
 
 def open_to_the_network(addresses: Sequence[str]) -> tuple[Diagnostic, ...]:
@@ -222,17 +249,16 @@ def _required(problem: Diagnostic | None) -> Diagnostic:
     return problem
 
 
+@lru_cache(maxsize=1000)
+def _parsed(key: str) -> tuple[str, str, str]:
+    """Receiver, sender and the sender's session of the key of a message."""
+    *_, receiver, _, _, sender, session = key.split("/")
+    return _read(receiver), _read(sender), session
+
+
 def _spelled(name: str) -> str:
     return _NAMELESS if name == COORDINATOR else quote(name, safe="")
 
 
 def _read(spelled: str) -> str:
     return COORDINATOR if spelled == _NAMELESS else unquote(spelled)
-
-
-def _on(loop: asyncio.AbstractEventLoop, act: Any, sample: zenoh.Sample) -> None:
-    """Hand a sample over to the event loop, from a thread of Zenoh; after the loop's end nobody is there to hear it."""
-    gone = sample.kind == zenoh.SampleKind.DELETE
-    key, payload = str(sample.key_expr), sample.payload.to_bytes()
-    if not loop.is_closed():
-        loop.call_soon_threadsafe(lambda: act(key, payload, gone=gone))

@@ -2,16 +2,17 @@
 
 import json
 from contextlib import suppress
-from typing import Any, cast, get_args
+from dataclasses import dataclass
+from typing import get_args
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
 
-from firable.executor.links.encoding import KINDS, MESSAGE_BYTES_MAX, EncodingError, decode, encode
+from firable.executor.links.encoding import KINDS, MESSAGE_BYTES_MAX, EncodingError, _writer, decode, encode
 from firable.executor.protocol import messages
-from firable.executor.protocol.messages import Decision, Message, ToController, ToCoordinator, VoteRequest
+from firable.executor.protocol.messages import Decision, Message, ToController, ToCoordinator
 
 MESSAGES: st.SearchStrategy[Message] = st.one_of([st.from_type(kind) for kind in KINDS.values()])
 
@@ -97,6 +98,13 @@ def test_a_set_in_another_order_or_with_a_doubled_entry_is_refused() -> None:
             decode(text.replace(b'"promised":["G1","G2"]', other))
 
 
-def test_what_is_no_value_of_a_message_is_not_written() -> None:
-    with pytest.raises(TypeError):
-        encode(VoteRequest("robot", 1, cast(Any, {"G1"}), 0, 0))
+@dataclass(frozen=True)
+class Odd:
+    """A message as there must be none."""
+
+    promised: set[str]
+
+
+def test_a_message_with_a_field_that_has_no_one_spelling_is_refused_when_the_program_starts() -> None:
+    with pytest.raises(TypeError, match="cannot be part of a message"):
+        _writer(Odd)

@@ -1,0 +1,185 @@
+"""A transition over four controllers, each in a process of its own, by Zenoh: time for each firing in round trips.
+
+The yardstick is what Zenoh alone needs, in the same run and with as many processes: one process publishes to four
+others, each answers, and the round trip is over when the last answer is there. A firing takes two phases, asking for
+promises and ordering what was decided, and the next one begins with the acknowledgements; so the goal is 1.3 round
+trips for each phase. Times are by the clock, because what is measured is waiting.
+
+    python benchmarks/linking.py controller c1 ADDRESS BUNDLE     a process of the firing
+    python benchmarks/linking.py echo c1 ADDRESS BUNDLE           a process of the yardstick
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from threading import Event
+from typing import Final
+
+import zenoh
+from measuring import Table, against
+
+from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.journal.journal import MemoryJournal
+from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.zenoh_link import ZenohLink
+from firable.executor.operating.host import Host
+from firable.executor.operating.host_trace import HostTrace
+from firable.nets.bundle import Bundle, read_bundle, write_bundle
+from firable.nets.decomposition import Decomposition
+from firable.nets.net import Controller, Net, Place, Transition
+
+CONTROLLERS: Final = tuple(f"c{i}" for i in range(4))
+PHASES: Final = 2
+GOAL: Final = 1.3
+COUNT: Final = 500
+PAYLOAD: Final = b"x" * 150
+"""As long as a vote."""
+
+
+class Firings(HostTrace):
+    """A trace that keeps nothing but when transitions fired."""
+
+    def __init__(self, net: Net, wanted: int) -> None:
+        super().__init__(net, (), None, {})
+        self.wanted = wanted
+        self.at: list[float] = []
+        self.enough = asyncio.Event()
+
+    def fired(self, transition: str, number: int | None) -> None:
+        """Remember when."""
+        super().fired(transition, number)
+        self.at.append(time.perf_counter())
+        if len(self.at) > self.wanted:
+            self.enough.set()
+
+
+def ring() -> Net:
+    """Two transitions by turns, each of all controllers, and no machine that takes time."""
+    owned = {name: (f"{name}.a", f"{name}.b") for name in CONTROLLERS}
+    places = tuple(Place(p, name, marked=p == owned[name][0]) for name in CONTROLLERS for p in owned[name])
+    a, b = (tuple(owned[name][i] for name in CONTROLLERS) for i in (0, 1))
+    controllers = tuple(map(Controller, CONTROLLERS))
+    return Net("ring", places, (Transition("go", a, b), Transition("back", b, a)), controllers=controllers)
+
+
+def host(of: Decomposition, names: tuple[str, ...], trace: HostTrace, *, listen: str = "", join: str = "") -> Host:
+    """A host of the ring, without machines and journal."""
+    greeting = Greeting("ring", names)
+    link = ZenohLink(greeting, listen=[listen] if listen else [], join=[join] if join else [], lease_seconds=10.0)
+    return Host(of, names, DryRunDriver([], 0.0), link, trace, MemoryJournal())
+
+
+def session(*, listen: str = "", join: str = "") -> zenoh.Session:
+    """A session as the link has it."""
+    link = ZenohLink(Greeting("", ()), listen=[listen] if listen else [], join=[join] if join else [])
+    return zenoh.open(link._configuration())
+
+
+async def firing(of: Decomposition, at: str, repeat: int) -> list[float]:
+    """Seconds between two firings, in the middle of many, so many times."""
+    trace = Firings(of.net, COUNT * repeat)
+    coordinator = asyncio.create_task(host(of, (COORDINATOR,), trace, listen=at).main())
+    async with asyncio.timeout(300):
+        await trace.enough.wait()
+    coordinator.cancel()
+    await coordinator
+    took = [after - before for before, after in zip(trace.at, trace.at[1:], strict=False)]
+    return [median(took[i * COUNT : (i + 1) * COUNT]) for i in range(repeat)]
+
+
+def bare(at: str, repeat: int) -> list[float]:
+    """Seconds of a round trip to all, in the middle of many, so many times."""
+    answered, all_answered = set[str](), Event()
+    opened = session(listen=at)
+
+    def answer(sample: zenoh.Sample) -> None:
+        answered.add(str(sample.key_expr))
+        if len(answered) == len(CONTROLLERS):
+            all_answered.set()
+
+    subscriber = opened.declare_subscriber("yardstick/from/*", answer)
+    close: Callable[[], object] = opened.close
+    publishers = [opened.declare_publisher(f"yardstick/to/{name}", express=True) for name in CONTROLLERS]
+    took: list[float] = []
+    while len(took) < COUNT * repeat:
+        begin = time.perf_counter()
+        answered.clear()
+        all_answered.clear()
+        for publisher in publishers:
+            publisher.put(PAYLOAD)
+        if all_answered.wait(0.5):  # not all are there yet
+            took.append(time.perf_counter() - begin)
+    del subscriber
+    close()
+    return [median(took[i * COUNT : (i + 1) * COUNT]) for i in range(repeat)]
+
+
+def echo(name: str, at: str) -> None:
+    """Answer for ever."""
+    opened = session(join=at)
+    back = opened.declare_publisher(f"yardstick/from/{name}", express=True)
+    _subscriber = opened.declare_subscriber(f"yardstick/to/{name}", lambda _: back.put(PAYLOAD))
+    Event().wait()
+
+
+@contextmanager
+def processes(kind: str, bundle: Path) -> Iterator[str]:
+    """The four other processes, and the address that they join."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        at = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    script = [sys.executable, str(Path(__file__).resolve()), kind]
+    started = [subprocess.Popen([*script, name, at, str(bundle)]) for name in CONTROLLERS]
+    try:
+        yield at
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def tables(repeat: int) -> list[Table]:
+    """One row: the smallest of the medians of each."""
+    from firable.decompose import split  # not for the processes, which read its result
+
+    of = split(ring())
+    with TemporaryDirectory() as folder:
+        bundle = Path(folder) / "ring.bundle"
+        write_bundle(bundle, Bundle(of, ()))
+        with processes("echo", bundle) as at:
+            trips = bare(at, repeat)
+        with processes("controller", bundle) as at:
+            firings = asyncio.run(firing(of, at, repeat))
+    ratio = min(firings) / PHASES / min(trips)
+    return [
+        Table(
+            "A transition over four controllers, by Zenoh",
+            "Microseconds by the clock, the median of 500, each smallest with all of the runs behind it: of a round "
+            "trip from one process to four others by Zenoh alone; between two firings, each of two phases; and a "
+            "phase as a multiple of a round trip.",
+            ("round trip", "firing", "phase / round trip"),
+            ((_shown(trips), _shown(firings), against(GOAL, ratio)),),
+        )
+    ]
+
+
+def _shown(seconds: list[float]) -> str:
+    return f"{min(seconds) * 1e6:.0f} ({', '.join(f'{one * 1e6:.0f}' for one in seconds)})"
+
+
+if __name__ == "__main__":
+    _, kind, own, address, path = sys.argv
+    if kind == "echo":
+        echo(own, address)
+    else:
+        cell = read_bundle(path).decomposition
+        asyncio.run(host(cell, (own,), HostTrace(cell.net, (), None, {}), join=address).main())
