@@ -85,6 +85,9 @@ def make_bundle(
 def _unbundled(problem: Diagnostic, lacking: Mapping[str, str]) -> Diagnostic:
     """What keeps a bundle from running, said to who makes it."""
     name = problem.subject[-1]
+    if name.startswith("o4."):
+        hint = f"{problem.hint}; `firable prove NET --machines PLANT` shows the run"
+        return replace(problem, code="F4003", hint=hint)
     if name not in lacking:
         return replace(problem, code="F4003")
     message = f"'{name}' is proved, and there is no evidence that shows it again: {lacking[name]}"

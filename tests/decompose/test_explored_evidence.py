@@ -321,6 +321,15 @@ def test_an_answer_that_refutes_is_refused_and_a_missing_one_only_claims(
     assert len([name for name in late if name.startswith("explored.")]) == of
 
 
+@pytest.mark.parametrize("solver", [by_cvc5, by_z3])
+def test_a_defined_name_says_within_a_let_what_it_said_before(solver: Callable[[str, int], tuple[str, ...]]) -> None:
+    """That less is to be done than before is asked by such names; a solver that read them anew would ask nothing."""
+    text = "(set-logic QF_LIA)\n(declare-const |p| Bool)\n(define-fun |to do 1| () Bool |p|)\n(assert |p|)\n"
+    for name, claim in (("before", "|to do 1|"), ("after", "(not |p|)"), ("both", "(and |to do 1| (not |p|))")):
+        text += f'(push 1)\n(echo "{name}")\n(assert (not (let ((|p| false)) {claim})))\n(check-sat)\n(pop 1)\n'
+    assert solver(text, TIMEOUT_MS) == ("before", "unsat", "after", "unsat", "both", "unsat")
+
+
 def test_the_invariant_refuses_a_start_that_it_does_not_hold_of() -> None:
     """The first obligation is asked before the invariant is assumed: of a contradiction it would follow."""
     text = stated_anew(example("shuttle"), NO_FAULTS)
