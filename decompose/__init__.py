@@ -13,14 +13,21 @@ in an `Exploration` whether it does what the central net does.
     write_bundle("cell.bundle", make_bundle(check(read_net("cell.firable.yaml"))))
 
 The rooms within: `splitting`, `proofs`, `protocol`; what is not named here is imported from their modules.
+
+The names are loaded when they are asked for, so that what checks a bundle (`verification`) runs in a process that holds
+nothing of what made it.
 """
 
-from firable.decompose.bundling import make_bundle
-from firable.decompose.proofs.proving import ProofReport, prove
-from firable.decompose.protocol.exploring import Exploration, explore_protocol
-from firable.decompose.protocol.variant import Faults, Variant, Votes
-from firable.decompose.splitting.cut import split
-from firable.decompose.splitting.table import table_text
+from importlib import import_module
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from firable.decompose.bundling import make_bundle
+    from firable.decompose.proofs.proving import ProofReport, prove
+    from firable.decompose.protocol.exploring import Exploration, explore_protocol
+    from firable.decompose.protocol.variant import Faults, Variant, Votes
+    from firable.decompose.splitting.cut import split
+    from firable.decompose.splitting.table import table_text
 
 __all__ = [
     "Exploration",
@@ -34,3 +41,27 @@ __all__ = [
     "split",
     "table_text",
 ]
+
+_MODULES: Final = {
+    "bundling": ("make_bundle",),
+    "proofs.proving": ("ProofReport", "prove"),
+    "protocol.exploring": ("Exploration", "explore_protocol"),
+    "protocol.variant": ("Faults", "Variant", "Votes"),
+    "splitting.cut": ("split",),
+    "splitting.table": ("table_text",),
+}
+_MODULE_OF: Final = {name: module for module, names in _MODULES.items() for name in names}
+
+
+if not TYPE_CHECKING:  # type checkers read the imports above, and so see a name that is misspelt
+
+    def __getattr__(name: str) -> object:
+        if name not in _MODULE_OF:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

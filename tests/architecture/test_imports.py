@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from support.executor_modules import executor_modules
 
+from firable.cli.main import main
+
 ROOT = Path(__file__).parents[2]
 
 MAY_IMPORT = {
@@ -96,11 +98,7 @@ def test_the_checker_of_bundles_loads_nothing_that_makes_them() -> None:
         "for name in names: __import__(f'firable.decompose.verification.{name}')\n"
         "print(*(n for n in sys.modules if n.startswith('firable.')))"
     )
-    # `firable.decompose` itself offers what makes bundles, and is loaded with any of its rooms: here an empty one
-    # stands in its place, so that only what the checker asks for is seen.
-    offered = "import sys, types\nroom = types.ModuleType('firable.decompose')\nroom.__path__ = ['decompose']\n"
-    offered += "import firable\nsys.modules['firable.decompose'] = room\n"
-    done = subprocess.run([sys.executable, "-c", offered + code], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     loaded = {name.removeprefix("firable.") for name in done.stdout.split()}
     made_by = {
         name for name in loaded if name.startswith("decompose.") and not name.startswith("decompose.verification")
@@ -109,6 +107,22 @@ def test_the_checker_of_bundles_loads_nothing_that_makes_them() -> None:
     assert not made_by
     assert not {name for name in loaded if name.startswith("analysis.evidence.producing")}
     assert not {name for name in loaded if name.startswith(("analysis.spaces", "analysis.verdicts", "analysis.check"))}
+
+
+def test_the_process_that_verifies_a_bundle_holds_nothing_that_makes_one(tmp_path: Path) -> None:
+    bundle = tmp_path / "cell.bundle"
+    assert main(["bundle", "catalogue:conceptual_one_robot", "-o", str(bundle)]) == 0
+    code = (
+        "import sys\nfrom firable.cli.main import main\n"
+        f"code = main(['verify', {str(bundle)!r}])\n"
+        "print('loaded:', *(n for n in sys.modules if n.startswith('firable.')))\nsys.exit(code)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    loaded = done.stdout.rpartition("loaded:")[2].split()
+    assert "firable.decompose.verification.checking" in loaded
+    made_by = ("firable.decompose.", "firable.analysis.spaces", "firable.analysis.check")
+    checker = "firable.decompose.verification"
+    assert [name for name in loaded if name.startswith(made_by) and not name.startswith(checker)] == []
 
 
 @pytest.mark.parametrize("file", sorted((ROOT / "decompose" / "verification").glob("*.py")), ids=lambda f: f.stem)
