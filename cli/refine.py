@@ -59,7 +59,8 @@ _METHODS = ("exploration of the task, closed", "the arcs and gates of the concep
     "--evidence",
     "evidence_dir",
     metavar="DIR",
-    help="Write what shows the conditions of each task and the verdicts on NET, for `firable verify`.",
+    help="Write what shows the conditions of each task, the verdicts on NET and, where that is small, those on the "
+    "detailed net, for `firable verify`.",
 )
 @analysis_options
 @page_option
@@ -124,7 +125,8 @@ def _report(
     table, more = _table(refinement.net)
     written: tuple[str, ...] = ()
     if evidence_dir is not None:
-        verdicts, documents = refinement_evidence(blocks, report, verdicts, _limits(most))
+        detailed = None if confirm is False else refinement.net
+        verdicts, documents = refinement_evidence(blocks, report, verdicts, _limits(most), detailed=detailed)
         written = write_folder(evidence_dir, documents)
     if output is not None:
         write_text(output, format_net(refinement.net))

@@ -13,8 +13,9 @@ The conditions are stated here a second time, as formulas instead of searches, a
 - *settles*: whenever it is under way it is left again, on every run, without any fairness;
 - *orderly*: never are two transitions firable that share an input or an output.
 
-That the detailed net is the one that the tasks make of the conceptual one is no matter of these documents; comparing
-both by bisimulation is (`confirming`), where they are small.
+That the detailed net is the one that the tasks make of the conceptual one is no matter of these documents. Where that
+net is small, another one shows what was carried over of the detailed net itself, without theorem and tasks; it confirms
+the refinement as comparing both nets by bisimulation does (`confirming`), to whoever reads it later.
 """
 
 from __future__ import annotations
@@ -29,8 +30,10 @@ from firable.analysis.evidence.document import Document
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
+from firable.analysis.spaces.reachability import Budget
 from firable.decompose.refinement.carrying import METHOD
 from firable.decompose.refinement.closed import BlockProof
+from firable.decompose.refinement.confirming import MARKINGS_MAX, TheoremError
 from firable.nets.bundle import file_stem
 from firable.nets.formula import And, Firable, Formula, Holds, Not, Or
 from firable.nets.net import Fairness, Net, Property, PropertyKind
@@ -42,13 +45,21 @@ _OF_EVERY_NET: Final = {"contact-free": "contact-free", "complete": "quasi-live"
 
 
 def refinement_evidence(
-    blocks: Sequence[BlockProof], report: CheckReport, verdicts: Sequence[Verdict], limits: Limits | None = None
+    blocks: Sequence[BlockProof],
+    report: CheckReport,
+    verdicts: Sequence[Verdict],
+    limits: Limits | None = None,
+    *,
+    detailed: Net | None = None,
 ) -> tuple[tuple[Verdict, ...], dict[str, bytes]]:
     """The verdicts of a refinement with the names of what shows them, and the documents by the names of their files.
 
     `report` is on the conceptual net. A verdict that is carried over rests on all documents. One that is large is
-    packed, and its name ends in `.gz`. Raises `RuntimeError` where a condition is answered otherwise by its formula
-    than by the search.
+    packed, and its name ends in `.gz`. What is carried over to a `detailed` net is shown of that itself, too, where it
+    has no more than `MARKINGS_MAX` markings.
+
+    Raises `RuntimeError` where a condition is answered otherwise by its formula than by the search, and `TheoremError`
+    where the detailed net has another verdict than is carried over to it.
     """
     documents, of_task = dict[str, bytes](), dict[str, str]()
 
@@ -62,13 +73,16 @@ def refinement_evidence(
         file = add(f"{block.task.name}.task", _document(block, limits))
         of_task |= {verdict.name: file for verdict in block.verdicts}
     conceptual = add(report.net.name, evidence_of_report(report, (), limits))
+    over = [verdict for verdict in verdicts if verdict.method == METHOD and verdict.status is not Status.UNKNOWN]
+    if detailed is not None and (direct := _direct(detailed, over, limits)) is not None:
+        add(f"{detailed.name}.detailed", direct)
 
     def files(verdict: Verdict) -> tuple[str, ...]:
         if verdict.name in of_task:
             return (of_task[verdict.name],)
         if verdict.name == "conceptual.contact-free":
             return (conceptual,)
-        return tuple(documents) if verdict.method == METHOD and verdict.status is not Status.UNKNOWN else ()
+        return tuple(documents) if verdict in over else ()
 
     return tuple(replace(verdict, evidence=files(verdict)) for verdict in verdicts), documents
 
@@ -84,6 +98,18 @@ def _document(block: BlockProof, limits: Limits | None) -> Document:
             raise RuntimeError(f"'{searched.name}' is {searched.status} by searching, {answered.status} by its formula")
         asked.append(answered)
     return evidence_of_report(replace(report, verdicts=tuple(asked)), (), limits)
+
+
+def _direct(detailed: Net, over: Sequence[Verdict], limits: Limits | None) -> Document | None:
+    """What is carried over, of the detailed net itself; None where that is too large to be explored for it."""
+    report = check(detailed, budget=Budget(MARKINGS_MAX))
+    if not report.space.complete:
+        return None
+    found = tuple(report.verdict(verdict.name) for verdict in over)
+    for carried, explored in zip(over, found, strict=True):
+        if {carried.status, explored.status} == {Status.PROVED, Status.VIOLATED}:
+            raise TheoremError(f"'{carried.name}' is {carried.status}, says the theorem, and {explored.status}")
+    return evidence_of_report(replace(report, verdicts=found), (), limits)
 
 
 def conditions(task: Task, net: Net) -> Iterator[Property]:

@@ -124,6 +124,8 @@ def test_evidence_is_written_and_verified(tmp_path: Path, capsys: pytest.Capture
     ]
     assert said.replace("\n", "").count("evidence: firable verify") == 6
     assert main(["verify", *map(str, documents)]) == 0
+    assert main(["refine", "catalogue:conceptual_one_robot", "--cell", "one", "--evidence", str(folder)]) == 0
+    assert main(["verify", str(folder / "one.detailed.evidence.json")]) == 0
     assert "✓ shown     property.ends-clean" in capsys.readouterr().out
 
 

@@ -11,6 +11,7 @@ from firable.analysis.evidence.checking.checker import check_document
 from firable.analysis.evidence.document import document_from_text
 from firable.decompose.refinement.carrying import METHOD, carried
 from firable.decompose.refinement.closed import BlockProof, prove_block
+from firable.decompose.refinement.confirming import TheoremError
 from firable.decompose.refinement.evidence import conditions, refinement_evidence
 from firable.decompose.refinement.refining import refine
 from firable.nets.catalogue import catalogue_net, catalogue_tasks
@@ -52,7 +53,7 @@ def refined() -> tuple[tuple[Verdict, ...], dict[str, bytes]]:
     net = catalogue_net("conceptual_two_robots")
     refinement, report = refine(net, catalogue_tasks()), check(net)
     verdicts = [*refinement.conditions, *carried(refinement.correspondence, refinement.blocks, report)]
-    return refinement_evidence(refinement.blocks, report, verdicts)
+    return refinement_evidence(refinement.blocks, report, verdicts, detailed=refinement.net)
 
 
 def test_every_condition_and_every_verdict_carried_over_names_documents_that_show_it(
@@ -74,6 +75,20 @@ def test_every_condition_and_every_verdict_carried_over_names_documents_that_sho
             assert verdict.evidence == (f"{task}.task.evidence.json",)
             assert names.get(condition, f"property.{condition}") in shown[verdict.evidence[0]]
     assert "contact-free" in shown["conceptual-two-robots.evidence.json"]
+    carried_over = {verdict.name for verdict in verdicts if verdict.method == METHOD and verdict.holds}
+    assert len(carried_over) > 7
+    assert shown["conceptual-two-robots.detailed.evidence.json"] == carried_over
+
+
+def test_a_detailed_net_that_contradicts_the_theorem_is_a_fault_of_ours() -> None:
+    net = catalogue_net("conceptual_one_robot")
+    refinement, report = refine(net, catalogue_tasks()), check(net)
+    over = [
+        replace(verdict, status=Status.VIOLATED) if verdict.name == "reversible" else verdict
+        for verdict in carried(refinement.correspondence, refinement.blocks, report)
+    ]
+    with pytest.raises(TheoremError, match="'reversible' is violated, says the theorem, and proved"):
+        refinement_evidence((), report, over, detailed=refinement.net)
 
 
 def test_a_condition_that_is_answered_otherwise_is_a_fault_of_ours() -> None:
