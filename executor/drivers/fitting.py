@@ -23,11 +23,14 @@ def _misfits(binding: Binding, net: Net) -> Iterator[Diagnostic]:
     if document.cell != net.name:
         message = f"this binding is for the cell '{document.cell}', and the net is '{net.name}'"
         yield binding.problem("F5101", ("cell",), message, "name the cell, when you have looked at all that is bound")
-    signals = {signal.name: signal for signal in net.signals}
+    signals = {signal.name: signal for signal in net.signals if signal.kind is not SignalKind.TIMER}
     for name in document.signals:
         if name not in signals:
             hint = did_you_mean(name, list(signals)) + "take it out, or correct its name"
-            yield binding.problem("F5101", ("signals", name), f"the net has no signal '{name}'", hint)
+            message = f"the net has no signal '{name}'"
+            if name in net.signal_index:
+                message, hint = f"'{name}' is a timer, which its controller sets", "take it out"
+            yield binding.problem("F5101", ("signals", name), message, hint)
     for name, signal in signals.items():
         if name not in document.signals:
             read = "{device: ..., read: ...}"

@@ -127,7 +127,9 @@ class Execution:
         self.fault = ""
         self.operated = operator is not None
         self.overdue: dict[str, asyncio.TimerHandle] = {}
-        """For each completion signal, the alarm of the command that it completes."""
+        """For each completion signal, the alarm of the command that it completes, if its place has no time limit."""
+        self.ticks: dict[str, asyncio.TimerHandle] = {}
+        """For each controller with a time that runs, when it is told the time next."""
         self.turn = 0
         self.fired_seconds = -1.0
         self.fired_at_once = 0
@@ -169,7 +171,7 @@ class Execution:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            for alarm in self.overdue.values():
+            for alarm in (*self.overdue.values(), *self.ticks.values()):
                 alarm.cancel()
 
     def now_seconds(self) -> float:
@@ -178,11 +180,11 @@ class Execution:
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing is pending: no message under way, no event in the cell to come, no completion awaited.
+        """Whether nothing is pending: no message under way, no event in the cell to come, nothing awaited or timed.
 
         Then time alone changes nothing; only the operator, by a step or a resume, may let something fire.
         """
-        return not self.under_way and self.driver.at_rest and not self.overdue
+        return not self.under_way and self.driver.at_rest and not self.overdue and not self.ticks
 
     def situation(self) -> Situation:
         """What the run is doing, and what waits for what; exact at quiescence."""
@@ -242,6 +244,7 @@ class Execution:
                     self._act(COORDINATOR, self.coordinator.permit(0))
             else:
                 self._act(name, self.controllers[name].fire())
+                self._tick(name)
                 self._act(name, self.controllers[name].report())
             self._settle()
             await self.quiet()
@@ -334,14 +337,26 @@ class Execution:
                     pass  # to fire is what every message leads to
                 case unknown:
                     raise ProtocolError(f"'{name}' was sent {unknown!r}")
+            self._tick(name)
             fired = [] if self.paused else controller.fire()
             if fired:
                 self._act(name, fired)
                 self._post(name, Continue())
+                self._tick(name)
             self._act(name, controller.report())
             self._handled()
             if fired:
                 await asyncio.sleep(0)  # the others' turn, and the operator's, even where firing never ends
+
+    def _tick(self, name: str) -> None:
+        """Tell a controller the time, and see to it that it is told again when the next of its times is over."""
+        controller = self.controllers[name]
+        self._act(name, controller.tick(self.now_seconds()))
+        if (earlier := self.ticks.pop(name, None)) is not None:
+            earlier.cancel()
+        if (due := controller.deadline()) is not None and self.clock is not None:
+            delay = self.clock.loop_delay_seconds(due)
+            self.ticks[name] = self.clock.loop.call_later(delay, self._post, name, Continue())
 
     async def _operate(self, operator: Callable[[Execution], Awaitable[None]]) -> None:
         await operator(self)
@@ -414,9 +429,9 @@ class Execution:
         self._act(owner, self.controllers[owner].sent(sending.place, sending.entry))
 
     def watch(self, place: str) -> None:
-        """Give the alarm where the command of a place is not completed in time, from now on."""
+        """Give the alarm where the command of a place without a time limit is not completed in time, from now on."""
         completion = self.net.place(place).completion
-        if completion is not None:
+        if completion is not None and self.net.place(place).within is None:
             if (earlier := self.overdue.pop(completion, None)) is not None:
                 earlier.cancel()
             self.overdue[completion] = asyncio.get_running_loop().call_later(

@@ -129,7 +129,10 @@ class Host:
         self.messages = 0
         self.repeats = 0
         self.overdue: dict[str, asyncio.TimerHandle] = {}
-        """For each completion signal, the alarm of the command that it completes."""
+        """For each completion signal, the alarm of the command that it completes, if its place has no time limit."""
+        self.clock: RunClock | None = None
+        self.ticks: dict[str, asyncio.TimerHandle] = {}
+        """For each controller with a time that runs, when it is told the time next."""
         self.outcome: asyncio.Future[Situation] | None = None
 
     # The run
@@ -141,7 +144,7 @@ class Host:
         """
         loop = asyncio.get_running_loop()
         self.outcome = loop.create_future()
-        clock = RunClock(loop, loop.time(), 1.0)
+        clock = self.clock = RunClock(loop, loop.time(), 1.0)
         self.trace.run_by(loop.time)
         tasks = [
             asyncio.create_task(self.link.run(self), name="link"),
@@ -166,7 +169,7 @@ class Host:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            for alarm in self.overdue.values():
+            for alarm in (*self.overdue.values(), *self.ticks.values()):
                 alarm.cancel()
 
     def situation(self) -> Situation:
@@ -331,9 +334,11 @@ class Host:
         self.firing[machine] = self.firing[machine] + 1 if item is None else 0
         if self.firing[machine] > FIRINGS_AT_ONCE_MAX:
             self._fail(f"'{machine}' fires without end, and no gate ever holds it")
+        self._tick(machine)
         if not self.stopping and (fired := controller.fire()):
             self._act(machine, fired)
             self.posted.append((machine, None))
+            self._tick(machine)
         self._act(machine, controller.report())
 
     def _act(self, machine: str, effects: list[Effect]) -> None:
@@ -390,7 +395,7 @@ class Host:
 
     def _send(self, place: str, entry: int) -> None:
         sender = self.net.place(place)
-        if sender.completion is not None:
+        if sender.completion is not None and sender.within is None:
             if (earlier := self.overdue.pop(sender.completion, None)) is not None:
                 earlier.cancel()
             self.overdue[sender.completion] = asyncio.get_running_loop().call_later(
@@ -401,6 +406,18 @@ class Host:
         self._act(owner, self.controllers[owner].sent(place, entry))
 
     # Time
+
+    def _tick(self, name: str) -> None:
+        """Tell a controller the time, and see to it that it is told again when the next of its times is over."""
+        if self.clock is None:
+            return
+        controller = self.controllers[name]
+        self._act(name, controller.tick(self.clock.now_seconds()))
+        if (earlier := self.ticks.pop(name, None)) is not None:
+            earlier.cancel()
+        if (due := controller.deadline()) is not None:
+            delay = self.clock.loop_delay_seconds(due)
+            self.ticks[name] = self.clock.loop.call_later(delay, self._post, name, None)
 
     async def _repeat(self) -> None:
         while True:

@@ -122,7 +122,8 @@ class Monitor:
                 if moves[name].flips & bit:
                     (self.refusing if name in loop.accidents else self.sending)[place].append(moves[name])
         self.hidden = [m for name, m in moves.items() if name not in own | sends and name not in loop.accidents]
-        self.signals = tuple(signal.name for signal in net.signals)
+        self.signals = tuple(signal.name for signal in net.signals if signal.name in loop.shown)
+        """All but timers: that a time is over says nothing of the machines."""
         self.shown = tuple((self._bit(place), means) for place, means in map(loop.shown.__getitem__, self.signals))
         self.work = {place.name: self._work(laws, place.name, loop.at) for place in laws.commanding}
         self.taken = [bool(loop.net.initial_marking & bit) == means for bit, means in self.shown]
@@ -156,7 +157,9 @@ class Monitor:
             return None
         if self.passed(at_seconds) is not None:
             return self.divergence
-        s = self.net.signal_index[name]
+        if name not in self.signals:
+            return None
+        s = self.signals.index(name)
         self.taken[s] = value
         if not value and any(place.completion == name for place in self.net.places):
             # The command that clears it follows; until then the bit differs from what was taken, and not for long.
@@ -312,7 +315,7 @@ def watch(monitor: Monitor, trace: Trace) -> Divergence | None:
 
 
 def _without_sensor_gates(net: Net) -> Net:
-    completions = {place.completion for place in net.places}
+    completions = {signal for place in net.places for signal in place.cleared}
     return replace(
         net,
         transitions=tuple(

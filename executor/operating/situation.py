@@ -75,7 +75,8 @@ def is_deadlock(player: TokenPlayer, word: Word) -> bool:
 def blocked(player: TokenPlayer, word: Word) -> Iterator[Blocked]:
     """What waits: the firable transitions with closed gates; in a deadlock, those that have some token to take."""
     net = player.net
-    firable = [c for c in player.transitions.values() if c.firable(word, player.places)]
+    faults = {net.transitions[t].name for t in net.fault_transitions.values()}  # nobody waits for a timeout
+    firable = [c for c in player.transitions.values() if c.name not in faults and c.firable(word, player.places)]
     shown = firable or [c for c in player.transitions.values() if c.takes & word]
     for compiled in shown:
         yield Blocked(

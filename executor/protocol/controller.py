@@ -8,7 +8,7 @@ the image, at the commit, and the commit always finds its part enabled. (The sig
 Eq. (8) then means "each true at its own vote", which SEMANTICS O4 accepts for gates that no command clears.)
 
 A token that enters a place with a command does three things in one act: the marking is changed, the completion signal
-of the place is cleared in the image, and the command is sent (O7). Nothing reads the image in between.
+of the place and its timer are cleared in the image, and the command is sent (O7). Nothing reads the image in between.
 
 A pure machine: inputs are method calls, outputs the effects that they return. It asks no clock and remembers a round
 only until the coordinator says that nobody will speak of it again. The alternative, a promise with a time limit, needs
@@ -30,11 +30,12 @@ What is kept in stable storage, and the fault that would show if it were not:
 - `epoch`: reports would be numbered from 0 again, and ignored as old ones; then nobody asks for what is enabled here.
 
 Not kept: *sensors*, because nobody knows what they show after an outage: their gates are closed, wanted 1 or 0, until
-the driver has told them anew. *Latched* values, for the same reason; a completion among them is told again, because
-its command is asked after. What the coordinator was *told* and has *seen*, because a report of the new epoch is newer
-than all. Which local transition fired *last*, because it only shares out turns where no arbiter decides. The
-coordinator's epoch, because a message of an earlier one can only repeat what is true: rounds below `closed_below` are
-closed for ever, and what it has seen of reports is older than those of the new epoch here.
+the driver has told them anew. *Timers*, because a time that ran while nobody looked says nothing (`timers`). *Latched*
+values, for the same reason; a completion among them is told again, because its command is asked after. What the
+coordinator was *told* and has *seen*, because a report of the new epoch is newer than all. Which local transition fired
+*last*, because it only shares out turns where no arbiter decides. The coordinator's epoch, because a message of an
+earlier one can only repeat what is true: rounds below `closed_below` are closed for ever, and what it has seen of
+reports is older than those of the new epoch here.
 
 After a restart a controller is *held*: nothing moves because a computer has started. It fires nothing, promises nothing
 more and sends no command, until an operator resumes it. What it promised before is still promised: its votes are
@@ -65,6 +66,7 @@ from firable.executor.protocol.messages import (
     Vote,
     VoteRequest,
 )
+from firable.executor.protocol.timers import Timers
 from firable.executor.protocol.token_player import Arbiter, Compiled, TokenPlayer, Word
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Marking, SignalKind
@@ -102,6 +104,7 @@ class LocalController:
         self.closed_below = 0
         self.latched: dict[str, bool] = {}
         self.commands = Commands(self.subnet, {})
+        self.timers = Timers(self.player)
         self.untold: Word = 0
         """The sensors that have shown nothing since the restart."""
         self.held = False
@@ -130,7 +133,8 @@ class LocalController:
 
     def start(self) -> list[Effect]:
         """The first act: from now on this epoch is used, so it is kept before anything is said in it."""
-        return [Keep("epoch", self.epoch)]
+        cleared = (name for name in self.timers.signals if not self.word & self.player.signal_bit(name))
+        return [Keep("epoch", self.epoch), *(Taken(name, value=False) for name in cleared if self.held)]
 
     def answer(self, place: str, entry: int, answer: Answer) -> list[Effect]:
         """Take what is said of a command in `commands.questions`."""
@@ -147,6 +151,7 @@ class LocalController:
         """End the hold after a restart, and send what is owed; `ProtocolError` while there are questions."""
         owed = list(self.commands.resume(frozenset(self.subnet.names(self.marking))))
         self.held = False
+        self.timers.begin_anew(self.word)
         return owed
 
     def receive(self, message: ToController) -> list[Effect]:
@@ -182,6 +187,19 @@ class LocalController:
     def sent(self, place: str, entry: int) -> list[Effect]:
         """Take the driver's word that it has the command of a place."""
         return list(self.commands.sent(place, entry))
+
+    def tick(self, now_seconds: float) -> list[Effect]:
+        """Take what the clock shows: set the timers whose time is over; a controller that is held times nothing."""
+        if self.held:
+            return []
+        effects: list[Effect] = []
+        for place in self.timers.over(now_seconds, self.word):
+            effects += self.read(self.subnet.place(place).cleared[-1], value=True)
+        return effects
+
+    def deadline(self) -> float | None:
+        """When it has to be told the time next; minus infinity for at once, None while nothing is timed."""
+        return None if self.held else self.timers.deadline(self.word)
 
     def fire(self) -> list[Effect]:
         """Fire one local transition, if one is enabled and disturbs no promise; no effect means that none is."""
@@ -229,6 +247,8 @@ class LocalController:
                     self.closed_below, self.closed = below, set(map(_number, numbers))
                 case ("turns", _, _), [*turns]:
                     self.arbiter.turns = self.kept_turns = tuple(map(_number, turns))
+        held = self._locked_reads()
+        self.word &= ~sum(bit for name in self.timers.signals if not (bit := self.player.signal_bit(name)) & held)
         sensors = (s.name for s in self.subnet.signals if s.kind is SignalKind.SENSOR)
         self.untold = sum(map(self.player.signal_bit, sensors))
 
@@ -286,11 +306,11 @@ class LocalController:
         self.word = transition.fire(before)
         yield from self._keep_word()
         for place in self.player.entered(transition.name):
-            completion = self.subnet.place(place).completion
-            if completion is not None:
-                self.latched.pop(completion, None)  # a value from before the command
-                if before & self.player.signal_bit(completion):
-                    yield Taken(completion, value=False)
+            for signal in self.subnet.place(place).cleared:
+                self.latched.pop(signal, None)  # a value from before the command
+                if before & self.player.signal_bit(signal):
+                    yield Taken(signal, value=False)
+            self.timers.enter(place)
             yield from self.commands.enter(place, held=self.held)
 
     def _release(self) -> Iterator[Effect]:
@@ -298,7 +318,9 @@ class LocalController:
         for signal, value in list(self.latched.items()):
             if not self.player.signal_bit(signal) & self._locked_reads():
                 del self.latched[signal]
-                yield from self._take(signal, value)
+                timed = self.timers.signals.get(signal)
+                if timed is None or self.timers.waits(timed.name, self.word):  # it may have come in time after all
+                    yield from self._take(signal, value)
 
     def _take(self, signal: str, value: bool) -> Iterator[Effect]:
         bit = self.player.signal_bit(signal)

@@ -75,6 +75,8 @@ class Simulation:
         self.completing: list[tuple[str, int]] = []
         self.events: list[Event] = []
         self.messages = 0
+        self.now_seconds = 0.0
+        self.timed = [controller for controller in self.controllers.values() if controller.timers.places]
 
     def run(self, steps: int) -> Trace:
         """Let `steps` random things happen, then let the network fall quiet, and return the joint trace.
@@ -111,6 +113,8 @@ class Simulation:
 
     def _something(self) -> None:
         choice = self.random.random()
+        if self.timed and self.random.random() < 0.2:
+            self._pass()
         if self.late and self.random.random() < 0.03:
             self.in_flight.append(self.late.pop(self.random.randrange(len(self.late))))
         if choice < 0.55 and self.in_flight:
@@ -128,6 +132,12 @@ class Simulation:
             self._perform(self.coordinator.resend())
             for controller in self.controllers.values():
                 self._perform(controller.resend())
+
+    def _pass(self) -> None:
+        """Let some time pass: none, or so much that what is timed is over, or that it is not."""
+        self.now_seconds += self.random.choice([0.0, 1.0, 10.0])
+        controller = self.random.choice(self.timed)
+        self._perform(controller.tick(self.now_seconds))
 
     def _turn(self, controller: LocalController) -> None:
         if self.random.random() < 0.5:

@@ -303,6 +303,8 @@ class World:
 
     def turn(self, process: Process[Any]) -> None:
         """Let a controller fire if it may and can, and report what that changed."""
+        if process.machine is not None and process.machine.timers.places:
+            self.act(process, process.machine.tick(process.now_seconds(self.step * SECONDS_PER_STEP)))
         if process.machine is not None and not self.paused and not self._is_slow():
             self.act(process, process.machine.fire())
         if process.machine is not None:
