@@ -13,7 +13,7 @@ its own transitions go. A driver's fault or an overdue command ends the host: it
 see it lost.
 
 *Stop*: nothing more is asked, promised or fired, and the host waits, for a while, until what was decided is applied and
-acknowledged. Only then its trace has a last line; one without says honestly that something was open.
+acknowledged; hosts of controllers wait for the coordinator's to end, so that their last words arrive. Only then its trace has a last line; one without says honestly that something was open.
 
 After a restart the controllers are held, and the driver is asked after every command that was under way; `resume` is
 the operator's. Rejected: one process for each of driver, controller and link. Their crashes would be independent, and
@@ -303,7 +303,7 @@ class Host:
             return
         if self.posted:
             self._wake()
-        elif self.stopping and self._is_settled() and (self.coordinator is None or self.coordinator.idle):
+        elif self.stopping and self._is_settled() and self._is_heard():
             self._end()
 
     def _give(self, machine: str, item: Message | SignalRead | None) -> None:
@@ -469,6 +469,10 @@ class Host:
         return all(opened.decided and opened.committed is None for opened in rounds) and not any(
             promise.promised for controller in self.controllers.values() for promise in controller.promises.values()
         )
+
+    def _is_heard(self) -> bool:
+        """Whether nobody waits for a word of this host: the coordinator has ended, or here every round is closed."""
+        return COORDINATOR not in self.connected_to if self.coordinator is None else self.coordinator.idle
 
     def _end(self) -> None:
         if self.outcome is None or self.outcome.done():

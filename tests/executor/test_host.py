@@ -198,6 +198,7 @@ def test_a_trace_says_who_was_lost_and_who_came_back(tmp_path: Path) -> None:
 
     run_in_virtual_time(main())
     notes = [e.note for e in read_trace(tmp_path / "robot.trace").events if isinstance(e, Noted)]
-    assert [note for note in notes if note in {"connected", "lost"}] == 4 * ["connected"] + 4 * ["lost"] + 4 * [
-        "connected"
-    ]
+    told = [note for note in notes if note in {"connected", "lost"}]
+    # In the end the coordinator is lost once more, by whose end that of this host is known to be heard.
+    assert told == [*4 * ["connected"], *4 * ["lost"], *4 * ["connected"], *told[12:]]
+    assert set(told[12:]) <= {"lost"}

@@ -1,7 +1,7 @@
 """The hosts of a cell in one process, over the in-process link, in virtual time."""
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from firable.decompose import split
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.link import COORDINATOR, Greeting, Link
 from firable.executor.operating.host import Host
 from firable.executor.operating.host_trace import TRACE, HostTrace
 from firable.executor.operating.situation import Situation
@@ -26,7 +26,16 @@ ALL_IN_ONE = ((COORDINATOR, "system", "robot", "mc", "conveyor"),)
 class Cell:
     """The hosts of the one-robot cell; `of` says which machines each runs."""
 
-    def __init__(self, folder: Path, of: tuple[tuple[str, ...], ...] = ONE_EACH, name: str = "one_robot") -> None:
+    def __init__(
+        self,
+        folder: Path,
+        of: tuple[tuple[str, ...], ...] = ONE_EACH,
+        name: str = "one_robot",
+        link: Callable[[Greeting], Link] | None = None,
+        seconds: float = 1.0,
+    ) -> None:
+        self.make_link = link
+        self.seconds = seconds
         self.decomposition = split(catalogue_net(name))
         self.net = self.decomposition.net
         self.folder = folder
@@ -48,11 +57,16 @@ class Cell:
         journal = self.journals[machines]
         trace = HostTrace(self.net, machines, self.path(machines), journal.kept(TRACE))
         subnets = [subnet for subnet in self.decomposition.subnets if subnet.name in machines]
-        link = self.links[machines] = InProcessLink(self.exchange, Greeting("d", machines))
+        greeting = Greeting("d", machines)
+        link: Link
+        if self.make_link is not None:
+            link = self.make_link(greeting)
+        else:
+            link = self.links[machines] = InProcessLink(self.exchange, greeting)
         host = self.hosts[machines] = Host(
             self.decomposition,
             machines,
-            DryRunDriver(subnets, 1.0, shown),
+            DryRunDriver(subnets, self.seconds, shown),
             link,
             trace,
             journal,

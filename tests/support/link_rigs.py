@@ -17,7 +17,7 @@ from firable.executor.links.zenoh_link import ZenohLink
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic
 
-CONTROLLERS = ("system", "robot", "mc", "conveyors")
+CONTROLLERS = ("system", "robot", "mc", "conveyor")
 PATIENCE_SECONDS = 30.0
 
 

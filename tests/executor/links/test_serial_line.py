@@ -3,11 +3,13 @@
 import asyncio
 import random
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
+from support.hosts import Cell
 from support.link_rigs import CONTROLLERS, Heard, SerialRig, over_a_serial_line, running
 
 from firable.executor.links.framing import PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
@@ -175,5 +177,22 @@ def test_a_message_that_no_frame_holds_ends_the_link() -> None:
                 with pytest.raises(InputError, match="longer than a frame"):
                     async with asyncio.timeout(20):
                         await centre
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.0003])
+def test_hosts_run_a_cell_over_a_line_with_noise(noise: float, tmp_path: Path) -> None:
+    async def main() -> None:
+        async with over_a_serial_line() as rig, asyncio.timeout(60):
+            cell = Cell(tmp_path, link=rig.link, seconds=0.005)
+            while cell.firings() < 10:
+                await asyncio.sleep(0.05)
+            rig.flipped = rig.lost = rig.doubled = noise
+            while cell.firings() < 60:
+                await asyncio.sleep(0.05)
+            rig.flipped = rig.lost = rig.doubled = 0.0
+            await cell.stop()
+            assert cell.replayed().firings >= 60
 
     asyncio.run(main())
