@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from firable.executor.links.link import Link
     from firable.executor.operating.host import Host
     from firable.executor.operating.situation import Situation
+    from firable.executor.protocol.commands import Answer
     from firable.nets.bundle import Bundle
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.verdict import Verdict
@@ -117,7 +118,12 @@ def host_options(command: F) -> F:
 
 
 def run_host_of(
-    path: str, bundle: Bundle, options: HostOptions, trace: str | None, notes: tuple[Diagnostic, ...]
+    path: str,
+    bundle: Bundle,
+    options: HostOptions,
+    trace: str | None,
+    notes: tuple[Diagnostic, ...],
+    said: Mapping[str, Answer],
 ) -> Report:
     """Run this host until it is stopped or fails, and report how it ended."""
     from firable.executor.operating.hosting import machines_of, run_host
@@ -136,6 +142,7 @@ def run_host_of(
         trace_path=trace,
         journal_path=options.journal,
         resume=options.resume,
+        said=said,
         tell=_told,
         started=hosts.append,
     )

@@ -81,8 +81,6 @@ def run(
     options = HostOptions(**host)
     if not options.is_one_of_several:
         options.refuse_alone()
-    elif say:
-        raise click.UsageError("--say is of a run of the whole cell, and not of one host among others")
 
     def make() -> Report:
         from firable.cli.stepping import stepping
@@ -93,7 +91,8 @@ def run(
         if options.is_one_of_several:
             if trace is not None:
                 _refuse_to_overwrite(trace, bundle, *filter(None, (options.bind, options.journal)))
-            return run_host_of(bundle, loaded, options, trace, _notes(loaded.net))
+            said = _said(loaded.net, say, options.journal)
+            return run_host_of(bundle, loaded, options, trace, _notes(loaded.net), said)
         plant_file = _plant_file(loaded, plant)
         model = read_plant(plant_file)
         if trace is not None:

@@ -13,7 +13,8 @@ its own transitions go. A driver's fault or an overdue command ends the host: it
 see it lost.
 
 *Stop*: nothing more is asked, promised or fired, and the host waits, for a while, until what was decided is applied and
-acknowledged; hosts of controllers wait for the coordinator's to end, so that their last words arrive. Only then its trace has a last line; one without says honestly that something was open.
+acknowledged; hosts of controllers wait for the coordinator's to end, so that their last words arrive. Only then its
+trace has a last line; one without says honestly that something was open.
 
 After a restart the controllers are held, and the driver is asked after every command that was under way; `resume` is
 the operator's. Rejected: one process for each of driver, controller and link. Their crashes would be independent, and
@@ -24,7 +25,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, assert_never
 
@@ -91,6 +92,7 @@ class Host:
         overdue_seconds: float = 120.0,
         resend_seconds: float = RESEND_SECONDS,
         settle_seconds: float = SETTLE_SECONDS,
+        said: Mapping[str, Answer] | None = None,
         tell: Told | None = None,
     ) -> None:
         self.net = decomposition.net
@@ -101,6 +103,8 @@ class Host:
         self.overdue_seconds = overdue_seconds
         self.resend_seconds = resend_seconds
         self.settle_seconds = settle_seconds
+        self.said = said or {}
+        """What an operator says of commands, by place, where the driver does not know."""
         self.tell = tell
         self.coordinator: Coordinator | None = None
         if COORDINATOR in machines:
@@ -394,6 +398,13 @@ class Host:
                     self.link.send(effect.controller, COORDINATOR, effect)
 
     def _send(self, place: str, entry: int) -> None:
+        self._watch(place)
+        self.driver.send(self.net.place(place), entry)
+        owner = str(self.net.place(place).owner)
+        self._act(owner, self.controllers[owner].sent(place, entry))
+
+    def _watch(self, place: str) -> None:
+        """Have an alarm, should a command not be completed in time; a place with a time of its own needs none."""
         sender = self.net.place(place)
         if sender.completion is not None and sender.within is None:
             if (earlier := self.overdue.pop(sender.completion, None)) is not None:
@@ -401,9 +412,6 @@ class Host:
             self.overdue[sender.completion] = asyncio.get_running_loop().call_later(
                 self.overdue_seconds, self._overdue, place
             )
-        self.driver.send(sender, entry)
-        owner = str(sender.owner)
-        self._act(owner, self.controllers[owner].sent(place, entry))
 
     # Time
 
@@ -437,10 +445,14 @@ class Host:
         """Ask the driver what became of the commands that were under way at a crash."""
         for name, controller in self.controllers.items():
             for place, entry in controller.commands.questions:
-                said = await self.driver.ask(self.net.place(place), entry)
-                self.answer(name, place, entry, Answer(said.value))
-                if said.value == Answer.UNKNOWN:
-                    self._told("held", f"nobody knows what became of the command of '{place}'")
+                answer = Answer((await self.driver.ask(self.net.place(place), entry)).value)
+                if answer is Answer.UNKNOWN:
+                    answer = self.said.get(place, answer)
+                self.answer(name, place, entry, answer)
+                if answer is Answer.UNKNOWN:
+                    self._told("held", f"nobody knows what became of the command of '{place}': look, and --say it")
+                elif answer is Answer.WORKING:
+                    self._watch(place)
             if controller.held:
                 self._told("held", f"{called(name)} is held after a restart, until it is resumed")
         await asyncio.get_running_loop().create_future()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +20,7 @@ from firable.executor.links.link import COORDINATOR, Greeting, Link
 from firable.executor.operating.host import Host, Told
 from firable.executor.operating.host_trace import TRACE, HostTrace
 from firable.executor.operating.situation import Situation
+from firable.executor.protocol.commands import Answer
 from firable.nets.bundle import Bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
@@ -98,11 +99,14 @@ def run_host(
     trace_path: Path | str | None = None,
     journal_path: Path | str | None = None,
     resume: bool = False,
+    said: Mapping[str, Answer] | None = None,
     overdue_seconds: float = 120.0,
     tell: Told | None = None,
     started: Callable[[Host], None] | None = None,
 ) -> Situation:
     """Run a host until it is stopped (Ctrl-C, SIGTERM) or fails; `resume` ends the hold after a restart by itself.
+
+    `said` is what an operator says of commands, by place, where no machine can tell what became of them.
 
     Raises `InputError` as link, journal and trace do.
     """
@@ -110,7 +114,15 @@ def run_host(
     try:
         trace = HostTrace(bundle.net, machines, trace_path, journal.kept(TRACE))
         host = Host(
-            bundle.decomposition, machines, driver, link, trace, journal, overdue_seconds=overdue_seconds, tell=tell
+            bundle.decomposition,
+            machines,
+            driver,
+            link,
+            trace,
+            journal,
+            overdue_seconds=overdue_seconds,
+            said=said,
+            tell=tell,
         )
         if started is not None:
             started(host)

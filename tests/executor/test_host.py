@@ -7,10 +7,13 @@ import pytest
 from support.hosts import ALL_IN_ONE, ONE_EACH, TOGETHER, Cell
 
 from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.driver import Answer as DriversAnswer
+from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.links.link import COORDINATOR
 from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.messages import Decision, Vote
+from firable.nets.net import Place
 from firable.semantics.trace import Noted, read_trace
 
 CENTRE = (COORDINATOR,)
@@ -182,6 +185,36 @@ def test_a_round_that_was_aborted_keeps_nobody_waiting(tmp_path: Path) -> None:
         assert coordinator is not None
         coordinator.permit(0)
         assert not any("robot" in sentence for sentence in cell.hosts[CENTRE].waits())
+
+    run_in_virtual_time(main())
+
+
+def test_what_no_machine_knows_an_operator_may_say_beforehand(tmp_path: Path) -> None:
+    class Forgetful(DryRunDriver):
+        async def ask(self, place: Place, entry: int) -> DriversAnswer:
+            return DriversAnswer.UNKNOWN if place.command is not None and entry else DriversAnswer.DONE
+
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(2.5)
+        await cell.kill(ROBOT)
+        cell.start(ROBOT)
+        host = cell.hosts[ROBOT]
+        ((place, _),) = host.controllers["robot"].commands.questions
+        host.driver = Forgetful([cell.decomposition.subnet("robot")], 1.0)
+        await asyncio.sleep(1)
+        assert not host.resume()
+        assert any(f"of '{place}': look" in sentence for kind, sentence in cell.told if kind == "held")
+        await cell.kill(ROBOT)
+        cell.start(ROBOT)
+        host = cell.hosts[ROBOT]
+        host.driver = Forgetful([cell.decomposition.subnet("robot")], 1.0)
+        host.said = {place: Answer.NOT_RECEIVED}
+        await asyncio.sleep(1)
+        assert host.resume()
+        await asyncio.sleep(20)
+        await cell.stop()
+        assert cell.replayed().firings > 10
 
     run_in_virtual_time(main())
 
