@@ -65,10 +65,10 @@ def prove(
 
 def show_obligations(verdicts: Sequence[Verdict]) -> None:
     """Print how many obligations of each family are proved."""
-    from firable.decompose.proofs.families import FAMILIES
+    from firable.decompose.proofs.families import REPORTED
     from firable.decompose.proofs.family import proved_of
 
-    of_each = [(family, proved_of(family, verdicts)) for family in FAMILIES]
+    of_each = [(family, proved_of(family, verdicts)) for family in REPORTED]
     width = max(3, *(len(str(len(some))) for _, some in of_each))
     for family, some in of_each:
         if not some:
@@ -86,13 +86,15 @@ def _report(
     from firable.decompose.proofs.assumptions import assumptions
     from firable.decompose.proofs.proving import prove as prove_split
     from firable.decompose.proofs.standing import standing
+    from firable.decompose.protocol.parametric.side_conditions import side_conditions
     from firable.decompose.splitting.cut import split
 
     loaded = load_net(argument)
     with loaded.placing():
         decomposition = split(loaded.net)
     found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)))
-    verdicts, loop, evidence = found.verdicts, None, dict[str, str | bytes](found.files)
+    verdicts = (*found.verdicts, *side_conditions(decomposition))
+    loop, evidence = None, dict[str, str | bytes](found.files)
     if machines is not None:
         from firable.decompose.proofs.held_gates import held_gates
 

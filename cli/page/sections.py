@@ -80,9 +80,9 @@ def _obligations(report: Report) -> Markup | None:
 
 def _families(report: Report) -> Sequence[Family]:
     """The families of obligations; a check has none, though a verdict of it may bear the name of one."""
-    from firable.decompose.proofs.families import FAMILIES
+    from firable.decompose.proofs.families import REPORTED
 
-    return FAMILIES if report.decomposition is not None else ()
+    return REPORTED if report.decomposition is not None else ()
 
 
 def _family(title: str, says: str, some: Sequence[Verdict]) -> Markup:

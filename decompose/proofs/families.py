@@ -25,6 +25,7 @@ from firable.decompose.proofs.ownership import ownership
 from firable.decompose.proofs.reading import reading
 from firable.decompose.proofs.sides import Sides
 from firable.decompose.protocol.parametric.proving import FILE, theorem
+from firable.decompose.protocol.parametric.side_conditions import side_conditions
 
 
 def _static(
@@ -36,12 +37,15 @@ def _static(
 def protocol(task: Task) -> Proved:
     """The theorem on the protocol, which is the same for every net.
 
-    What it assumes of a decomposition (`parametric.side_conditions`) is what the families above prove, each with its
-    file: ownership, O3, Eq. (7)-(10), M0 and commands.
+    What it assumes of a decomposition, `SIDE_CONDITIONS` compare; a bundle needs no verdicts on them, since families
+    above prove the same, each with its file: ownership, O3, Eq. (7)-(10), M0, commands, and
+    of arbitration that no row is there twice.
     """
     verdicts, text = theorem(task.timeout_ms)
     return Proved(verdicts, {FILE: text})
 
+
+SIDE: Final = "protocol.side"
 
 _RUNS: Final = "whatever is lost or crashes, what runs is a run of the net"
 
@@ -66,6 +70,18 @@ FAMILIES: Final[tuple[Family, ...]] = (
         protocol,
         ("O1", "O5"),
         Kind.PROTOCOL,
+        SIDE,
     ),
 )
 """Every family, in the order of a report."""
+
+SIDE_CONDITIONS: Final = Family(
+    SIDE,
+    "side conditions",
+    "what that assumes of this split, as do ownership, O3, Eq. (7)-(10), M0, commands, arbitration",
+    lambda task: Proved(side_conditions(task.decomposition)),
+)
+"""What connects the theorem on the protocol with one decomposition: told of it, and nothing that a bundle holds."""
+
+REPORTED: Final = (*FAMILIES, SIDE_CONDITIONS)
+"""Every family of which a report on a decomposition tells."""

@@ -58,10 +58,18 @@ class Family:
     prove: Callable[[Task], Proved]
     serves: tuple[str, ...] = ()
     kind: Kind = Kind.STATIC
+    apart: str = ""
+    """The name of a family within this one that is told by itself."""
 
     def has(self, verdict: Verdict) -> bool:
         """Whether the verdict is one of this family."""
-        return verdict.name.partition(".")[0] == self.name
+        if self.apart and _within(verdict.name, self.apart):
+            return False
+        return _within(verdict.name, self.name)
+
+
+def _within(name: str, family: str) -> bool:
+    return name == family or name.startswith(f"{family}.")
 
 
 def proved_of(family: Family, verdicts: Iterable[Verdict]) -> list[Verdict]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from firable.decompose.proofs.assumptions import assumptions
-from firable.decompose.proofs.families import FAMILIES
+from firable.decompose.proofs.families import FAMILIES, SIDE_CONDITIONS
 from firable.decompose.proofs.family import Kind, proved_of
 from firable.nets.decomposition import Decomposition
 from firable.nets.right_to_run import required_verdicts
@@ -44,9 +44,9 @@ OTHERWISE: Final = {
 
 
 ASSUMED_BY_THE_PROTOCOL: Final = frozenset(
-    ("ownership", "o3", "eq7", "eq8", "eq9-10", "initial-marking", "commands"),
+    ("ownership", "o3", "eq7", "eq8", "eq9-10", "initial-marking", "commands", "arbitration"),
 )
-"""The families that prove of a split what the protocol proof assumes of it."""
+"""The families that prove of a split what the protocol proof assumes of it; the last: no row is there twice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +98,8 @@ def _doubted(decomposition: Decomposition, given: Iterable[Verdict]) -> Iterator
     for family in FAMILIES:
         if family.name in ASSUMED_BY_THE_PROTOCOL and any(name.partition(".")[0] == family.name for name in demanded):
             yield family.title
+    if not all(verdict.holds for verdict in proved_of(SIDE_CONDITIONS, verdicts)):
+        yield SIDE_CONDITIONS.title
 
 
 def _listed(name: str, decomposition: Decomposition) -> str:

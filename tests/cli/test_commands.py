@@ -273,3 +273,18 @@ def test_methods_and_costs_are_told_on_request(capsys: pytest.CaptureFixture[str
             r"by reachability graph, interleaving, 40 markings, 70 edges, [0-9.e-]+ s\n", capsys.readouterr().out
         )
         assert (told is not None) is verbose
+
+
+def test_prove_tells_the_side_conditions_of_the_protocol_theorem_in_one_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["prove", "catalogue:conceptual_one_robot"]) == 0
+    told = capsys.readouterr().out
+    assert "  ✓  40 of 40  protocol " in told
+    assert "  ✓   6 of 6   side conditions  what that assumes of this split, as do ownership, O3" in told
+    code, data = as_json(capsys, "prove", "catalogue:conceptual_one_robot")
+    side = [v for v in data["reports"][0]["verdicts"] if v["name"].startswith("protocol.side.")]
+    assert code == 0
+    assert [(v["name"].rpartition(".")[2], v["status"]) for v in side] == [
+        (name, "proved") for name in ("owner", "parts", "locals", "strangers", "gates", "start")
+    ]

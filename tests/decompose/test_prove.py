@@ -25,6 +25,7 @@ from firable.decompose.proofs.family import Task
 from firable.decompose.proofs.proving import ProofReport, prove
 from firable.decompose.proofs.script import Reader, ScriptError
 from firable.decompose.proofs.standing import ASSUMED_BY_THE_PROTOCOL, standing
+from firable.decompose.protocol.parametric.side_conditions import side_conditions
 from firable.decompose.splitting.cut import split
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_names, catalogue_net, family_net
@@ -91,6 +92,10 @@ def gated_net() -> Net:
 def refuted(decomposition: Decomposition) -> dict[str, Verdict]:
     report = prove(decomposition)
     assert all(verdict.status in {Status.PROVED, Status.VIOLATED} for verdict in report.verdicts)
+    violated = {verdict.name.partition(".")[0] for verdict in report.verdicts if verdict.status is Status.VIOLATED}
+    # What the theorem on the protocol assumes is proved by static families, as every report says: none fails alone.
+    if not all(verdict.holds for verdict in side_conditions(decomposition)):
+        assert violated & ASSUMED_BY_THE_PROTOCOL
     return {verdict.name: verdict for verdict in report.verdicts if verdict.status is Status.VIOLATED}
 
 
@@ -473,6 +478,10 @@ def test_protocol_proof_says_of_a_split_what_it_says_where_all_that_it_assumes_i
                 protocol_lines(decomposition, some)
                 == [("unknown", f"protocol, which assumes of the split what is not proved here: {title}")] * 2
             )
+    side = side_conditions(replace(decomposition, subnets=decomposition.subnets[1:]))
+    assert not all(verdict.holds for verdict in side)
+    doubted = "protocol, which assumes of the split what is not proved here: side conditions"
+    assert protocol_lines(decomposition, (*verdicts, *side)) == [("unknown", doubted)] * 2
     o2 = tuple(v for v in verdicts if not v.name.startswith("o2."))
     assert protocol_lines(decomposition, o2) == [("by the protocol proof", "protocol")] * 2
 
