@@ -11,6 +11,7 @@ import argparse
 from pathlib import Path
 from typing import Final
 
+import executing
 import explicit
 import linking
 import public_nets
@@ -26,6 +27,7 @@ BENCHMARKS: Final = {
     "splitting": splitting.tables,
     "linking": linking.tables,
     "public_nets": public_nets.tables,
+    "executing": executing.tables,
 }
 
 BUSY: Final = (

@@ -33,7 +33,7 @@ from firable.executor.links.link import COORDINATOR
 from firable.executor.operating import restart
 from firable.executor.operating.mailbox import Continue, Mailbox, SignalRead
 from firable.executor.operating.recorder import Recorder
-from firable.executor.operating.situation import Situation, State, blocked, is_deadlock
+from firable.executor.operating.situation import Situation, State, blocked
 from firable.executor.operating.taken_up import TRACE
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
@@ -196,7 +196,7 @@ class Execution:
             return Situation(State.RUNNING, shown)
         if self.taking_up is not None:
             return Situation(State.HELD, shown, (), restart.told(self, self.taking_up))
-        if is_deadlock(player, word):
+        if self.recorder.is_deadlock:
             message = "no transition can fire any more, whatever the signals do"
             return Situation(State.DEADLOCK, shown, tuple(blocked(player, word)), message)
         if self.paused:
@@ -505,6 +505,6 @@ class Execution:
             return replace(self.situation(), state=State.DONE, blocked=())
         # With an operator present, a cell at rest is waited for: it may be paused, or be given work.
         is_stuck = self.at_rest and not self.operated
-        if is_stuck or is_deadlock(self.recorder.player, self.recorder.word):
+        if is_stuck or self.recorder.is_deadlock:
             return self.situation()
         return None

@@ -22,6 +22,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, Protocol
 
+from firable.executor.protocol.enabled import EnabledSet
 from firable.executor.protocol.messages import Keep, Stored
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -97,6 +98,9 @@ class Recorder:
     def __init__(self, net: Net, digest: str, stream: LineStream | None, kept: Stored | None = None) -> None:
         self.player = TokenPlayer.of(net)
         self.word = net.initial_marking
+        openable = [c for c in self.player.transitions.values() if c.openable]
+        places = self.player.places
+        self._firable = EnabledSet([(c.needs & places, c.forbids & places) for c in openable])
         self.stream = stream
         self.firings: dict[str, int] = {transition.name: 0 for transition in net.transitions}
         self.commands = 0
@@ -115,6 +119,11 @@ class Recorder:
             self.note(self.at_seconds, "restarted")
         else:
             self._write(Header(net.name, digest, signals=True, commands=True))
+
+    @property
+    def is_deadlock(self) -> bool:
+        """Whether no transition is firable and openable, as `situation.is_deadlock` says, without looking at each."""
+        return not self._firable.at(self.word & self.player.places)
 
     @property
     def keeping(self) -> list[Keep]:

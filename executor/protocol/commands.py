@@ -65,6 +65,12 @@ class Commands:
 
     def __init__(self, subnet: Net, kept: Mapping[str, Stored]) -> None:
         self.subnet = subnet
+        shared: dict[str, list[str]] = {}
+        for sender in subnet.places:
+            if sender.command is not None and sender.completion is not None:
+                shared.setdefault(sender.completion, []).append(_place_key(sender.name))
+        self.beside = {completion: keys for completion, keys in shared.items() if len(keys) > 1}
+        """Under which keys earlier commands stand that a signal completes as well."""
         self.newest: dict[str, Command] = {}
         """By the key under which each is kept."""
         for key, value in kept.items():
@@ -107,9 +113,8 @@ class Commands:
     def completed(self, completion: str) -> Iterator[Effect]:
         """The completion signal of the newest command has been taken into the process image."""
         yield from self._over(_signal_key(completion))
-        for key, command in self.newest.items():
-            if command.stage is not Stage.OVER and self.subnet.place(command.place).completion == completion:
-                yield from self._over(key)
+        for key in self.beside.get(completion, ()):
+            yield from self._over(key)
 
     def sent(self, place: str, entry: int) -> Iterator[Effect]:
         """The driver has taken a command: one without a completion signal is over with that."""

@@ -49,6 +49,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from firable.executor.protocol.commands import Answer, Commands
+from firable.executor.protocol.enabled import EnabledSet, bits
 from firable.executor.protocol.messages import (
     EPOCH_BITS,
     Acknowledgement,
@@ -93,7 +94,13 @@ class LocalController:
         }
         compiled = self.player.transitions
         self.parts: dict[str, Compiled] = {row: compiled[part] for part, row in part_of.items()}
-        self.locals: tuple[Compiled, ...] = tuple(c for c in compiled.values() if c.name not in part_of)
+        self.transitions = tuple(compiled.values())
+        self.enabled = EnabledSet([(c.needs, c.forbids) for c in self.transitions])
+        self.rows = {t: part_of[c.name] for t, c in enumerate(self.transitions) if c.name in part_of}
+        """The coordinated transition of each part, by the index of the part."""
+        self.part_mask = sum(1 << t for t in self.rows)
+        self.ready_mask = 0
+        """The parts that the readiness names."""
         self.arbiter = Arbiter(self.subnet, (group for group in decomposition.groups if group.controller == name))
         self.kept_turns = self.arbiter.turns
         self.word = self.subnet.initial_marking
@@ -110,8 +117,6 @@ class LocalController:
         self.held = False
         self.epoch = 0
         self.readiness = Readiness(-1, frozenset())
-        self.readiness_of: tuple[Word, bool, Word, Word] | None = None
-        """The word, the hold and the untold signals (with what promises hold of them) that the readiness is of."""
         self.told = -1
         """The sequence number of the newest report that was sent."""
         self.seen = -1
@@ -205,10 +210,13 @@ class LocalController:
         """Fire one local transition, if one is enabled and disturbs no promise; no effect means that none is."""
         if self.held:
             return []
-        enabled = [c.name for c in self.locals if self._is_enabled(c) and not self._disturbs_promises(c)]
+        enabled = self.enabled.at(self.word) & ~self.part_mask
         if not enabled:
             return []
-        chosen = self.player.transitions[self.arbiter.choose(enabled)]
+        found = self.arbiter.following(enabled, self._is_free) if self._is_bound() else self.arbiter.following(enabled)
+        if found is None:
+            return []
+        chosen = self.transitions[found]
         effects: list[Effect] = [Firing(chosen.name), *self._fire(chosen)]
         if self.arbiter.turns != self.kept_turns:
             self.kept_turns = self.arbiter.turns
@@ -351,6 +359,14 @@ class LocalController:
             return False
         return transition.enabled(self.word)
 
+    def _is_bound(self) -> bool:
+        """Whether anything but the word decides what may fire."""
+        return bool(self.promises or self.untold)
+
+    def _is_free(self, t: int) -> bool:
+        transition = self.transitions[t]
+        return self._is_enabled(transition) and not self._disturbs_promises(transition)
+
     def _is_closed(self, number: int) -> bool:
         return number < self.closed_below or number in self.closed
 
@@ -361,14 +377,13 @@ class LocalController:
         return _union(promise.reads | promise.writes for promise in self.promises.values())
 
     def _readiness(self) -> Readiness:
-        known = (self.word, self.held, self.untold, self.untold and self._locked_reads())
-        if known == self.readiness_of and self.readiness.sequence >= self.epoch << EPOCH_BITS:
-            return self.readiness  # nothing has changed that it depends on
-        self.readiness_of = known
-        enabled = () if self.held else self.parts.items()
-        ready = frozenset(name for name, part in enabled if self._is_enabled(part))
-        if ready != self.readiness.transitions or self.readiness.sequence < self.epoch << EPOCH_BITS:
-            self.readiness = Readiness(self.readiness.sequence + 1, ready)
+        ready = 0 if self.held else self.enabled.at(self.word) & self.part_mask
+        if self.untold:
+            ready = sum(1 << t for t in bits(ready) if self._is_enabled(self.transitions[t]))
+        if ready != self.ready_mask or self.readiness.sequence < self.epoch << EPOCH_BITS:
+            self.ready_mask = ready
+            names = frozenset(self.rows[t] for t in bits(ready))
+            self.readiness = Readiness(self.readiness.sequence + 1, names)
         return self.readiness
 
     def _told(self) -> Readiness:

@@ -12,10 +12,12 @@ This is a compiled copy of the rule, not the rule: `firable.semantics.firing` is
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
+from firable.executor.protocol.enabled import bits
 from firable.nets.decomposition import ArbitrationGroup
 from firable.nets.net import Marking, Net
 from firable.semantics.arbitration import Arbitration, Group, Turns
@@ -105,8 +107,15 @@ class TokenPlayer:
 
     def entered(self, transition: str) -> tuple[str, ...]:
         """The places with a command that a firing of the transition enters, in the order of the net."""
-        outputs = self.net.transition(transition).outputs
-        return tuple(sorted((p for p in outputs if self.net.place(p).command), key=self.net.place_index.__getitem__))
+        return self._entered[transition]
+
+    @cached_property
+    def _entered(self) -> dict[str, tuple[str, ...]]:
+        order = self.net.place_index.__getitem__
+        return {
+            transition.name: tuple(sorted((p for p in transition.outputs if self.net.place(p).command), key=order))
+            for transition in self.net.transitions
+        }
 
 
 class Arbiter:
@@ -129,20 +138,41 @@ class Arbiter:
         )
         self.turns: Turns = self.arbitration.first_turns
         self.last = -1
+        self.rivals = [sum(1 << t for t in component) for component in self.arbitration.conflicts.components]
+        self.group_of = {t: g for g, group in enumerate(self.arbitration.groups) for t in group.sequence}
+        """The group in whose turns a transition has a place."""
 
     def choose(self, enabled: Iterable[str]) -> str:
         """The one transition to fire now; `enabled` must not be empty."""
-        candidates = frozenset(self.net.transition_index[name] for name in enabled)
-        if len(candidates) == 1:
-            (self.last,) = candidates
-            return self.net.transitions[self.last].name
-        granted, _ = self.arbitration.decide(candidates, self.turns)
-        count = len(self.net.transitions)
-        chosen = min(granted, key=lambda t: (t - self.last - 1) % count)
-        self.last = chosen
-        if self.arbitration.conflicts.input_rivals[chosen] & candidates:
-            self.turns = tuple(
-                group.turn_after(chosen, turn) if chosen in group.sequence else turn
-                for group, turn in zip(self.arbitration.groups, self.turns, strict=True)
-            )
+        chosen = self.following(sum(1 << self.net.transition_index[name] for name in enabled))
+        if chosen is None:
+            raise ValueError("nothing is enabled that is arbitrated here")
         return self.net.transitions[chosen].name
+
+    def following(self, enabled: int, is_free: Callable[[int], bool] = lambda _: True) -> int | None:
+        """The transition to fire now, by its index, of the mask of those enabled as far as they are free to fire.
+
+        It is the first behind the last winner that its arbiter grants; only its own rivals are looked at.
+        """
+        behind = enabled >> self.last + 1 << self.last + 1
+        for part in (behind, enabled ^ behind):
+            for t in bits(part):
+                if is_free(t) and self._is_granted(t, enabled, is_free):
+                    self.last = t
+                    return t
+        return None
+
+    def _is_granted(self, t: int, enabled: int, is_free: Callable[[int], bool]) -> bool:
+        component = self.arbitration.conflicts.component_of[t]
+        if component < 0:
+            return True
+        rivals = enabled & self.rivals[component]
+        candidates = frozenset(u for u in bits(rivals) if u == t or is_free(u))
+        if len(candidates) == 1:
+            return True
+        if t not in self.arbitration.decide(candidates, self.turns)[0]:
+            return False
+        if (g := self.group_of.get(t)) is not None and self.arbitration.conflicts.input_rivals[t] & candidates:
+            turn = self.arbitration.groups[g].turn_after(t, self.turns[g])
+            self.turns = (*self.turns[:g], turn, *self.turns[g + 1 :])
+        return True

@@ -1,0 +1,111 @@
+"""What is kept up to date by what changed is what looking at everything would say."""
+
+import random
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.examples import examples
+from support.owned_nets import owned_net, owned_nets
+
+from firable.decompose.splitting.cut import split
+from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.situation import is_deadlock
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.enabled import EnabledSet, bits
+from firable.executor.protocol.messages import Firing
+from firable.executor.protocol.token_player import Arbiter, TokenPlayer
+from firable.nets.decomposition import ArbitrationGroup
+from firable.nets.net import ArbitrationRule, Controller, Net, Place, Transition
+from firable.semantics.arbitration import Arbitration
+
+
+@examples(200)
+@given(owned_nets(), st.lists(st.integers(0, 2**30), max_size=12))
+def test_enabled_set_is_what_each_transition_says(net: Net, words: list[int]) -> None:
+    compiled = list(TokenPlayer.of(net).transitions.values())
+    watched = EnabledSet([(c.needs, c.forbids) for c in compiled])
+    for drawn in words:
+        word = drawn & ((1 << len(net.places) + len(net.signals)) - 1)
+        assert list(bits(watched.at(word))) == [t for t, c in enumerate(compiled) if c.enabled(word)]
+
+
+def test_transition_that_reads_nothing_is_always_enabled() -> None:
+    watched = EnabledSet([(0, 0), (1, 0)])
+    assert [watched.at(word) for word in (0, 1, 0)] == [1, 3, 1]
+
+
+def chosen_by_looking_at_all(
+    arbitration: Arbitration, turns: tuple[int, ...], last: int, candidates: frozenset[int], count: int
+) -> tuple[int, tuple[int, ...]]:
+    """The choice as it is defined: of all that is granted, the first behind the last winner."""
+    if len(candidates) == 1:
+        return next(iter(candidates)), turns
+    granted, _ = arbitration.decide(candidates, turns)
+    chosen = min(granted, key=lambda t: (t - last - 1) % count)
+    if arbitration.conflicts.input_rivals[chosen] & candidates:
+        turns = tuple(
+            group.turn_after(chosen, turn) if chosen in group.sequence else turn
+            for group, turn in zip(arbitration.groups, turns, strict=True)
+        )
+    return chosen, turns
+
+
+@pytest.mark.parametrize("by", ArbitrationRule)
+def test_choice_among_rivals_alone_is_the_choice_among_all(by: ArbitrationRule) -> None:
+    for seed in range(60):
+        draw = random.Random(seed)
+        net = owned_net(seed)
+        components = Arbitration.of(net).groups
+        groups = []
+        for g, group in enumerate(components):
+            members = [net.transitions[t].name for t in group.rest]
+            named = draw.sample(members, draw.randint(0, len(members)))
+            rest = tuple(m for m in members if m not in named)
+            groups.append(ArbitrationGroup(f"g{g}", tuple(named), rest, by))
+        arbiter = Arbiter(net, groups)
+        turns, last = arbiter.turns, -1
+        for _ in range(30):
+            candidates = frozenset(t for t in range(len(net.transitions)) if draw.random() < 0.6)
+            if candidates:
+                last, turns = chosen_by_looking_at_all(
+                    arbiter.arbitration, turns, last, candidates, len(net.transitions)
+                )
+                assert arbiter.choose(net.transitions[t].name for t in candidates) == net.transitions[last].name
+                assert arbiter.turns == turns
+
+
+def test_deadlock_that_the_recorder_knows_is_that_of_the_net() -> None:
+    for seed in range(30):
+        net, draw = owned_net(seed), random.Random(seed)
+        recorder = Recorder(net, "", None)
+        for _ in range(40):
+            recorder.word = draw.getrandbits(len(net.places) + len(net.signals))
+            assert recorder.is_deadlock is is_deadlock(recorder.player, recorder.word)
+
+
+def test_firing_looks_only_at_the_transitions_that_it_touches(monkeypatch: pytest.MonkeyPatch) -> None:
+    def looked_at(n_rings: int) -> int:
+        places = [Place(f"a.{r}.{i}", "a", marked=not i) for r in range(n_rings) for i in range(3)]
+        moves = [
+            Transition(f"t{r}.{i}", (f"a.{r}.{i}",), (f"a.{r}.{(i + 1) % 3}",))
+            for r in range(n_rings)
+            for i in range(3)
+        ]
+        controller = LocalController(split(Net("n", tuple(places), tuple(moves), controllers=(Controller("a"),))), "a")
+        controller.fire()
+        looks: list[tuple[int, int, int]] = []
+
+        class Counting(dict[int, list[tuple[int, int, int]]]):
+            def get(self, bit: int, default: Any = None) -> Any:
+                found = super().get(bit, default)
+                looks.extend(found)
+                return found
+
+        monkeypatch.setattr(controller.enabled, "_readers", Counting(controller.enabled._readers))
+        fired = [effect for _ in range(20) for effect in controller.fire() if isinstance(effect, Firing)]
+        assert len(fired) == 20
+        return len(looks)
+
+    assert looked_at(2) == looked_at(200) == 20 * 4
