@@ -33,6 +33,7 @@ from firable.nets.drawing.shapes import (
 )
 from firable.nets.drawing.text import COMMAND, NAME, NOTE, Style, width_of, wrapped
 from firable.nets.net import ExternalGate, Net, Place
+from firable.nets.time_limits import format_time
 
 _BYPASS_HALF_WIDTH: Final = 5.0
 _ROW_HEIGHT: Final = 94.0
@@ -56,7 +57,8 @@ def label_lines(place: Place) -> list[tuple[str, Style]]:
     """What stands beside a place: its name, and below it the command, or else the description."""
     lines = [(local_name(place.name, place.owner), NAME)]
     if place.command is not None:
-        return [*lines, (str(place.command), COMMAND)]
+        limit = [] if place.within is None else [(f"within {format_time(place.within.milliseconds)}", NOTE)]
+        return [*lines, (str(place.command), COMMAND), *limit]
     return [*lines, *((line, NOTE) for line in wrapped(place.description, _NOTE_CHARACTERS))]
 
 
@@ -301,10 +303,10 @@ class _Layouter:
         return found
 
     def _track_of_gate(self, t: int, gate: ExternalGate) -> int:
-        """A completion gate stands at the place whose command it completes, another one at its owner's first track."""
+        """A completion or timer stands at the place of its command, another gate at its owner's first track."""
         transition, owner = self.net.transitions[t], self.net.signal(gate.signal).owner
         for name in transition.inputs:
-            if self.net.place(name).completion == gate.signal:
+            if gate.signal in self.net.place(name).cleared:
                 return self.track_of[self.net.place_index[name]]
         lane = self.owners.index(owner)
         names = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)

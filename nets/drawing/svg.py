@@ -230,7 +230,7 @@ class _Writer:
 
     def _stub(self, stub: Stub) -> Iterator[str]:
         y = self.where.bars[stub.transition].y - BAR_HALF_HEIGHT - 4
-        x = stub.x + BAR_HALF_WIDTH - 7
+        x = stub.x + BAR_HALF_WIDTH - 7 - 9 * (stub.slot % 4)  # each its own end: one may be a dot, the other a circle
         far_x, far_y = stub.x + BAR_HALF_WIDTH + 6, y - 7 - 12 * stub.slot
         yield f'<path class="stub" d="M{_n(far_x)} {_n(far_y)}L{_n(x)} {_n(y)}"/>'
         yield _end(x, y, permissive=stub.gate.wanted)

@@ -26,6 +26,7 @@ from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net
+from firable.nets.contention import contentions
 from firable.nets.decomposition import Coordinated, Decomposition, Part
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Net, TimeLimit
@@ -141,3 +142,10 @@ def test_a_controller_cannot_time_the_command_of_another_one() -> None:
         split(owned_by_rules(handover(), rules))
     assert [problem.code for problem in caught.value.diagnostics] == ["F4001"]
     assert "is timed by 'y.go_overdue'" in caught.value.diagnostics[0].message
+
+
+def test_a_transition_that_reads_a_timer_contends_with_those_that_clear_it() -> None:
+    text = HANDOVER.replace("to: a.go}\n  hand", "to: a.go, if: b.idle}\n  hand").replace("has: }", "has: , lamp: }")
+    net = parse_net(text.replace("  use:", "  lit: {from: b.has, to: b.lamp, unless: a.go_overdue}\n  use:"))
+    found = [one for one in contentions(net, {"start", "lit"}) if one.at == "a.go_overdue"]
+    assert [(one.mover, one.reader) for one in found] == [("start", "lit")]

@@ -126,3 +126,10 @@ def test_firings_are_numbered_at_their_transitions() -> None:
     svg = draw_net(net, firings=[["t1"], ["t2"], ["t1"]])
     assert {"1, 3", "2"} <= texts(svg)
     assert len(elements(svg, "rect", "fired")) >= 2
+
+
+def test_a_time_limit_stands_below_the_command_and_its_timer_beside_the_completion() -> None:
+    drawn = draw_net(catalogue_net("one_robot_timed"))
+    assert drawn.count(">within 5s<") == 5
+    stubs = {"".join(stub.itertext()): stub.get("x") for stub in elements(drawn, "text", "signal")}
+    assert stubs["to_cv1_overdue"] == stubs["at_cv1"]
