@@ -4,8 +4,8 @@ What a program imports from here: `load` reads a bundle that may run, `read_plan
 `run` carries workpieces through it and returns a `RunReport`, whose `Situation` has a `State` and says with `Blocked`
 what waits for what. `execute` runs a decomposition that need not be proved, for simulation and tests. An `Operator`
 beside the run is given its `Execution`, with the controls pause, step, resume and stop; an `Answer` says what became
-of a command, of a run that is taken up from its journal; `StuckSensor` and
-`NeverCompletes` disturb the cell. Other machines than simulated ones are reached by a `Driver`.
+of a command, of a run that is taken up from its journal; `StuckSensor`, `NeverCompletes` and `Drops` disturb the cell.
+Other machines than simulated ones are reached by a `Driver`.
 
     from firable.executor import load, read_plant, run
 
@@ -15,7 +15,7 @@ The voting protocol (`coordinator`, `controller`, `messages`) is pure: no clock,
 imports `semantics` and `nets` and nothing that proves.
 """
 
-from firable.executor.cell.plant import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.cell.plant import Disturbance, Drops, NeverCompletes, StuckSensor
 from firable.executor.drivers.driver import Driver
 from firable.executor.operating.execution import Execution
 from firable.executor.operating.running import Operator, RunReport, execute, load, run
@@ -28,6 +28,7 @@ __all__ = [
     "Blocked",
     "Disturbance",
     "Driver",
+    "Drops",
     "Execution",
     "NeverCompletes",
     "Operator",

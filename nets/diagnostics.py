@@ -119,6 +119,7 @@ CODES: Final[dict[str, str]] = {
     "F5101": "the binding does not fit the net",
     "F5102": "not an address that the device has",
     "F5103": "unknown or unusable driver",
+    "F5104": "a device that cannot be served here",
     # F6: evidence
     "F6001": "the evidence is damaged or malformed",
     "F6002": "the evidence does not show what it claims",

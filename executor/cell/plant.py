@@ -77,7 +77,16 @@ class StuckSensor:
     from_seconds: float = 0.0
 
 
-Disturbance = NeverCompletes | StuckSensor
+@dataclass(frozen=True, slots=True)
+class Drops:
+    """A disturbance: when this command of this machine ends, the `occurrence`-th time, what it holds is lost."""
+
+    machine: str
+    command: str
+    occurrence: int = 1
+
+
+Disturbance = NeverCompletes | StuckSensor | Drops
 
 
 @dataclass(slots=True)
@@ -197,6 +206,10 @@ class Plant:
         self.faulted = True
         for machine in self.machines.values():
             machine.busy = None
+
+    def stand(self, machine: str) -> None:
+        """Stop one machine where it is; what it was at is never done, and it may be commanded again."""
+        self.machines[machine].busy = None
 
     def command(
         self, now_seconds: float, machine: str, command: str, parameters: Mapping[str, str], ticket: Ticket
@@ -340,6 +353,8 @@ class Plant:
                 self._lying(station, f"{name} machines on {station}").processed += 1
             case Release(station=station):
                 self.clamped.discard(station)
+        if Drops(name, busy.command, machine.times[busy.command]) in self.disturbances:
+            machine.holding = None
         machine.busy = None
         yield CommandDone(busy.ticket)
 

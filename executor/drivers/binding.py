@@ -13,9 +13,9 @@ The file is read like a net file: bounded, without ambiguous YAML, each mistake 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
@@ -162,6 +162,29 @@ class Binding:
     def problem(self, code: str, path: TreePath, message: str, hint: str = "") -> Diagnostic:
         """A diagnostic at a path of the file."""
         return _problem(self.source, self.tree, code, path, message, hint)
+
+    def watching(self) -> Binding:
+        """The binding for who only looks: without safe outputs and heartbeats, which are another's to write."""
+        devices = {
+            name: device.model_copy(update={"safe": {}, "heartbeat": None})
+            for name, device in self.document.devices.items()
+        }
+        return replace(self, document=self.document.model_copy(update={"devices": devices}))
+
+    def without(self, devices: Collection[str]) -> Binding:
+        """The binding without some devices, as if nothing was bound to them."""
+        bound = {**self.document.signals, **self.document.commands}
+        return self.serving({name for name, one in bound.items() if one is None or one.device not in devices})
+
+    def serving(self, names: Collection[str]) -> Binding:
+        """What the binding says of these signals and places, and the devices that they need."""
+        document = self.document
+        signals = {name: signal for name, signal in document.signals.items() if name in names}
+        commands = {name: command for name, command in document.commands.items() if name in names}
+        needed = {one.device for one in (*signals.values(), *commands.values()) if one is not None}
+        devices = {name: device for name, device in document.devices.items() if name in needed}
+        own = document.model_copy(update={"devices": devices, "signals": signals, "commands": commands})
+        return replace(self, document=own)
 
 
 def read_binding(path: Path | str) -> Binding:

@@ -23,13 +23,19 @@ from firable.nets.diagnostics import InputError
 from firable.nets.net import Net, Place, SignalKind
 
 
-def bound_driver(binding: Binding, net: Net) -> BoundDriver:
-    """The driver of a net's binding; raises `InputError` F5101 where they do not fit."""
+def bound_driver(binding: Binding, net: Net, part: Net | None = None) -> BoundDriver:
+    """The driver of a net's binding, or of a part of the net, whose machines are all that this host has.
+
+    Raises `InputError` F5101 where binding and net do not fit. One binding serves all hosts of a cell: each takes from
+    it the devices of its own machines.
+    """
     if problems := misfits(binding, net):
         raise InputError(problems)
-    completions = {signal.name for signal in net.signals if signal.kind is SignalKind.COMPLETION}
+    served = net if part is None else part
+    completions = {signal.name for signal in served.signals if signal.kind is SignalKind.COMPLETION}
     answered = frozenset(place.name for place in net.places if place.completion is not None)
-    return BoundDriver(binding, completions, answered)
+    names = {*served.signal_index, *served.place_index}
+    return BoundDriver(binding if part is None else binding.serving(names), completions, answered)
 
 
 class BoundDriver:
@@ -162,6 +168,7 @@ class _Device:
         self.tripped = None if heartbeat is None else heartbeat.tripped
         self.has_tripped: bool | None = None
         self.forced: deque[Writes] = deque()
+        self.is_forcing = False
         self.writing: Channel | None = None
         self.is_ready = asyncio.Event()
         self.was_ready = False
@@ -196,6 +203,11 @@ class _Device:
         if not self.kept.is_connected and (self.document.safe or self.document.heartbeat is not None):
             self.note("not connected: the safe outputs are left to its watchdog")
         self.kept.stop()
+
+    @property
+    def is_writing(self) -> bool:
+        """Whether something that was to be written has not been confirmed."""
+        return bool(self.forced) or self.is_forcing or any(channel.is_writing for channel in self.channels.values())
 
     # What the connection tells
 
@@ -233,8 +245,9 @@ class _Device:
 
     def next_writes(self) -> Writes | None:
         """What is to be written now."""
+        self.writing = None
         if self.forced:
-            self.writing = None
+            self.is_forcing = True
             return self.forced.popleft()
         for channel in self.channels.values():
             if (some := channel.next_writes()) is not None:
@@ -244,6 +257,7 @@ class _Device:
 
     def written(self) -> None:
         """The device has confirmed that."""
+        self.is_forcing = False
         if self.writing is not None:
             self.writing.written()
             self.writing = None

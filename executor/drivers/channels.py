@@ -78,6 +78,11 @@ class Channel:
         self.unanswered = 0
         """How many commands without a completion were sent."""
 
+    @property
+    def is_writing(self) -> bool:
+        """Whether a command has not been written yet."""
+        return bool(self.waiting) or (self.current is not None and self.phase is not _Phase.WRITTEN)
+
     def number(self, place: str, entry: int) -> int:
         """The number of a command: 1 + (entry * n + i) mod m, for place i of n and the largest m of whole rounds.
 

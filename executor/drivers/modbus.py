@@ -12,6 +12,7 @@ pymodbus looks at it, frames of RTU carry none: there a late answer *is* the ans
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -265,6 +266,7 @@ class ModbusRtu(_Modbus):
 async def _opened(
     client: AsyncModbusTcpClient | AsyncModbusSerialClient, where: str, unit: int, every_s: float, wanted: Wanted
 ) -> Connection:
+    logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # what matters is told by us
     try:
         if not await client.connect():
             raise LinkError(f"{where} does not answer")

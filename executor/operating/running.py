@@ -20,6 +20,8 @@ from typing import Any
 
 from firable.executor.cell.plant import Disturbance, Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.binding import Binding
+from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.operating.execution import Execution
 from firable.executor.operating.recorder import LineStream
@@ -185,6 +187,35 @@ def execute(
         commands=files.recorder.commands,
         messages=execution.messages,
         simulated_seconds=execution.now_seconds(),
+    )
+
+
+def run_bound(
+    bundle: Bundle,
+    binding: Binding,
+    *,
+    trace_path: Path | str | None = None,
+    overdue_seconds: float = 120.0,
+    operator: Operator | None = None,
+) -> RunReport:
+    """Run a bundle on the machines of a binding, in real time, until the operator stops it or nothing can go on.
+
+    What workpieces there are is not to be known; the report counts none. Raises `InputError` F5002 where the bundle is
+    not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the trace cannot
+    be written.
+    """
+    if problems := unproved(bundle):
+        raise InputError(problems)
+    driver = bound_driver(binding, bundle.net)
+    with nullcontext() if trace_path is None else closing(TraceFile(trace_path)) as trace:
+        recorder = Recorder(bundle.net, net_digest(bundle.net), trace)
+        execution = Execution(
+            bundle.decomposition, driver, recorder, overdue_seconds=overdue_seconds, operator=operator
+        )
+        situation = asyncio.run(_terminable(execution))
+        recorder.end(execution.now_seconds(), situation.state.value)
+    return RunReport(
+        situation, (), (), (), (), recorder.firings, recorder.commands, execution.messages, execution.now_seconds()
     )
 
 

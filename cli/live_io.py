@@ -1,0 +1,197 @@
+"""`firable io`: what the devices of a binding show now, and forcing it where the binding allows that."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import click
+
+from firable.cli.options import load_net
+
+if TYPE_CHECKING:
+    from firable.executor.drivers.binding import Binding
+    from firable.executor.drivers.bound import BoundDriver
+    from firable.executor.drivers.driver import Reading
+    from firable.nets.net import Place
+
+_REFRESH_SECONDS = 0.25
+_COLOURS = {"good": "green", "uncertain": "yellow", "bad": "red"}
+
+
+@click.command("io", short_help="Show the live signals of a binding; force them where it allows that.")
+@click.argument("bind", metavar="BIND")
+@click.option("--once", is_flag=True, help="Show everything once, when it has been read, and end.")
+@click.option("--for", "seconds", type=click.FloatRange(min=0), metavar="SECONDS", help="End by itself after so long.")
+@click.option("--force", metavar="SIGNAL=0|1", multiple=True, help="Write a signal on its device.")
+@click.option("--send", metavar="PLACE", multiple=True, help="Send the command of a place; needs --net.")
+@click.option("--net", "of", metavar="NET", help="The net, or the bundle, whose commands are sent.")
+def live_io(
+    bind: str, once: bool, seconds: float | None, force: tuple[str, ...], send: tuple[str, ...], of: str | None
+) -> int:
+    """Show the signals of BIND as they are: value, quality, age, and how many edges were coalesced.
+
+    Looking disturbs nothing: neither safe outputs nor heartbeats are written, so it may be done beside a running cell.
+
+    --force and --send write, each only where the binding says `force: true` of the signal or of the command. With
+    --send this is the master of the devices: it gives them their heartbeats, and drives the safe outputs at both ends.
+    Never do that beside a running cell.
+
+    Ctrl-C ends it. Exit code 3 where --once cannot read something.
+    """
+    from firable.executor.drivers.binding import read_binding
+
+    binding = read_binding(bind)
+    forced = [_forced(binding, text) for text in force]
+    places = _sent(binding, send, of)
+    try:
+        return asyncio.run(_shown(binding, forced, places, once=once, seconds=seconds))
+    except KeyboardInterrupt:
+        return 0
+
+
+def _forced(binding: Binding, text: str) -> tuple[str, bool]:
+    """The signal and the value that are asked for, if the binding allows it."""
+    from firable.nets.diagnostics import did_you_mean
+
+    name, _, value = text.partition("=")
+    known = [signal for signal, bound in binding.document.signals.items() if bound is not None]
+    if name not in known:
+        raise click.UsageError(f"no signal '{name}' is read; {did_you_mean(name, known)}there are {', '.join(known)}")
+    if value not in {"0", "1"}:
+        raise click.UsageError(f"--force {text}: write {name}=0 or {name}=1")
+    bound = binding.document.signals[name]
+    if bound is None or not bound.force:
+        raise click.UsageError(f"the binding does not allow '{name}' to be forced: that takes `force: true` in it")
+    return name, value == "1"
+
+
+def _sent(binding: Binding, names: tuple[str, ...], of: str | None) -> list[Place]:
+    """The places whose commands are to be sent, if the binding allows it."""
+    from firable.executor.drivers.fitting import misfits
+    from firable.nets.diagnostics import InputError
+
+    if not names:
+        return []
+    if of is None:
+        raise click.UsageError("say with --net whose commands --send is about")
+    net = load_net(of).net
+    if problems := misfits(binding, net):
+        raise InputError(problems)
+    for name in names:
+        if name not in binding.document.commands:
+            raise click.UsageError(f"no command of '{name}' is bound")
+        if not binding.document.commands[name].force:
+            raise click.UsageError(
+                f"the binding does not allow the command of '{name}' to be sent by hand: `force: true`"
+            )
+    return [net.place(name) for name in names]
+
+
+class _Heard:
+    """Who listens: faults and notes are told as they come."""
+
+    def __init__(self) -> None:
+        self.begun = time.monotonic()
+        self.lines = 0
+        """How many lines of the table stand above, to be written over."""
+
+    def now_seconds(self) -> float:
+        return time.monotonic() - self.begun
+
+    def loop_delay_seconds(self, until_seconds: float) -> float:
+        return max(0.0, until_seconds - self.now_seconds())
+
+    def signal(self, name: str, value: bool, entry: int | None) -> None:
+        pass  # the table is made of the image
+
+    def moved(self) -> None:
+        pass
+
+    def driver_fault(self, machine: str, message: str) -> None:
+        self._told(f"{click.style('fault', fg='red')}: {machine}: {message}")
+
+    def driver_note(self, machine: str, message: str) -> None:
+        self._told(f"{machine}: {message}")
+
+    def _told(self, line: str) -> None:
+        self.lines = 0
+        click.echo(line, err=True)
+
+    def show(self, readings: Mapping[str, Reading]) -> None:
+        """The table, over the one before where that stands on a terminal."""
+        if self.lines and sys.stdout.isatty():
+            click.echo(f"\x1b[{self.lines}F\x1b[J", nl=False)
+        rows = list(self.rows(readings))
+        for row in rows:
+            click.echo(row)
+        self.lines = len(rows)
+
+    def rows(self, readings: Mapping[str, Reading]) -> list[str]:
+        """One line for each signal."""
+        width = max((len(name) for name in readings), default=6)
+        rows = [click.style(f"  {'signal':<{width}}  value  quality    age        coalesced", dim=True)]
+        for name, reading in readings.items():
+            value = "-" if reading.value is None else str(int(reading.value))
+            age = "-" if reading.value is None else f"{self.now_seconds() - reading.at_seconds:.2f} s"
+            quality = click.style(f"{reading.quality:<9}", fg=_COLOURS[reading.quality])
+            why = f"  {reading.why}" if reading.why else ""
+            rows.append(f"  {name:<{width}}  {value:<5}  {quality}  {age:<9}  {reading.coalesced}{why}")
+        return rows
+
+
+async def _shown(
+    binding: Binding, forced: list[tuple[str, bool]], places: list[Place], *, once: bool, seconds: float | None
+) -> int:
+    """Show the signals until the end; returns the exit code."""
+    from firable.executor.drivers.bound import BoundDriver
+    from firable.executor.drivers.driver import Quality
+
+    driver = BoundDriver(binding if places else binding.watching(), (), frozenset())
+    heard = _Heard()
+    running = asyncio.create_task(driver.run(heard, heard))
+    try:
+        reached = await _connected(driver, running)
+        for signal, value in forced:
+            driver.force(signal, value)
+        for place in places:
+            driver.send(place, 0)
+        while any(device.is_writing for device in driver.devices.values() if device.is_ready.is_set()):
+            await asyncio.sleep(0.01)
+        if once:
+            await asyncio.sleep(_REFRESH_SECONDS)  # what is told a moment after the first answer
+            heard.show(driver.readings())
+            good = all(reading.quality is Quality.GOOD for reading in driver.readings().values())
+            return 0 if good and reached else 3
+        before: dict[str, Reading] = {}
+        while seconds is None or heard.now_seconds() < seconds:
+            now = dict(driver.readings())
+            changed = [name for name, one in now.items() if name not in before or _differ(one, before[name])]
+            if sys.stdout.isatty() or changed:
+                heard.show(now)
+            before = now
+            await asyncio.wait([running], timeout=_REFRESH_SECONDS)
+            if running.done():
+                running.result()
+        return 0
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+
+def _differ(one: Reading, other: Reading) -> bool:
+    return (one.value, one.quality, one.coalesced) != (other.value, other.quality, other.coalesced)
+
+
+async def _connected(driver: BoundDriver, running: asyncio.Task[None]) -> bool:
+    """Wait until every device has been read, as long as its start may take; whether all were."""
+    for device in driver.devices.values():
+        ready = asyncio.create_task(device.is_ready.wait())
+        await asyncio.wait([ready, running], timeout=device.document.start_s, return_when=asyncio.FIRST_COMPLETED)
+        ready.cancel()
+        if running.done():
+            running.result()
+    return all(device.is_ready.is_set() for device in driver.devices.values())

@@ -1,0 +1,188 @@
+"""`firable sim`: the simulated cell as real servers, for the executor to be run against."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_text
+
+if TYPE_CHECKING:
+    from firable.executor.cell.plant import Disturbance, Plant
+    from firable.executor.drivers.binding import Binding
+    from firable.executor.drivers.far_side.end import FarEnd
+    from firable.nets.machines.plant_file import PlantModel
+    from firable.nets.net import Net
+
+
+@click.command(short_help="Serve the simulated cell over real protocols.")
+@click.argument("net", metavar="NET")
+@click.option("--plant", metavar="FILE", help="The plant file of the cell, or catalogue:NAME.  [default: by its name]")
+@click.option("--modbus", is_flag=True, help="Serve machines over Modbus TCP.")
+@click.option("--opcua", is_flag=True, help="Serve machines over OPC UA.")
+@click.option("--mqtt", is_flag=True, help="Serve machines over MQTT, by mosquitto, which must be installed.")
+@click.option("--serial", is_flag=True, help="Serve machines on a serial line, by a pseudo-terminal.")
+@click.option("--bind", metavar="FILE", help="The binding: written where protocols are named, or else read and served.")
+@click.option("--workpieces", type=click.IntRange(min=0), default=10, show_default=True, help="How many will come.")
+@click.option("--seed", type=int, default=0, show_default=True, help="The seed of the cell's jitter.")
+@click.option("--speed", type=click.FloatRange(min=0.01), default=1.0, show_default=True, help="Times real time.")
+@click.option("--stuck", metavar="SIGNAL=0|1[@S]", multiple=True, help="A sensor that shows one value, from a time on.")
+@click.option("--drop", metavar="MACHINE.COMMAND[#N]", multiple=True, help="What is held falls as this ends.")
+@click.option("--hang", metavar="MACHINE.COMMAND[#N]", multiple=True, help="A command that is taken and never done.")
+@click.option("--for", "seconds", type=click.FloatRange(min=0), metavar="SECONDS", help="End by itself after so long.")
+def sim(
+    net: str,
+    plant: str | None,
+    modbus: bool,
+    opcua: bool,
+    mqtt: bool,
+    serial: bool,
+    bind: str | None,
+    workpieces: int,
+    seed: int,
+    speed: float,
+    stuck: tuple[str, ...],
+    drop: tuple[str, ...],
+    hang: tuple[str, ...],
+    seconds: float | None,
+) -> int:
+    """Serve the machines of NET, with workpieces and jitter, to whoever connects: `firable run BUNDLE --bind FILE`.
+
+    The machines are dealt out to the protocols that are named, on ports of this host, and where everything is stands in
+    the binding that is written. Without protocols, --bind is read, and what it leads to on this host is served.
+
+    It ends by Ctrl-C, or when something collides. N in --drop and --hang says which time, from 1.
+    """
+    from firable.executor.cell.plant import Plant
+    from firable.executor.drivers.fitting import misfits as binding_misfits
+    from firable.nets.diagnostics import InputError
+    from firable.nets.machines.plant_file import misfits, read_plant
+
+    loaded = load_net(net).net
+    model = read_plant(_plant_file(loaded, plant))
+    if problems := misfits(model, loaded):
+        raise InputError(problems)
+    disturbances = _disturbances(model, stuck, drop, hang)
+    chosen = {"modbus": modbus, "opcua": opcua, "mqtt": mqtt, "serial": serial}
+    protocols = [name for name, is_chosen in chosen.items() if is_chosen]
+    if not protocols and bind is None:
+        raise click.UsageError("name protocols, such as --modbus --opcua, or a binding to serve, with --bind")
+
+    async def served() -> str:
+        task = asyncio.current_task()
+        if task is not None:
+            with suppress(NotImplementedError, RuntimeError, ValueError):  # not the main thread, or not this system
+                asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
+        binding, ends = await _bound(loaded, protocols, bind, model)
+        if problems := binding_misfits(binding, loaded):
+            raise InputError(problems)
+        cell = Plant(model, workpieces=workpieces, seed=seed, disturbances=disturbances)
+        return await _serve(binding, loaded, cell, ends, speed, seconds)
+
+    try:
+        fault = asyncio.run(served())
+    except (KeyboardInterrupt, asyncio.CancelledError):
+        fault = ""
+    if fault:
+        click.echo(f"the cell stands still: {fault}")
+    return 1 if fault else 0
+
+
+async def _bound(
+    net: Net, protocols: list[str], bind: str | None, model: PlantModel
+) -> tuple[Binding, dict[str, FarEnd]]:
+    """The binding, made or read, and the ends that it leads to."""
+    from firable.executor.drivers.binding import parse_binding, read_binding
+    from firable.executor.drivers.far_side.ends import PORTS, binding_text, ends_of
+
+    if not protocols:
+        binding = read_binding(str(bind))
+        return binding, ends_of(binding)
+    ends: dict[str, FarEnd] = {}
+    ports = {name: PORTS[name] for name in protocols}
+    if "serial" in protocols:
+        from firable.executor.drivers.far_side.serial_device import SerialEnd
+
+        line = ends["serial"] = SerialEnd()
+        line.line.open()
+        ports["serial"] = line.line.near
+    path = bind or f"{net.name}.bind.yaml"
+    text = binding_text(net, ports, model.sensors)
+    binding = parse_binding(text, path)
+    write_text(path, text)
+    click.echo(f"{path}: {', '.join(f'{name} at {port}' for name, port in ports.items())}")
+    return binding, ends | ends_of(binding.without(set(ends)))
+
+
+async def _serve(
+    binding: Binding, net: Net, plant: Plant, ends: dict[str, FarEnd], speed: float, seconds: float | None
+) -> str:
+    """Serve until something collides, whose sentence is returned, or until it is cancelled or the time is over."""
+    from firable.executor.drivers.far_side.cell import CellServer
+    from firable.nets.diagnostics import Diagnostic, InputError
+
+    def tell(at_seconds: float, what: str) -> None:
+        click.echo(f"{at_seconds:8.1f} s  {what}")
+
+    cell = CellServer(binding, net, plant, ends, speed=speed, tell=tell)
+    try:
+        try:
+            await cell.start()
+        except (OSError, RuntimeError) as error:  # a port that is taken, or a broker that is not installed
+            hint = "end what else serves there, or name other ports in a binding of your own, with --bind alone"
+            raise InputError([Diagnostic("F5104", f"the cell cannot be served: {error}", hint)]) from None
+        click.echo(f"serving '{net.name}'; Ctrl-C ends it")
+        try:
+            await asyncio.wait_for(cell.run(), seconds)
+        except TimeoutError:
+            click.echo(f"the time is over: {len(plant.delivered)} carried out, {len(plant.inside)} inside")
+    finally:
+        await cell.stop()
+    return cell.fault
+
+
+def _plant_file(net: Net, argument: str | None) -> Path:
+    """The plant file that the option names, or the one of the catalogue that bears the name of the cell."""
+    from firable.nets.catalogue import catalogue_names
+
+    if argument is None:
+        name = net.name.replace("-", "_")
+        argument = f"{CATALOGUE}{name}"
+        if name not in catalogue_names() or not catalogue_file(argument, "plant").exists():
+            raise click.UsageError(f"say with --plant which cell to serve: none in the catalogue is '{net.name}'")
+    return catalogue_file(argument, "plant") if argument.startswith(CATALOGUE) else Path(argument)
+
+
+def _disturbances(
+    model: PlantModel, stuck: tuple[str, ...], drop: tuple[str, ...], hang: tuple[str, ...]
+) -> list[Disturbance]:
+    """What was asked to go wrong; a name that the cell has not is a mistake."""
+    from firable.executor.cell.plant import Drops, NeverCompletes, StuckSensor
+    from firable.nets.diagnostics import did_you_mean
+
+    found: list[Disturbance] = []
+    for text in stuck:
+        sensor, _, rest = text.partition("=")
+        value, _, at = rest.partition("@")
+        if sensor not in model.sensors:
+            known = ", ".join(model.sensors)
+            hint = did_you_mean(sensor, list(model.sensors))
+            raise click.UsageError(f"the cell has no sensor '{sensor}'; {hint}it has {known}")
+        if value not in {"0", "1"} or not (at or "0").replace(".", "", 1).isdecimal():
+            raise click.UsageError(f"--stuck {text}: write SIGNAL=0 or SIGNAL=1, and @SECONDS behind it if later")
+        found.append(StuckSensor(sensor, value == "1", float(at or 0)))
+    for kind, texts in ((Drops, drop), (NeverCompletes, hang)):
+        for text in texts:
+            name, _, occurrence = text.partition("#")
+            machine, _, command = name.partition(".")
+            known_commands = [f"{m}.{c}" for m, body in model.machines.items() for c in body.commands]
+            if name not in known_commands or not (occurrence or "1").isdecimal():
+                hint = did_you_mean(name, known_commands)
+                raise click.UsageError(f"the cell has no command '{text}'; {hint}it has {', '.join(known_commands)}")
+            found.append(kind(machine, command, int(occurrence or 1)))
+    return found

@@ -1,0 +1,220 @@
+"""The simulated cell behind real servers: a plant that is reached only through the points of a binding.
+
+What the executor meets here is what it would meet on the floor: sockets, times, jitter, machines that are watched by
+their devices. A device takes a command when its number comes and knows which one by what was written before it, as a
+program in it would; it shows the numbers that it has taken and done; it stops its machines when a safe output is
+written, and when its heartbeat stays away for `BEATS_MISSED` of its periods. The cell does not know the net beyond the
+commands of its places, and learns of no firing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Final
+
+from firable.executor.cell.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
+from firable.executor.drivers.binding import Binding, ChannelDocument, DeviceDocument, writes
+from firable.executor.drivers.device import Point, Value, as_bit, as_number
+from firable.executor.drivers.far_side.end import FarEnd
+from firable.nets.net import Command, Net
+
+BEATS_MISSED: Final = 5
+
+
+@dataclass
+class _Channel:
+    """One channel of a device: the number that it has, and the commands that it knows."""
+
+    document: ChannelDocument
+    commands: list[tuple[dict[Point, int | str], Command]] = field(default_factory=list)
+    """What is written for a command, and the command."""
+    number: int = 0
+
+
+@dataclass
+class _Device:
+    """One device: its end, its channels, and what was written to it last."""
+
+    document: DeviceDocument
+    end: FarEnd
+    channels: dict[str, _Channel]
+    last: dict[Point, int | str] = field(default_factory=dict)
+    machines: set[str] = field(default_factory=set)
+    watchdog: asyncio.TimerHandle | None = None
+
+
+class CellServer:
+    """A plant behind the ends of a binding's devices; `tell` is told what happens, in words."""
+
+    def __init__(
+        self,
+        binding: Binding,
+        net: Net,
+        plant: Plant,
+        ends: Mapping[str, FarEnd],
+        *,
+        speed: float = 1.0,
+        tell: Callable[[float, str], None] = lambda _seconds, _what: None,
+    ) -> None:
+        self.binding = binding
+        self.plant = plant
+        self.speed = speed
+        self.tell = tell
+        self.devices = {
+            name: _Device(document, ends[name], {key: _Channel(one) for key, one in document.channels.items()})
+            for name, document in binding.document.devices.items()
+        }
+        for place, bound in binding.document.commands.items():
+            command = net.place(place).command
+            if command is not None:
+                device = self.devices[bound.device]
+                written = {point: _plain(value) for point, value in writes(bound.write)}
+                device.channels[bound.channel].commands.append((written, command))
+                device.machines.add(command.machine)
+        self.tickets: dict[int, tuple[_Device, _Channel, int]] = {}
+        self.at: dict[str, tuple[_Device, _Channel, int]] = {}
+        """What each machine is at."""
+        self.next_ticket = 0
+        self.begun_seconds = 0.0
+        self.delivered = 0
+        self.fault = ""
+        self.awake = asyncio.Event()
+
+    def now_seconds(self) -> float:
+        """The time in the cell."""
+        return (asyncio.get_running_loop().time() - self.begun_seconds) * self.speed
+
+    async def start(self) -> None:
+        """Begin to serve."""
+        self.begun_seconds = asyncio.get_running_loop().time()
+        for device in self.devices.values():
+            await device.end.start(partial(self._written, device))
+            for channel in device.channels.values():
+                self._clear(device, channel)
+            if device.document.heartbeat is not None and device.document.heartbeat.tripped is not None:
+                device.end.show(device.document.heartbeat.tripped, value=False)
+        for signal in self.plant.shown:
+            self._sensor(signal)
+
+    async def stop(self) -> None:
+        """End, and close all connections."""
+        for device in self.devices.values():
+            if device.watchdog is not None:
+                device.watchdog.cancel()
+            await device.end.stop()
+
+    async def run(self) -> None:
+        """Let the plant's events happen when they are due, until cancelled or until something collides."""
+        while not self.fault:
+            self._report(self.plant.advance(self.now_seconds()))
+            due = self.plant.next_seconds
+            delay = None if due is None else max(0.0, due - self.now_seconds()) / self.speed
+            self.awake.clear()
+            try:
+                await asyncio.wait_for(self.awake.wait(), delay)
+            except TimeoutError:
+                continue
+
+    def _written(self, device: _Device, point: Point, value: Value) -> None:
+        """A client has written something."""
+        document = device.document
+        device.last[point] = _plain(value)
+        if document.heartbeat is not None and point == document.heartbeat.write:
+            self._beaten(device, document.heartbeat.every_s)
+        if point in document.safe and device.last[point] == _plain(dict(writes(document.safe))[point]):
+            self._stop(device, "a safe output")
+            if document.heartbeat is not None and document.heartbeat.tripped is not None:
+                device.end.show(document.heartbeat.tripped, value=False)
+        for channel in device.channels.values():
+            if point == channel.document.number:
+                self._ordered(device, channel, as_number(value), "")
+            elif point == channel.document.command:
+                number, _, text = str(value).partition(" ")
+                self._ordered(device, channel, as_number(number), text)
+
+    def _ordered(self, device: _Device, channel: _Channel, number: int | None, text: str) -> None:
+        if number is None or number == channel.number:
+            return
+        channel.number = number
+        if number == 0:
+            self._clear(device, channel)
+            return
+        self._show(device, channel.document.taken, number)
+        known = [
+            command
+            for written, command in channel.commands
+            if (str(command) == text if text else all(device.last.get(point) == one for point, one in written.items()))
+        ]
+        if not known:
+            self.tell(self.now_seconds(), f"a command that nobody knows: {text or device.last}")
+            self._show(device, channel.document.failed, number)
+            return
+        command = known[0]
+        self.tell(self.now_seconds(), f"{command}")
+        ticket, self.next_ticket = self.next_ticket, self.next_ticket + 1
+        self.tickets[ticket] = self.at[command.machine] = (device, channel, number)
+        parameters = dict(command.parameters)
+        self._report(self.plant.command(self.now_seconds(), command.machine, command.command, parameters, ticket))
+        self.awake.set()
+
+    def _report(self, reports: list[PlantReport]) -> None:
+        for report in reports:
+            match report:
+                case SensorChanged(signal, value):
+                    self.tell(self.now_seconds(), f"{signal} shows {int(value)}")
+                    self._sensor(signal)
+                case CommandDone(ticket):
+                    if (waiting := self.tickets.pop(ticket, None)) is not None:
+                        device, channel, number = waiting
+                        self.at = {machine: one for machine, one in self.at.items() if one is not waiting}
+                        self._show(device, channel.document.done, number)
+                case PlantFault(machine, message):
+                    self.fault = f"{machine}: {message}" if machine else message
+                    self.tell(self.now_seconds(), self.fault)
+        if len(self.plant.delivered) > self.delivered:
+            self.delivered = len(self.plant.delivered)
+            self.tell(self.now_seconds(), f"workpiece {self.plant.delivered[-1].id} is carried out")
+
+    def _sensor(self, signal: str) -> None:
+        bound = self.binding.document.signals.get(signal)
+        if bound is not None:
+            self.devices[bound.device].end.show(bound.read, self.plant.shown[signal] ^ bound.invert)
+
+    def _beaten(self, device: _Device, every_s: float) -> None:
+        if device.watchdog is not None:
+            device.watchdog.cancel()
+        loop = asyncio.get_running_loop()
+        device.watchdog = loop.call_later(max(BEATS_MISSED * every_s, 0.5), self._trip, device)
+
+    def _trip(self, device: _Device) -> None:
+        self._stop(device, "its watchdog")
+        if device.document.heartbeat is not None and device.document.heartbeat.tripped is not None:
+            device.end.show(device.document.heartbeat.tripped, value=True)
+
+    def _stop(self, device: _Device, why: str) -> None:
+        """Stop the machines of a device where they are; what they were at has failed."""
+        for machine in sorted(device.machines & set(self.at)):
+            of, channel, number = self.at.pop(machine)
+            self.plant.stand(machine)
+            self.tell(self.now_seconds(), f"{machine} is stopped by {why}")
+            self._show(of, channel.document.failed, number)
+
+    def _clear(self, device: _Device, channel: _Channel) -> None:
+        for point in (channel.document.taken, channel.document.done, channel.document.failed):
+            self._show(device, point, 0)
+
+    def _show(self, device: _Device, point: Point | None, value: Value) -> None:
+        if point is not None:
+            device.end.show(point, value)
+
+
+def _plain(value: Value) -> int | str:
+    """A value as it can be compared, whatever the protocol has made of it."""
+    bit = as_bit(value)
+    if bit is not None:
+        return int(bit)
+    number = as_number(value)
+    return str(value) if number is None else number

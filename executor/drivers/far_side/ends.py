@@ -1,0 +1,160 @@
+"""A binding for a simulated cell, and the servers that it leads to.
+
+The machines are dealt out to the protocols in turn, one device for each protocol. Addresses are of no importance here
+beyond being right; they are laid out as one would by hand: a block for each machine, one input for each sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from firable.executor.drivers.binding import Binding, DeviceDocument, writes
+from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.far_side.end import FarEnd
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Command, Net, Place
+
+PORTS: Final = {"modbus": "15020", "opcua": "14840", "mqtt": "11883", "serial": ""}
+"""The protocols, and the port of this host at which each is served; a serial line gets its name when it is made."""
+
+HEARTBEAT_S: Final = 0.2
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """The keys of a device of a protocol, and how its points are called."""
+
+    protocol: str
+    port: str
+
+    @property
+    def keys(self) -> Sequence[str]:
+        """The lines that say where it is."""
+        return {
+            "modbus": ("driver: modbus-tcp", "host: 127.0.0.1", f"port: {self.port}"),
+            "opcua": ("driver: opcua", f'url: "opc.tcp://127.0.0.1:{self.port}/"'),
+            "mqtt": ("driver: mqtt", "host: 127.0.0.1", f"port: {self.port}"),
+            "serial": ("driver: serial", f"port: {self.port}"),
+        }[self.protocol]
+
+    @property
+    def parts(self) -> Sequence[str]:
+        """What a channel has: a number beside what is written, or all in one text."""
+        asked = ("number",) if self.protocol in {"modbus", "opcua"} else ("command",)
+        return (*asked, "taken", "done", "failed")
+
+    def machine(self, name: str, i: int, part: str) -> Point:
+        """A point of the i-th machine."""
+        if self.protocol == "modbus":
+            registers = {"code": "holding 0", "number": "holding 1", "taken": "input 0", "done": "input 1"}
+            table, _, offset = registers.get(part, "input 2").partition(" ")
+            return f"{table} {10 * i + 10 + int(offset)}"
+        return self._named(f"{name}/{part}")
+
+    def device(self, part: str) -> Point:
+        """A point of the device itself."""
+        if self.protocol == "modbus":
+            return {"beat": "holding 0", "tripped": "discrete 0", "stop": "coil 0"}[part]
+        return self._named(f"device/{part}")
+
+    def sensor(self, name: str, i: int) -> str:
+        """How the i-th sensor is read, and whether it may be forced."""
+        if self.protocol == "modbus":
+            return f"read: discrete {i + 1}"
+        return f"read: {self._named(f'sensors/{name}')}{', force: true' if self.protocol != 'serial' else ''}"
+
+    def _named(self, name: str) -> Point:
+        return {"opcua": f"ns=2;s={name}", "mqtt": f"cell/{name}"}.get(self.protocol, name)
+
+
+def binding_text(net: Net, ports: Mapping[str, str], sensed: Collection[str]) -> str:
+    """A binding of a net to these protocols at these ports, as a file; `sensed` are the signals that a sensor shows."""
+    layouts = [_Layout(protocol, port) for protocol, port in ports.items()]
+    commanded = [(place, place.command) for place in net.places if place.command is not None]
+    machines = list(dict.fromkeys(command.machine for _, command in commanded))
+    of = {machine: layouts[i % len(layouts)] for i, machine in enumerate(machines)}
+    owners = {place.owner: of[command.machine] for place, command in commanded}
+    lines = [
+        "firable_bind: 1",
+        f"cell: {net.name}",
+        "description: a simulated cell behind real servers, by firable sim",
+    ]
+    lines += ["", "devices:"]
+    for layout in layouts:
+        own = {name: i for i, name in enumerate(machines) if of[name] is layout}
+        lines += [f"  {layout.protocol}:", *(f"    {key}" for key in layout.keys)]
+        beat, tripped = layout.device("beat"), layout.device("tripped")
+        lines.append(f"    heartbeat: {{write: {beat}, every_s: {HEARTBEAT_S:g}, tripped: {tripped}}}")
+        lines.append(f"    safe: {{{layout.device('stop')}: true}}")
+        lines.append("    channels:")
+        for name, i in own.items():
+            points = ", ".join(f"{part}: {layout.machine(name, i, part)}" for part in layout.parts)
+            lines.append(f"      {name}: {{{points}}}")
+    lines += ["", "signals:"]
+    for i, signal in enumerate(net.signals):
+        at = owners.get(signal.owner, layouts[0])
+        read = f"{{device: {at.protocol}, {at.sensor(signal.name, i)}}}"
+        lines.append(f"  {signal.name}: {read if signal.name in sensed else 'acknowledged'}")
+    return "\n".join([*lines, "", "commands:", *_commands(commanded, machines, of), ""])
+
+
+def _commands(
+    commanded: Sequence[tuple[Place, Command]], machines: Sequence[str], of: Mapping[str, _Layout]
+) -> Iterator[str]:
+    codes: dict[str, int] = {}
+    for place, command in commanded:
+        name, layout = command.machine, of[command.machine]
+        code = codes.setdefault(str(command), len(codes) + 1)
+        write = f", write: {{{layout.machine(name, machines.index(name), 'code')}: {code}}}"
+        written = write if "number" in layout.parts else ""
+        yield f"  {place.name}: {{device: {layout.protocol}, channel: {name}{written}}}"
+
+
+def ends_of(binding: Binding) -> dict[str, FarEnd]:
+    """The servers to which a binding leads, on this host; raises `InputError` F5104 for a device that has none."""
+    return {name: _end(binding, name, device) for name, device in binding.document.devices.items()}
+
+
+def _end(binding: Binding, name: str, device: DeviceDocument) -> FarEnd:
+    options = binding.options[name].model_dump()
+    points = _points(binding, name)
+    match device.driver:
+        case "modbus-tcp":
+            from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
+
+            return ModbusTcpEnd(options["port"])
+        case "opcua":
+            from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
+
+            return OpcUaEnd(points, int(options["url"].rstrip("/").rpartition(":")[2]))
+        case "mqtt":
+            from firable.executor.drivers.far_side.mqtt_device import MqttEnd
+
+            return MqttEnd(list(points), options["port"])
+        case other:
+            message = f"`driver: {other}` leads to nothing that can be served on this host"
+            hint = "let the binding be made: name the protocols, such as --modbus --opcua"
+            raise InputError([binding.problem("F5104", ("devices", name, "driver"), message, hint)])
+
+
+def _points(binding: Binding, name: str) -> dict[Point, Value]:
+    """The points that a device must have, with the values that they have at first, and so their types."""
+    document = binding.document
+    device = document.devices[name]
+    points: dict[Point, Value] = {point: not value for point, value in writes(device.safe)}
+    if device.heartbeat is not None:
+        points[device.heartbeat.write] = 0
+        if device.heartbeat.tripped is not None:
+            points[device.heartbeat.tripped] = False
+    for channel in device.channels.values():
+        points |= {point: 0 for point in (channel.number, channel.taken, channel.done, channel.failed) if point}
+        points |= {point: "" for point in (channel.command,) if point}
+    for command in document.commands.values():
+        if command.device == name:
+            points |= {point: type(value)() for point, value in writes(command.write)}
+    for signal in document.signals.values():
+        if signal is not None and signal.device == name:
+            points[signal.read] = False
+    return points

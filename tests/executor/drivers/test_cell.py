@@ -1,0 +1,128 @@
+"""The simulated cell behind real servers, and the executor on the other side of the sockets."""
+
+import asyncio
+import io
+import socket
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+
+from support.cells import decomposition_of, plant_of
+
+from firable.executor.cell.plant import Disturbance, Drops, NeverCompletes, Plant
+from firable.executor.drivers.bench import until
+from firable.executor.drivers.binding import Binding, parse_binding
+from firable.executor.drivers.bound import bound_driver
+from firable.executor.drivers.far_side.cell import CellServer
+from firable.executor.drivers.far_side.end import FarEnd
+from firable.executor.drivers.far_side.ends import binding_text, ends_of
+from firable.executor.drivers.far_side.serial_device import SerialEnd
+from firable.executor.operating.execution import Execution
+from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.situation import Situation, State
+from firable.nets.interchange import net_digest
+from firable.semantics.replaying import replay
+from firable.semantics.trace import parse_trace
+
+DECOMPOSITION = decomposition_of("one_robot")
+NET = DECOMPOSITION.net
+
+
+@dataclass
+class Served:
+    """A cell that is served, and what it said."""
+
+    binding: Binding
+    plant: Plant
+    cell: CellServer
+    said: list[str] = field(default_factory=list)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@asynccontextmanager
+async def served(workpieces: int, *disturbances: Disturbance, speed: float = 50.0) -> AsyncIterator[Served]:
+    """The one-robot cell over Modbus and a serial line, fifty times as fast as it would be."""
+    line = SerialEnd()
+    line.line.open()
+    binding = parse_binding(
+        binding_text(NET, {"modbus": str(free_port()), "serial": line.line.near}, plant_of("one_robot").sensors)
+    )
+    ends: dict[str, FarEnd] = {**ends_of(binding.without({"serial"})), "serial": line}
+    plant = Plant(plant_of("one_robot"), workpieces=workpieces, disturbances=disturbances)
+    said: list[str] = []
+    cell = CellServer(binding, NET, plant, ends, speed=speed, tell=lambda _, what: said.append(what))
+    await cell.start()
+    running = asyncio.create_task(cell.run())
+    try:
+        yield Served(binding, plant, cell, said)
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        await cell.stop()
+
+
+async def executed(one: Served, done: Callable[[], object], *, overdue_seconds: float = 20.0) -> Situation:
+    """Run the net on a served cell until something is so; the trace must be one of the net."""
+
+    async def operator(execution: Execution) -> None:
+        await until(done, "the work in the cell")
+        execution.stop()
+
+    stream = io.StringIO()
+    recorder = Recorder(NET, net_digest(NET), stream)
+    driver = bound_driver(one.binding, NET)
+    execution = Execution(DECOMPOSITION, driver, recorder, operator=operator, overdue_seconds=overdue_seconds)
+    situation = await execution.main()
+    recorder.end(execution.now_seconds(), situation.state.value)
+    assert replay(NET, parse_trace(stream.getvalue())).complete
+    return situation
+
+
+def test_workpieces_go_through_a_cell_behind_sockets_none_lost_and_none_doubled() -> None:
+    async def main() -> None:
+        async with served(3) as one:
+            situation = await executed(one, lambda: len(one.plant.delivered) == 3)
+            assert situation.state is State.STOPPED
+            assert [workpiece.processed for workpiece in one.plant.delivered] == [1, 1, 1]
+            assert not one.cell.fault
+
+    asyncio.run(main())
+
+
+def test_machine_that_hangs_is_a_fault_and_the_others_are_stopped() -> None:
+    async def main() -> None:
+        async with served(2, NeverCompletes("R", "GRASP")) as one:
+            situation = await executed(one, lambda: False, overdue_seconds=1.5)
+            assert situation.state is State.FAULT
+            assert "'R GRASP at=CV1' of 'robot.grasp_cv1'" in situation.message
+            await until(lambda: "R is stopped by a safe output" in one.said, "the safe output")
+
+    asyncio.run(main())
+
+
+def test_workpiece_that_is_dropped_is_missed_where_it_should_be() -> None:
+    async def main() -> None:
+        async with served(1, Drops("R", "MOVE", 2)) as one:
+            situation = await executed(one, lambda: one.cell.fault, overdue_seconds=20.0)
+            assert "has lost the workpiece" in one.cell.fault or "holds nothing" in one.cell.fault
+            assert situation.state in {State.STOPPED, State.FAULT}
+            assert one.plant.inside == ()
+
+    asyncio.run(main())
+
+
+def test_host_of_some_machines_takes_from_the_binding_what_is_its_own() -> None:
+    async def main() -> None:
+        async with served(0) as one:
+            (mc,) = [subnet for subnet in DECOMPOSITION.subnets if subnet.name == "mc"]
+            driver = bound_driver(one.binding, NET, mc)
+            assert set(driver.devices) == {"serial"}
+            assert set(driver.readings()) == {"mc.part_present"}
+
+    asyncio.run(main())
