@@ -55,7 +55,6 @@ class HostOptions:
             "--tls": self.tls,
             "--serial": self.serial,
             "--dry-run": self.dry_run is not None,
-            "--bind": self.bind,
         }
         if names := [name for name, value in given.items() if value]:
             raise click.UsageError(f"{names[0]} is for a host among others: say with --controller what runs here")
@@ -104,7 +103,7 @@ def host_options(command: F) -> F:
                 is_flag=True,
                 help="After a restart go on as soon as it is known what became of each command.",
             ),
-            click.option("--bind", metavar="FILE", help="Where the machines and sensors of this host are."),
+            click.option("--bind", metavar="FILE", help="Run on real machines: where they and the sensors are."),
             click.option(
                 "--dry-run",
                 type=click.FloatRange(min=0.0),
@@ -192,7 +191,8 @@ def _driver(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> 
         from firable.executor.drivers.binding import read_binding
         from firable.executor.drivers.bound import bound_driver
 
-        return bound_driver(read_binding(options.bind), own_net(bundle.decomposition, machines))
+        own = own_net(bundle.decomposition, machines)
+        return bound_driver(read_binding(options.bind), bundle.net, own)
     net = own_net(bundle.decomposition, machines)
     if options.dry_run is None and (net.signals or any(place.command for place in net.places)):
         raise click.UsageError("say with --bind where the machines of this host are, or --dry-run without any")

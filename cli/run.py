@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from firable.cli import text
+from firable.cli.bound_run import run_bound_of, show_bound
 from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
 from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option
 from firable.cli.report import Report
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
 
 
-@click.command(short_help="Run a bundle on the simulated cell.")
+@click.command(short_help="Run a bundle on the simulated cell, or on real machines.")
 @click.argument("bundle", metavar="BUNDLE")
 @click.option("--plant", metavar="FILE", help="The plant file of the cell, or catalogue:NAME.  [default: by its name]")
 @click.option(
@@ -74,6 +75,8 @@ def run(
     and s stops now. In real time (--speed 1 or 10) the machines end what they are at while you think, and Enter pauses
     a run that runs on.
 
+    With --bind, all runs on the machines of a binding, in real time, until Ctrl-C; what they carry it does not count.
+
     With --controller, only these controllers run here, on machines that --bind names, and the others on hosts that are
     linked to this one by --listen and --join, or by --serial. A host that holds another bundle is refused. The run ends
     by Ctrl-C; `firable replay` joins the traces of all hosts. Without machines, --dry-run tries all that.
@@ -93,6 +96,15 @@ def run(
                 _refuse_to_overwrite(trace, bundle, *filter(None, (options.bind, options.journal)))
             said = _said(loaded.net, say, options.journal)
             return run_host_of(bundle, loaded, options, trace, _notes(loaded.net), said)
+        if options.bind is not None:
+            if plant is not None:
+                raise click.UsageError(
+                    "--plant is for the simulated cell and --bind for real machines: give one of them"
+                )
+            if trace is not None:
+                _refuse_to_overwrite(trace, bundle, options.bind)
+            operator = stepping(1.0, to_stderr=format_ == "json") if step else None
+            return run_bound_of(bundle, loaded, options.bind, trace, _notes(loaded.net), operator)
         plant_file = _plant_file(loaded, plant)
         model = read_plant(plant_file)
         if trace is not None:
@@ -236,6 +248,9 @@ def _show(report: Report) -> None:
         text.show_diagnostic(note)
     if "machines" in report.run:
         show_host(report)
+        return
+    if "binding" in report.run:
+        show_bound(report)
         return
     text.heading(report.net, report.input)
     done = report.run

@@ -18,7 +18,7 @@ from firable.executor.drivers.device import Point, Value, Writes, as_bit
 from firable.executor.drivers.driver import Answer, Clock, Listener, Quality, Reading
 from firable.executor.drivers.fitting import misfits
 from firable.executor.drivers.image import Change, Image
-from firable.executor.drivers.keeping import Kept
+from firable.executor.drivers.keeping import Kept, ended
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Net, Place, SignalKind
 
@@ -66,6 +66,8 @@ class BoundDriver:
     async def run(self, clock: Clock, listener: Listener) -> None:
         """Serve the devices until cancelled; on the way out the safe outputs are driven."""
         self.clock, self.listener = clock, listener
+        for name in self.devices:
+            self.binding.kinds[name].load()
         tasks = [asyncio.create_task(device.run(), name=name) for name, device in self.devices.items()]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_EXCEPTION)
@@ -76,9 +78,7 @@ class BoundDriver:
             stopping = [asyncio.create_task(device.kept.stopped.wait()) for device in self.devices.values()]
             longest = max((device.document.timeout_s for device in self.devices.values()), default=0.0)
             await asyncio.wait(stopping, timeout=2 * longest)
-            for one in (*tasks, *stopping):
-                one.cancel()
-            await asyncio.gather(*tasks, *stopping, return_exceptions=True)
+            await ended([*tasks, *stopping])
 
     def send(self, place: Place, entry: int) -> None:
         """Send the command of a place, or keep it until its device is connected."""
@@ -168,7 +168,6 @@ class _Device:
         self.tripped = None if heartbeat is None else heartbeat.tripped
         self.has_tripped: bool | None = None
         self.forced: deque[Writes] = deque()
-        self.is_forcing = False
         self.writing: Channel | None = None
         self.is_ready = asyncio.Event()
         self.was_ready = False
@@ -207,7 +206,7 @@ class _Device:
     @property
     def is_writing(self) -> bool:
         """Whether something that was to be written has not been confirmed."""
-        return bool(self.forced) or self.is_forcing or any(channel.is_writing for channel in self.channels.values())
+        return bool(self.forced) or any(channel.is_writing for channel in self.channels.values())
 
     # What the connection tells
 
@@ -247,8 +246,7 @@ class _Device:
         """What is to be written now."""
         self.writing = None
         if self.forced:
-            self.is_forcing = True
-            return self.forced.popleft()
+            return self.forced[0]  # until it is confirmed
         for channel in self.channels.values():
             if (some := channel.next_writes()) is not None:
                 self.writing = channel
@@ -257,10 +255,10 @@ class _Device:
 
     def written(self) -> None:
         """The device has confirmed that."""
-        self.is_forcing = False
-        if self.writing is not None:
+        if self.writing is None:
+            self.forced.popleft()
+        else:
             self.writing.written()
-            self.writing = None
 
     # What follows from it
 

@@ -12,6 +12,7 @@ mistakes are, into every one of them.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -89,9 +90,23 @@ class DeviceKind(Protocol):
         """What is wrong with an address for a use, as a sentence without its end; empty where nothing is."""
         ...
 
-    async def connect(self, options: Any, wanted: Wanted) -> Connection:
-        """Make a new connection; raises `LinkError` or `OSError`, and `ModuleNotFoundError` for a missing library."""
+    def load(self) -> None:
+        """Import the library, before any connection waits for an answer; raises `ModuleNotFoundError`."""
         ...
+
+    async def connect(self, options: Any, wanted: Wanted) -> Connection:
+        """Make a new connection; raises `LinkError` or `OSError`."""
+        ...
+
+
+def quiet(library: str) -> None:
+    """Let a library that logs not write on the terminal by itself: what matters is told by the driver.
+
+    Who configures logging still gets all of it.
+    """
+    logger = logging.getLogger(library)
+    if not logger.handlers:
+        logger.addHandler(logging.NullHandler())
 
 
 def as_bit(value: Value) -> bool | None:

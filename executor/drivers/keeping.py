@@ -13,7 +13,7 @@ own watchdog, which knows of it in time; a driver that is back after a second wo
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine, Sequence
+from collections.abc import Collection, Coroutine, Sequence
 from contextlib import suppress
 from typing import Any, Final, Protocol
 
@@ -23,7 +23,30 @@ from firable.executor.drivers.device import Connection, DeviceKind, LinkError, O
 BEATS: Final = 65_536
 """Heartbeats are numbers from 0, one more each time, and again from 0."""
 
+_CANCELLED_AGAIN_SECONDS: Final = 0.5
+
 _FAILURES: Final = (LinkError, OSError, TimeoutError)
+
+
+async def ended(tasks: Collection[asyncio.Task[Any]]) -> None:
+    """Cancel tasks until they are over, whatever they end with.
+
+    Once is not enough: before Python 3.12, a task that waits with a time limit (`asyncio.wait_for`, in libraries as
+    well) loses the cancellation that comes at the same time as what it waits for.
+    """
+    cancelled: asyncio.CancelledError | None = None
+    while pending := [task for task in tasks if not task.done()]:
+        for task in pending:
+            task.cancel()
+        try:
+            await asyncio.wait(pending, timeout=_CANCELLED_AGAIN_SECONDS)
+        except asyncio.CancelledError as error:  # ours: when they are over
+            cancelled = error
+    for task in tasks:
+        if not task.cancelled():
+            task.exception()
+    if cancelled is not None:
+        raise cancelled
 
 
 class Served(Protocol):
@@ -128,9 +151,7 @@ class Kept:
             for task in done:
                 task.result()
         finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            await ended(tasks)
 
     def _take(self, batch: Sequence[tuple[Point, Value]]) -> None:
         if self.document.alive is not None:

@@ -12,7 +12,6 @@ pymodbus looks at it, frames of RTU carry none: there a late answer *is* the ans
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +20,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 from pydantic import Field
 
-from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes
+from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes, quiet
 
 if TYPE_CHECKING:
     from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
@@ -225,6 +224,10 @@ class ModbusTcp(_Modbus):
 
     options: type[Options] = TcpOptions
 
+    def load(self) -> None:
+        """Import what is needed."""
+        import_module("pymodbus.client")
+
     async def connect(self, options: TcpOptions, wanted: Wanted) -> Connection:
         """Make a new connection."""
         from pymodbus.client import AsyncModbusTcpClient
@@ -241,13 +244,17 @@ class ModbusRtu(_Modbus):
 
     options: type[Options] = RtuOptions
 
+    def load(self) -> None:
+        """Import what is needed."""
+        import_module("serial")  # which pymodbus would say to be missing only in passing
+        import_module("pymodbus.client")
+
     async def connect(self, options: RtuOptions, wanted: Wanted) -> Connection:
         """Open the line anew."""
         import termios
 
         from pymodbus.client import AsyncModbusSerialClient
 
-        import_module("serial")  # pymodbus would say it is missing only in passing
         client = AsyncModbusSerialClient(
             options.port,
             baudrate=options.baud,
@@ -266,7 +273,7 @@ class ModbusRtu(_Modbus):
 async def _opened(
     client: AsyncModbusTcpClient | AsyncModbusSerialClient, where: str, unit: int, every_s: float, wanted: Wanted
 ) -> Connection:
-    logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # what matters is told by us
+    quiet("pymodbus")
     try:
         if not await client.connect():
             raise LinkError(f"{where} does not answer")

@@ -17,11 +17,12 @@ import math
 import uuid
 from collections.abc import Sequence
 from contextlib import suppress
+from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
 from pydantic import Field
 
-from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes
+from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes, quiet
 
 if TYPE_CHECKING:
     from aiomqtt import Client
@@ -99,18 +100,21 @@ class Mqtt:
             return f"a topic to {use} has no wildcards: no `+`, no `#`"
         return ""
 
+    def load(self) -> None:
+        """Import what is needed."""
+        import_module("aiomqtt")
+
     async def connect(self, options: MqttOptions, wanted: Wanted) -> Connection:
         """Make a new client."""
         from aiomqtt import Client, MqttError, TLSParameters
 
-        logger = logging.getLogger("firable.mqtt")
-        logger.addHandler(logging.NullHandler())  # what matters is told by us
+        quiet("firable.mqtt")
         client = Client(
             options.host,
             options.port,
             username=options.user,
             password=options.password,
-            logger=logger,
+            logger=logging.getLogger("firable.mqtt"),
             timeout=wanted.timeout_s,
             keepalive=max(1, math.ceil(wanted.timeout_s)),
             tls_params=TLSParameters() if options.tls else None,

@@ -12,14 +12,14 @@ subscriptions with what was queued in the meantime. A new client begins with wha
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 from pydantic import Field
 
-from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes
+from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes, quiet
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client
@@ -91,9 +91,11 @@ class OpcUaConnection:
 
     async def close(self) -> None:
         """End the session if that can be, and the connection in any case."""
-        with suppress(Exception):
-            await asyncio.wait_for(self.client.disconnect(), self.wanted.timeout_s)
-        self.client.disconnect_socket()
+        try:
+            with suppress(Exception):
+                await asyncio.wait_for(self.client.disconnect(), self.wanted.timeout_s)
+        finally:
+            self.client.disconnect_socket()
 
     def datachange_notification(self, node: Node, value: Any, data: Any) -> None:
         """The subscription tells of a change (called by asyncua)."""
@@ -159,12 +161,16 @@ class OpcUa:
             return "what stands after `i=` is a number"
         return ""
 
+    def load(self) -> None:
+        """Import what is needed."""
+        import_module("asyncua.client.client")
+
     async def connect(self, options: OpcUaOptions, wanted: Wanted) -> Connection:
         """Make a new client."""
         from asyncua.client.client import Client
         from asyncua.ua.uaerrors import UaError
 
-        logging.getLogger("asyncua").addHandler(logging.NullHandler())  # what matters is told by us
+        quiet("asyncua")
         client = Client(options.url, timeout=wanted.timeout_s, watchdog_intervall=wanted.timeout_s)
         if options.user is not None:
             client.set_user(options.user)

@@ -18,6 +18,7 @@ import itertools
 import re
 from collections import deque
 from collections.abc import Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
 from pydantic import Field
@@ -210,6 +211,10 @@ class SerialLine:
         if _POINT.fullmatch(point) is None or len(point) > 60:
             return f"what a line is to {use} is a word of letters, digits, and . _ / -"
         return ""
+
+    def load(self) -> None:
+        """Import what is needed."""
+        import_module("serial")
 
     async def connect(self, options: SerialOptions, wanted: Wanted) -> Connection:
         """Open the port anew, and forget what has come before."""

@@ -96,6 +96,7 @@ class Execution:
         resume: bool = False,
         said: Mapping[str, Answer] | None = None,
         begin_seconds: float = 0.0,
+        tell: Callable[[str, str], None] | None = None,
     ) -> None:
         self.net = decomposition.net
         self.driver = driver
@@ -103,6 +104,7 @@ class Execution:
         self.overdue_seconds = overdue_seconds
         self.is_complete = is_complete
         self.operator = operator
+        self.tell = tell
         self.speed = speed
         self.begin_seconds = begin_seconds
         self.journal = journal or MemoryJournal()
@@ -306,6 +308,8 @@ class Execution:
     def driver_note(self, machine: str, message: str) -> None:
         """What a driver says of a machine or its link stands in the trace."""
         self.recorder.note(self.now_seconds(), "driver", machine=machine, message=message)
+        if self.tell is not None:
+            self.tell(machine, message)
 
     def moved(self) -> None:
         """Something happened in the cell; perhaps it has come to rest."""

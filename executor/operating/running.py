@@ -197,10 +197,12 @@ def run_bound(
     trace_path: Path | str | None = None,
     overdue_seconds: float = 120.0,
     operator: Operator | None = None,
+    tell: Callable[[str, str], None] | None = None,
 ) -> RunReport:
     """Run a bundle on the machines of a binding, in real time, until the operator stops it or nothing can go on.
 
-    What workpieces there are is not to be known; the report counts none. Raises `InputError` F5002 where the bundle is
+    What workpieces there are is not to be known; the report counts none. `tell` is told of links that come and go, by
+    device and sentence. Raises `InputError` F5002 where the bundle is
     not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the trace cannot
     be written.
     """
@@ -210,7 +212,7 @@ def run_bound(
     with nullcontext() if trace_path is None else closing(TraceFile(trace_path)) as trace:
         recorder = Recorder(bundle.net, net_digest(bundle.net), trace)
         execution = Execution(
-            bundle.decomposition, driver, recorder, overdue_seconds=overdue_seconds, operator=operator
+            bundle.decomposition, driver, recorder, overdue_seconds=overdue_seconds, operator=operator, tell=tell
         )
         situation = asyncio.run(_terminable(execution))
         recorder.end(execution.now_seconds(), situation.state.value)

@@ -100,6 +100,9 @@ class MemoryKind:
     def point_problem(self, point: Point, use: Use) -> str:
         return f"a question is no point to {use}" if point.startswith("?") else ""
 
+    def load(self) -> None:
+        pass  # there is no library
+
     async def connect(self, options: MemoryOptions, wanted: Wanted) -> Connection:
         end = MEMORIES[options.memory]
         if end.is_cut:

@@ -89,7 +89,6 @@ class CellServer:
 
     async def start(self) -> None:
         """Begin to serve."""
-        self.begun_seconds = asyncio.get_running_loop().time()
         for device in self.devices.values():
             await device.end.start(partial(self._written, device))
             for channel in device.channels.values():
@@ -98,6 +97,7 @@ class CellServer:
                 device.end.show(device.document.heartbeat.tripped, value=False)
         for signal in self.plant.shown:
             self._sensor(signal)
+        self.begun_seconds = asyncio.get_running_loop().time()
 
     async def stop(self) -> None:
         """End, and close all connections."""

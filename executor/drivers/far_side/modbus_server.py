@@ -13,7 +13,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.device import Point, Value, quiet
 from firable.executor.drivers.far_side.end import Faults
 from firable.executor.drivers.far_side.line import PseudoLine
 from firable.executor.drivers.modbus import BITS, Address, address
@@ -29,6 +29,7 @@ class ModbusServer:
     """A Modbus server of points, without its transport."""
 
     def __init__(self) -> None:
+        quiet("pymodbus")
         self.faults = Faults()
         self.shown: dict[tuple[str, int], int] = {}
         self.written: Callable[[Point, Value], None] = lambda _point, _value: None

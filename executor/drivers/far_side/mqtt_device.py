@@ -7,6 +7,7 @@ the plant would.
 from __future__ import annotations
 
 import asyncio
+import logging
 import shutil
 import socket
 import tempfile
@@ -16,7 +17,7 @@ from pathlib import Path
 
 from aiomqtt import Client, MqttError
 
-from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.device import Point, Value, quiet
 from firable.executor.drivers.far_side.end import Faults
 from firable.executor.drivers.far_side.relay import Relay
 
@@ -31,6 +32,7 @@ class MqttEnd:
 
     def __init__(self, taken: Collection[Point], port: int = 0) -> None:
         self.faults = Faults()
+        quiet("firable.mqtt")
         self.taken = sorted(taken)
         self.relay = Relay(self.faults, port)
         self.behind = 0
@@ -95,7 +97,7 @@ class MqttEnd:
     async def _serve(self) -> None:
         while True:
             with suppress(MqttError):
-                async with Client("127.0.0.1", self.behind) as client:
+                async with Client("127.0.0.1", self.behind, logger=logging.getLogger("firable.mqtt")) as client:
                     await client.subscribe([(topic, 1) for topic in self.taken])
                     self.is_ready.set()
                     await asyncio.gather(self._take(client), self._publish(client))

@@ -6,7 +6,6 @@ Its nodes are made when it starts, from the values that its points have at first
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -16,7 +15,7 @@ from asyncua.server.server import Server
 from asyncua.ua.status_codes import StatusCodes
 from asyncua.ua.uatypes import UInt32
 
-from firable.executor.drivers.device import Point, Value
+from firable.executor.drivers.device import Point, Value, quiet
 from firable.executor.drivers.far_side.end import Faults
 from firable.executor.drivers.far_side.relay import Relay
 
@@ -73,7 +72,7 @@ class OpcUaEnd:
         await self.relay.open(self.behind)
 
     async def _serve(self) -> None:
-        logging.getLogger("asyncua").addHandler(logging.NullHandler())
+        quiet("asyncua")
         self.server = Server()
         await self.server.init()
         self.server.set_security_policy([ua.SecurityPolicyType.NoSecurity])

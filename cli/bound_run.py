@@ -1,0 +1,78 @@
+"""`firable run BUNDLE --bind FILE`: run all controllers of a bundle here, on the machines of a binding."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from firable.cli import text
+from firable.cli.report import Report
+
+if TYPE_CHECKING:
+    from firable.executor import Operator, RunReport
+    from firable.nets.bundle import Bundle
+    from firable.nets.diagnostics import Diagnostic
+    from firable.nets.verdict import Verdict
+
+
+def run_bound_of(
+    path: str,
+    bundle: Bundle,
+    bind: str,
+    trace: str | None,
+    notes: tuple[Diagnostic, ...],
+    operator: Operator | None,
+) -> Report:
+    """Run until the operator stops it or nothing can go on, and report how it ended."""
+    from firable.executor.drivers.binding import read_binding
+    from firable.executor.operating.running import run_bound
+
+    report = run_bound(bundle, read_binding(bind), trace_path=trace, operator=operator, tell=_told)
+    known = report.to_json()
+    kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages")
+    return Report(
+        "run",
+        path,
+        bundle.net,
+        (_verdict(report, bind),),
+        files=(trace,) if trace else (),
+        notes=notes,
+        run={**{key: known[key] for key in kept}, "seconds": report.simulated_seconds, "binding": bind},
+    )
+
+
+def show_bound(report: Report) -> None:
+    """How the run ended."""
+    text.heading(report.net, report.input)
+    done = report.run
+    click.echo(f"  {done['state']} after {done['seconds']:,.0f} s on the machines of {done['binding']}")
+    click.echo(
+        f"  {text.counted(sum(done['firings'].values()), 'firing')}, {text.counted(done['commands'], 'command')} to "
+        f"machines, {text.counted(done['messages'], 'message')} between coordinator and controllers"
+    )
+    if refuted := [verdict for verdict in report.verdicts if not verdict.holds]:
+        text.show_verdicts(report.net, refuted)
+    text.show_summary(report)
+    for file in report.files:
+        click.echo(f"  trace {file}")
+
+
+def _told(machine: str, sentence: str) -> None:
+    """One line of what becomes of a link, as it happens."""
+    click.echo(f"  {machine}: {sentence}", err=True)
+
+
+def _verdict(report: RunReport, bind: str) -> Verdict:
+    from firable.executor import State
+    from firable.nets.verdict import Status, Verdict
+
+    went_wrong = report.state is not State.STOPPED
+    return Verdict(
+        "ran-until-stopped",
+        Status.VIOLATED if went_wrong else Status.PROVED,
+        "the cell runs until it is stopped",
+        f"run on the machines of {bind}",
+        hint=f"{report.state}: {report.situation.message}" if went_wrong else "",
+        subjects=tuple(map(str, report.situation.blocked)) if went_wrong else (),
+    )

@@ -1,0 +1,136 @@
+"""`firable sim`, `firable io` and `firable run --bind`: the cell over sockets, looked at, forced and run."""
+
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from firable.cli.main import main
+from firable.executor.drivers.far_side.ends import binding_text
+from firable.nets.catalogue import catalogue_net, catalogue_path
+from firable.nets.machines.plant_file import read_plant
+from firable.semantics.replaying import replay
+from firable.semantics.trace import read_trace
+
+NET = catalogue_net("one_robot")
+SENSORS = read_plant(catalogue_path("one_robot").with_name("one_robot.plant.yaml")).sensors
+
+
+def free_port() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return str(probe.getsockname()[1])
+
+
+def firable(*arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-u", "-m", "firable.cli", *arguments]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+@dataclass
+class Cell:
+    """A cell that is served by a process of its own, and where."""
+
+    process: subprocess.Popen[str]
+    bind: Path
+
+    def line_with(self, text: str) -> str:
+        """Read on to the line that holds a text."""
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            if text in line:
+                return line
+        raise AssertionError(f"the cell has ended and never said '{text}'")
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Iterator[Cell]:
+    """The one-robot cell over Modbus, of which the completion of a grasp and the sensor of MC may be forced."""
+    bind = tmp_path / "cell.bind.yaml"
+    text = binding_text(NET, {"modbus": free_port()}, SENSORS)
+    text = text.replace("write: {holding 10: 5}}", "write: {holding 10: 5}, force: true}")
+    held = "mc.part_present: {device: modbus, read: coil 20, on_loss: hold, force: true}"
+    bind.write_text("\n".join(f"  {held}" if "mc.part_present:" in line else line for line in text.split("\n")))
+    serving = firable("sim", "catalogue:one_robot", "--bind", str(bind), "--workpieces", "1", "--speed", "40")
+    served = Cell(serving, bind)
+    served.line_with("serving 'one-robot'")
+    yield served
+    serving.terminate()
+    serving.wait()
+
+
+def test_signals_are_shown_and_forced_only_where_the_binding_allows_it(
+    cell: Cell, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["io", str(cell.bind), "--once"]) == 0
+    shown = capsys.readouterr().out
+    assert "mc.part_present         0      good" in shown
+    assert main(["io", str(cell.bind), "--once", "--force", "mc.part_present=1"]) == 0
+    assert "mc.part_present         1      good" in capsys.readouterr().out
+    assert main(["io", str(cell.bind), "--force", "robot.touch=1"]) == 2
+    assert "does not allow 'robot.touch' to be forced" in capsys.readouterr().err
+
+
+def test_looking_writes_nothing_and_sending_by_hand_is_for_what_the_binding_allows(cell: Cell) -> None:
+    sending = ["io", str(cell.bind), "--once", "--net", "catalogue:one_robot", "--send"]
+    assert main(["io", str(cell.bind), "--once"]) == 0
+    assert main([*sending, "robot.to_cv1"]) == 2
+    assert main([*sending, "robot.back"]) == 0
+    assert cell.line_with(" R ").strip().endswith("R MOVE to=HOME")
+
+
+def test_what_cannot_be_read_is_told_and_unknown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bind = tmp_path / "c.bind.yaml"
+    text = binding_text(NET, {"modbus": free_port()}, SENSORS)
+    bind.write_text(text.replace("host: 127.0.0.1", "host: 127.0.0.1\n    start_s: 0.2"))
+    assert main(["io", str(bind), "--once"]) == 3
+    said = capsys.readouterr()
+    assert "bad        -          0  not reached since the start" in said.out
+    assert "modbus: not connected: " in said.err
+
+
+def test_bundle_runs_on_the_machines_of_a_binding_until_it_is_stopped(cell: Cell, tmp_path: Path) -> None:
+    bundle, trace = tmp_path / "cell.bundle", tmp_path / "trace"
+    assert main(["bundle", "catalogue:one_robot", "-o", str(bundle)]) == 0
+    running = firable("run", str(bundle), "--bind", str(cell.bind), "--trace", str(trace))
+    cell.line_with("workpiece 1 is carried out")
+    running.send_signal(signal.SIGINT)
+    said, _ = running.communicate(timeout=60)
+    assert running.returncode == 0, said
+    assert "stopped after" in said
+    assert replay(NET, read_trace(trace)).complete
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["sim", "catalogue:one_robot"], "name protocols"),
+        (["sim", "catalogue:one_robot", "--modbus", "--stuck", "robot.tuch=1"], "did you mean 'robot.touch'?"),
+        (["sim", "catalogue:one_robot", "--modbus", "--stuck", "robot.touch=2"], "write SIGNAL=0 or SIGNAL=1"),
+        (["sim", "catalogue:one_robot", "--modbus", "--drop", "R.MOV"], "did you mean 'R.MOVE'?"),
+        (["sim", "catalogue:philosophers-3", "--modbus"], "say with --plant which cell to serve"),
+    ],
+)
+def test_mistakes_of_who_serves_a_cell_are_told(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_device_that_cannot_be_served_here_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bind = tmp_path / "c.bind.yaml"
+    bind.write_text(binding_text(NET, {"serial": "/dev/ttyS0"}, SENSORS))
+    assert main(["sim", "catalogue:one_robot", "--bind", str(bind)]) == 2
+    assert "error[F5104]: `driver: serial` leads to nothing that can be served" in capsys.readouterr().err
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        bind.write_text(binding_text(NET, {"modbus": str(taken.getsockname()[1])}, SENSORS))
+        assert main(["sim", "catalogue:one_robot", "--bind", str(bind)]) == 2
+    assert "error[F5104]: the cell cannot be served: " in capsys.readouterr().err
