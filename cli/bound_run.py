@@ -10,7 +10,9 @@ from firable.cli import text
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
-    from firable.executor import Operator, RunReport
+    from collections.abc import Mapping
+
+    from firable.executor import Answer, Operator, RunReport
     from firable.nets.bundle import Bundle
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.verdict import Verdict
@@ -23,12 +25,25 @@ def run_bound_of(
     trace: str | None,
     notes: tuple[Diagnostic, ...],
     operator: Operator | None,
+    journal: str | None,
+    said: Mapping[str, Answer],
+    *,
+    resume: bool,
 ) -> Report:
     """Run until the operator stops it or nothing can go on, and report how it ended."""
     from firable.executor.drivers.binding import read_binding
     from firable.executor.operating.running import run_bound
 
-    report = run_bound(bundle, read_binding(bind), trace_path=trace, operator=operator, tell=_told)
+    report = run_bound(
+        bundle,
+        read_binding(bind),
+        trace_path=trace,
+        operator=operator,
+        tell=_told,
+        journal_path=journal,
+        resume=resume,
+        said=said,
+    )
     known = report.to_json()
     kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages")
     return Report(
@@ -67,12 +82,14 @@ def _verdict(report: RunReport, bind: str) -> Verdict:
     from firable.executor import State
     from firable.nets.verdict import Status, Verdict
 
-    went_wrong = report.state is not State.STOPPED
+    went_wrong = report.state not in {State.STOPPED, State.HELD}
+    held = report.state is State.HELD
     return Verdict(
         "ran-until-stopped",
-        Status.VIOLATED if went_wrong else Status.PROVED,
+        Status.VIOLATED if went_wrong else Status.UNKNOWN if held else Status.PROVED,
         "the cell runs until it is stopped",
         f"run on the machines of {bind}",
+        bound=report.situation.message if held else "",
         hint=f"{report.state}: {report.situation.message}" if went_wrong else "",
         subjects=tuple(map(str, report.situation.blocked)) if went_wrong else (),
     )

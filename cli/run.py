@@ -102,9 +102,18 @@ def run(
                     "--plant is for the simulated cell and --bind for real machines: give one of them"
                 )
             if trace is not None:
-                _refuse_to_overwrite(trace, bundle, options.bind)
-            operator = stepping(1.0, to_stderr=format_ == "json") if step else None
-            return run_bound_of(bundle, loaded, options.bind, trace, _notes(loaded.net), operator)
+                _refuse_to_overwrite(trace, bundle, options.bind, *_files_beside(options.journal))
+            return run_bound_of(
+                bundle,
+                loaded,
+                options.bind,
+                trace,
+                _notes(loaded.net),
+                stepping(1.0, to_stderr=format_ == "json") if step else None,
+                options.journal,
+                _said(loaded.net, say, options.journal),
+                resume=options.resume,
+            )
         plant_file = _plant_file(loaded, plant)
         model = read_plant(plant_file)
         if trace is not None:

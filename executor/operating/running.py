@@ -198,23 +198,36 @@ def run_bound(
     overdue_seconds: float = 120.0,
     operator: Operator | None = None,
     tell: Callable[[str, str], None] | None = None,
+    journal_path: Path | str | None = None,
+    resume: bool = False,
+    said: Mapping[str, Answer] | None = None,
 ) -> RunReport:
     """Run a bundle on the machines of a binding, in real time, until the operator stops it or nothing can go on.
 
     What workpieces there are is not to be known; the report counts none. `tell` is told of links that come and go, by
-    device and sentence. Raises `InputError` F5002 where the bundle is
-    not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the trace cannot
-    be written.
+    device and sentence; journal, `resume` and `said` are as for `run`. Raises `InputError` F5002 where the bundle is
+    not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the trace cannot be
+    written, and F5031 to F5034 where the journal cannot be gone on with.
     """
     if problems := unproved(bundle):
         raise InputError(problems)
     driver = bound_driver(binding, bundle.net)
-    with nullcontext() if trace_path is None else closing(TraceFile(trace_path)) as trace:
-        recorder = Recorder(bundle.net, net_digest(bundle.net), trace)
+    decomposition = bundle.decomposition
+    with opened(decomposition, bundle.digest, None, 0, 0, journal_path, trace_path) as files:
         execution = Execution(
-            bundle.decomposition, driver, recorder, overdue_seconds=overdue_seconds, operator=operator, tell=tell
+            decomposition,
+            driver,
+            files.recorder,
+            overdue_seconds=overdue_seconds,
+            operator=operator,
+            tell=tell,
+            journal=files.journal,
+            resume=resume,
+            said=said,
+            begin_seconds=files.begin_seconds,
         )
         situation = asyncio.run(_terminable(execution))
+        recorder = files.recorder
         recorder.end(execution.now_seconds(), situation.state.value)
     return RunReport(
         situation, (), (), (), (), recorder.firings, recorder.commands, execution.messages, execution.now_seconds()

@@ -47,13 +47,14 @@ class Files:
 def opened(
     decomposition: Decomposition,
     digest: str,
-    plant: PlantModel,
+    plant: PlantModel | None,
     workpieces: int,
     seed: int,
     journal_path: Path | str | None,
     trace: LineStream | Path | str | None,
 ) -> Iterator[Files]:
-    """The files of a run, for as long as it lasts; without a journal nothing is taken up.
+    """The files of a run, for as long as it lasts; without a journal nothing is taken up, and without a plant there is
+    no simulated cell that would have to be where it was.
 
     Raises `InputError` F5031-F5034 for a journal that cannot be gone on with, F5035 for a simulated cell of another
     run, F1017 for a trace that cannot be written or does not go on where it was.
@@ -65,7 +66,8 @@ def opened(
         if journal_path is not None:
             names = [COORDINATOR, *(subnet.name for subnet in decomposition.subnets)]
             journal = stack.enter_context(closing(SqliteJournal(journal_path, digest, names)))
-            cell = stack.enter_context(closing(CellLog(f"{journal_path}.cell", plant, workpieces, seed)))
+            if plant is not None:
+                cell = stack.enter_context(closing(CellLog(f"{journal_path}.cell", plant, workpieces, seed)))
         kept = journal.kept(TRACE).get(KEY)
         begun = any(journal.kept(subnet.name) for subnet in decomposition.subnets)
         if cell is not None and begun and kept is not None and not cell.past:
