@@ -206,8 +206,8 @@ def run_bound(
 
     What workpieces there are is not to be known; the report counts none. `tell` is told of links that come and go, by
     device and sentence; journal, `resume` and `said` are as for `run`. Raises `InputError` F5002 where the bundle is
-    not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the trace cannot be
-    written, and F5031 to F5034 where the journal cannot be gone on with.
+    not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the trace cannot
+    be written, and F5031 to F5034 where the journal cannot be gone on with.
     """
     if problems := unproved(bundle):
         raise InputError(problems)
