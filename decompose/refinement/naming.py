@@ -72,7 +72,7 @@ class _Naming:
         places = tuple(
             Place(
                 names[place.key], place.owner, place.marked, place.command, _full(place.completion, place.owner),
-                place.description,
+                place.description, within=place.within,
             )
             for place in order
         )  # fmt: skip
@@ -85,13 +85,11 @@ class _Naming:
         def transition(key: str) -> Transition:
             t = self.opened.transitions[key]
             inputs = arcs(t.inputs)
-            done = (completions[source] for source in inputs)
-            gates = dict.fromkeys(
-                [
-                    *(ExternalGate(signal) for signal in done if signal),
-                    *(ExternalGate(_full(name, owner) or "", wanted) for owner, name, wanted in t.external),
-                ]
-            )
+            said = [ExternalGate(_full(name, owner) or "", wanted) for owner, name, wanted in t.external]
+            done = (ExternalGate(signal) for source in inputs if (signal := completions[source]))
+            # A fault transition wants the completion 0, as the net says already.
+            implied = [gate for gate in done if ExternalGate(gate.signal, wanted=False) not in said]
+            gates = dict.fromkeys([*implied, *said])
             return Transition(
                 titles[key], inputs, arcs(t.outputs), arcs(t.permissive), arcs(t.inhibitive), tuple(gates),
                 numbers.get(key, t.number), _described(t),

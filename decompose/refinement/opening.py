@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from firable.decompose.refinement.binding import Binding
-from firable.nets.net import Command, Net
+from firable.nets.net import Command, Net, TimeLimit
 from firable.nets.tasks.model import Catalogue, Gate, Move
 
 
@@ -40,6 +40,7 @@ class OpenPlace:
     description: str = ""
     resource: str | None = None
     path: str = ""
+    within: TimeLimit | None = None
 
 
 @dataclass(slots=True)
@@ -102,7 +103,7 @@ class _Opening:
                 owner, _, local = full.partition(".")
             self.places[place.name] = OpenPlace(
                 place.name, owner, local, full, place.marked, place.command, _local(place.completion, place.owner),
-                place.description, place.name if place.resource else None,
+                place.description, place.name if place.resource else None, within=place.within,
             )  # fmt: skip
         for t in net.transitions:
             gates = [(net.signal(gate.signal), gate.wanted) for gate in t.external]

@@ -380,3 +380,17 @@ def test_a_task_is_proved_once_however_many_places_name_it() -> None:
     )
     tasks: Catalogue = parse_tasks(PICK)
     assert [block.task.name for block in proved_tasks(more, tasks)] == ["pick"]
+
+
+def test_a_time_limit_of_the_conceptual_net_is_one_of_the_detailed_net() -> None:
+    text = format_net(replace(catalogue_net("conceptual_one_robot"), properties=()))
+    horn = "\n  horn:\n    start: off_\n    places:\n      off_:\n"
+    horn += "      sounds: {send: {machine: H, command: SOUND}, until: heard, within: 2s}\n\ntransitions:\n"
+    horn += "  h1: {from: horn.off_, to: horn.sounds}\n  h2: {from: horn.sounds, to: horn.off_}\n"
+    horn += "  h3: {from: horn.sounds_fault, to: horn.off_}"
+    net = parse_net(text.replace("\n\ntransitions:", f"{horn}", 1))
+    found = refine(net, TASKS).net
+    assert found.place("horn.sounds").within == net.place("horn.sounds").within
+    assert found.transition("horn.sounds_timeout") == net.transition("horn.sounds_timeout")
+    assert found.transition("h2").external == net.transition("h2").external
+    assert parse_net(format_net(found)) == found
