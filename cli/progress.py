@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from threading import Event, Thread
 from time import monotonic
 from typing import Final, TextIO
 
@@ -61,4 +62,58 @@ def progress_line(wanted: bool | None) -> Generator[ProgressLine | None]:
     try:
         yield line
     finally:
+        line.wipe()
+
+
+class Stages:
+    """Writes what is being done and for how long, where the work itself counts nothing: over itself, on a terminal."""
+
+    def __init__(self, stream: TextIO, clock: Callable[[], float] = monotonic) -> None:
+        self._stream = stream
+        self._clock = clock
+        self._began = clock()
+        self._words = ""
+        self._width = 0
+
+    def __call__(self, words: str) -> None:
+        """Say what is done from now on."""
+        self._words = words
+
+    def tell(self) -> None:
+        """Write the line, once a second has gone by."""
+        seconds = self._clock() - self._began
+        if seconds < SILENT_SECONDS or not self._words:
+            return
+        line = f"  {self._words}, {seconds:.0f} s"
+        self._stream.write(f"\r{line.ljust(self._width)}")
+        self._stream.flush()
+        self._width = len(line)
+
+    def wipe(self) -> None:
+        """Take the line off the terminal."""
+        if self._width:
+            self._stream.write(f"\r{' ' * self._width}\r")
+            self._stream.flush()
+            self._width = 0
+
+
+@contextmanager
+def stages() -> Generator[Callable[[str], object]]:
+    """What tells the stages of the work of this block: a line on a terminal, and nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    line, over = Stages(sys.stderr), Event()
+
+    def write() -> None:
+        while not over.wait(EVERY_SECONDS):
+            line.tell()
+
+    writer = Thread(target=write, daemon=True)
+    writer.start()
+    try:
+        yield line
+    finally:
+        over.set()
+        writer.join()
         line.wipe()

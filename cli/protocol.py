@@ -65,8 +65,18 @@ def protocol_options(command: F) -> F:
     return command
 
 
-def ask(decomposition: Decomposition, asked: Asked, seconds: float, *, evidence: bool) -> Answered:
-    """Ask about the protocol; `seconds` are for each exploration."""
+def ask(
+    decomposition: Decomposition,
+    asked: Asked,
+    seconds: float,
+    *,
+    evidence: bool,
+    begins: Callable[[str], object] = lambda _: None,
+) -> Answered:
+    """Ask about the protocol; `seconds` are for each exploration, and `begins` is told what is done next.
+
+    Ctrl-C ends the questions: what was found stays, and a verdict says that there is more.
+    """
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
     from firable.decompose.protocol.outages import outage_verdict, outages
@@ -80,20 +90,35 @@ def ask(decomposition: Decomposition, asked: Asked, seconds: float, *, evidence:
     verdicts: tuple[Verdict, ...] = ()
     protocols: dict[str, ProtocolNet] = {}
     files: dict[str, str | bytes] = {}
-    if asked.protocol or asked.faults:
-        timeout_ms = max(1, round(seconds * 1000))
-        found = protocol_verdicts(decomposition, limits, faults=asked.faults, timeout_ms=timeout_ms)
-        verdicts, protocols = found.verdicts, found.protocols
-        files = found.evidence() if evidence else {}
-    dead = tuple(outages(decomposition, limits)) if asked.faults else ()
-    refutations = (
-        tuple(readable(refute(wrong, decomposition, limits())) for wrong in wrong_protocols(decomposition.net))
-        if asked.wrong
-        else ()
-    )
-    verdicts += tuple(map(outage_verdict, dead)) + tuple(one.verdict for one in refutations)
+    dead: list[Outage] = []
+    refutations: list[Refutation] = []
+    interrupted: tuple[Verdict, ...] = ()
+    try:
+        if asked.protocol or asked.faults:
+            begins("exploring the protocol" + " with and without faults" * asked.faults)
+            timeout_ms = max(1, round(seconds * 1000))
+            found = protocol_verdicts(decomposition, limits, faults=asked.faults, timeout_ms=timeout_ms)
+            verdicts, protocols = found.verdicts, found.protocols
+            begins("writing the evidence of it")
+            files = found.evidence() if evidence else {}
+        if asked.faults:
+            begins("exploring it while somebody is dead")
+            dead.extend(outages(decomposition, limits))
+        for wrong in wrong_protocols(decomposition.net) if asked.wrong else ():
+            begins(f"trying the wrong protocol {wrong.name}")
+            refutations.append(readable(refute(wrong, decomposition, limits())))
+    except KeyboardInterrupt:
+        interrupted = (_interrupted(),)
+    verdicts += tuple(map(outage_verdict, dead)) + tuple(one.verdict for one in refutations) + interrupted
     protocols |= {refutation.verdict.name: refutation.protocol for refutation in refutations}
-    return Answered(verdicts, protocols, files, dead, refutations)
+    return Answered(verdicts, protocols, files, tuple(dead), tuple(refutations))
+
+
+def _interrupted() -> Verdict:
+    from firable.nets.verdict import Status, Verdict
+
+    says, hint = "all that was asked of the protocol is answered", "--timeout bounds each exploration"
+    return Verdict("explored.asked", Status.UNKNOWN, says, "nothing", hint=hint, bound="interrupted")
 
 
 def show(answered: Answered) -> None:

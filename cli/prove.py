@@ -10,6 +10,7 @@ import click
 from firable.cli import text
 from firable.cli.loop import machines_option, read_machines
 from firable.cli.options import answer, format_option, load_net, net_argument, page_option, with_page, write_folder
+from firable.cli.progress import stages
 from firable.cli.protocol import Answered, Asked, ask, protocol_options
 from firable.cli.protocol import show as show_protocol
 from firable.cli.report import Report
@@ -57,6 +58,7 @@ def prove(
     values of the net's own names that refute it. With --machines the gates that a vote relies on (O4) are asked of the
     loop that the plant closes, instead of being assumed. With --protocol the voting protocol of the split is explored
     as a net of its own, with --faults under faults too, and with --wrong the protocols known to be wrong are tried.
+    Ctrl-C ends what is being done and shows what is known so far.
     """
     asked, answered = Asked(protocol, faults, wrong), list[Answered]()
     make = with_page(lambda: _report(net, smt_dir, timeout, machines, asked, answered), page)
@@ -92,7 +94,8 @@ def _report(
     loaded = load_net(argument)
     with loaded.placing():
         decomposition = split(loaded.net)
-    found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)))
+    with stages() as begins:
+        found = prove_split(decomposition, timeout_ms=max(1, round(timeout * 1000)), begins=begins)
     verdicts = (*found.verdicts, *side_conditions(decomposition))
     loop, evidence = None, dict[str, str | bytes](found.files)
     if machines is not None:
@@ -105,7 +108,8 @@ def _report(
             evidence |= held.evidence()
     told = Answered()
     if asked:
-        told = ask(decomposition, asked, timeout, evidence=smt_dir is not None)
+        with stages() as begins:
+            told = ask(decomposition, asked, timeout, evidence=smt_dir is not None, begins=begins)
         answered[:] = [told]
         verdicts += told.verdicts
         evidence |= told.files

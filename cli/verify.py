@@ -13,6 +13,7 @@ import click
 
 from firable.cli import text
 from firable.cli.options import CATALOGUE, answer_all, format_option, load_net, write_folder
+from firable.cli.progress import stages
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
 
@@ -134,8 +135,8 @@ def _of_bundle(file: str, asked: _Asked) -> Report:
         signers = demand_signature(bundle, file, asked.trust)
     if asked.of is not None:
         _refuse_another_net(file, bundle.net, asked.of)
-    with _named(file):
-        checked = check_bundle(bundle, solver=asked.solver, timeout_ms=asked.timeout_ms)
+    with _named(file), stages() as begins:
+        checked = check_bundle(bundle, solver=asked.solver, timeout_ms=asked.timeout_ms, begins=begins)
     verdicts = [_told(one.verdict, one.method, one.only_claimed, shown=one.shown) for one in checked]
     files = asked.write(file, {name: text for name, text in bundle.evidence.items() if name.endswith(".smt2")})
     of = {"digest": bundle.digest, "solver": asked.solver, **({"signed_by": ", ".join(signers)} if signers else {})}

@@ -20,6 +20,7 @@ it was left undecided; or something says what is not so, and then the bundle is 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from firable.decompose.verification.checked import CheckedVerdict, Examination
@@ -30,7 +31,7 @@ from firable.decompose.verification.obligations import check_obligations
 from firable.decompose.verification.protocol import check_protocol
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
-from firable.decompose.verification.solvers import SOLVERS
+from firable.decompose.verification.solvers import SOLVERS, Answers
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import InputError
 from firable.nets.right_to_run import unproved
@@ -38,33 +39,62 @@ from firable.nets.right_to_run import unproved
 TIMEOUT_MS: Final = 60_000
 
 
-def check_bundle(bundle: Bundle, *, solver: str = "cvc5", timeout_ms: int = TIMEOUT_MS) -> tuple[CheckedVerdict, ...]:
+def check_bundle(
+    bundle: Bundle,
+    *,
+    solver: str = "cvc5",
+    timeout_ms: int = TIMEOUT_MS,
+    begins: Callable[[str], object] = lambda _: None,
+) -> tuple[CheckedVerdict, ...]:
     """Judge every verdict of a bundle, in their order; `timeout_ms` is for each question.
+
+    `begins` is told what is done next. Ctrl-C ends the check: what was not judged yet is only claimed then.
 
     Raises `InputError`: F5002 where a verdict that the net requires is not proved, F6002 where the bundle does not show
     what it claims, and `ModuleNotFoundError` where the solver is not installed. Takes time linear in the bundle, but
-    for what its documents of evidence take, and groups of hundreds of competitors, which cvc5 may give up.
+    for what its documents of evidence take.
     """
     if problems := unproved(bundle):
         raise InputError(problems)
     try:
-        return _checked(bundle, solver, timeout_ms)
+        return _checked(bundle, solver, timeout_ms, begins)
     except NotShownError as error:
         raise error.as_input_error() from None
 
 
-def _checked(bundle: Bundle, solver: str, timeout_ms: int) -> tuple[CheckedVerdict, ...]:
+def _checked(
+    bundle: Bundle, solver: str, timeout_ms: int, begins: Callable[[str], object]
+) -> tuple[CheckedVerdict, ...]:
     answers = SOLVERS[solver]
     answers("(set-logic QF_UF)", timeout_ms)  # a solver that is not there is missed before the work is done
     examination = Examination(bundle)
+    try:
+        _judge_all(examination, solver, answers, timeout_ms, begins)
+    except KeyboardInterrupt:
+        left = list(examination.unjudged())
+        if not left:  # what follows the last verdict was not seen to its end, and nothing would say so
+            raise
+        for verdict in left:
+            examination.judge(verdict, shown=False, method="nothing", only_claimed="interrupted")
+    return tuple(examination.checked[verdict.name] for verdict in bundle.verdicts)
+
+
+def _judge_all(
+    examination: Examination, solver: str, answers: Answers, timeout_ms: int, begins: Callable[[str], object]
+) -> None:
+    bundle = examination.bundle
+    begins("cutting the net anew")
     cut = check_cut(bundle.decomposition)
+    begins(f"the obligations, stated anew and answered by {solver}")
     check_obligations(examination, cut, solver, answers, timeout_ms)
+    begins("the theorem on the protocol")
     check_protocol(examination, solver, answers, timeout_ms)
+    begins("the protocol of this net")
     check_explored(examination, cut, solver, answers, timeout_ms)
     check_machines(examination, cut, answers, timeout_ms)
+    begins("the evidence on the net")
     check_verdicts_on_the_net(examination, answers, timeout_ms)
     for verdict in list(examination.unjudged()):
         raise NotShownError(f"nobody knows what '{verdict.name}' is on", "verdicts", verdict.name)
     if unused := sorted(set(bundle.evidence) - examination.used):
         raise NotShownError(f"no verdict rests on '{unused[0]}'", "evidence", unused[0])
-    return tuple(examination.checked[verdict.name] for verdict in bundle.verdicts)

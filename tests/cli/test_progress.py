@@ -1,11 +1,12 @@
 """The line that tells how far an exploration has come: on a terminal or on request, and never in a report."""
 
 import io
+from pathlib import Path
 
 import pytest
 
 from firable.cli.main import main
-from firable.cli.progress import ProgressLine, progress_line
+from firable.cli.progress import ProgressLine, Stages, progress_line, stages
 
 
 class Terminal(io.StringIO):
@@ -75,3 +76,71 @@ def test_a_long_check_tells_how_far_it_is_and_the_report_is_the_same(
     assert main([*arguments, "--no-progress"]) == 1
     silent = capsys.readouterr()
     assert (silent.out, silent.err) == (told.out, "")
+
+
+def test_stages_tell_what_is_done_and_for_how_long_and_are_wiped() -> None:
+    clock, terminal = Clock(), Terminal()
+    line = Stages(terminal, clock)
+    line("Eq. (7)")
+    clock.now_seconds = 0.9
+    line.tell()
+    assert terminal.getvalue() == ""
+    for clock.now_seconds, words in ((1.0, "arbitration"), (2.0, "O2")):
+        line(words)
+        line.tell()
+    assert terminal.getvalue() == f"\r  arbitration, 1 s\r{'  O2, 2 s'.ljust(18)}"
+    line.wipe()
+    line.wipe()
+    assert terminal.getvalue().endswith(f"\r{' ' * len('  O2, 2 s')}\r")
+
+
+def test_stages_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
+    for stream, shown in ((Terminal(), True), (io.StringIO(), False)):
+        monkeypatch.setattr("sys.stderr", stream)
+        with stages() as begins:
+            assert isinstance(begins, Stages) == shown
+            begins("anything")
+        assert stream.getvalue() == ""
+
+
+NET = "catalogue:conceptual_one_robot"
+
+
+def interrupt(*_: object, **__: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_ctrl_c_in_a_proof_shows_what_is_known_so_far(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("firable.decompose.proofs.families.theorem", interrupt)
+    assert main(["prove", NET]) == 3
+    told = capsys.readouterr().out
+    assert "✓   6 of 6   Eq. (7)" in told
+    assert "?   0 of 1   protocol" in told
+    assert "interrupted" in told
+
+
+def test_ctrl_c_in_the_exploration_of_a_protocol_shows_what_is_known_so_far(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("firable.decompose.protocol.outages.outages", interrupt)
+    assert main(["prove", NET, "--faults"]) == 3
+    told = capsys.readouterr().out
+    assert "✓ proved    explored.follows" in told
+    assert "explored.asked" in told
+    assert "interrupted" in told
+
+
+def test_ctrl_c_while_a_bundle_is_checked_leaves_the_rest_claimed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    bundle = str(tmp_path / "cell.bundle")
+    assert main(["bundle", NET, "-o", bundle]) == 0
+    capsys.readouterr()
+    monkeypatch.setattr("firable.decompose.verification.checking.check_verdicts_on_the_net", interrupt)
+    assert main(["verify", bundle]) == 3
+    told = capsys.readouterr().out
+    assert "6 of 6    eq7 " in told
+    assert "? claimed   deadlock-free" in told
+    assert "interrupted" in told
