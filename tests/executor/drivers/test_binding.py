@@ -8,6 +8,8 @@ import pytest
 from firable.executor.drivers import kinds
 from firable.executor.drivers.binding import parse_binding, read_binding
 from firable.executor.drivers.bound import bound_driver
+from firable.executor.drivers.far_side.ends import ends_of
+from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
 from firable.nets.text import parse_net
 
@@ -169,6 +171,12 @@ def test_what_refers_to_nothing_is_refused(old: str, new: str, place: str) -> No
 )
 def test_a_binding_that_does_not_fit_the_net_is_refused(old: str, new: str, place: str) -> None:
     assert ("F5101", place) in refusal(edited(old, new), fit=True)
+
+
+def test_the_binding_of_the_catalogue_fits_its_net_and_can_be_served() -> None:
+    binding = read_binding(catalogue_path("one_robot").with_name("one_robot.bind.yaml"))
+    driver = bound_driver(binding, catalogue_net("one_robot"))
+    assert set(driver.devices) == set(ends_of(binding)) == {"modbus", "opcua"}
 
 
 def test_a_driver_of_others_is_found_by_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
