@@ -61,6 +61,7 @@ class SqliteJournal:
         """The check value of each row in the file."""
         self.total = 0
         self.generation = 0
+        self.failed: InputError | None = None
         with self._failures("opened"):
             self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None)
         try:
@@ -86,7 +87,9 @@ class SqliteJournal:
                     self.rows[row] = effect.value
 
     def sync(self) -> None:
-        """Make all acts written until now durable; raises `InputError` F5034, and then the process has to end."""
+        """Make all acts written until now durable; raises `InputError` F5034, and then always: the process has to end."""
+        if self.failed is not None:
+            raise self.failed
         if not self.changed:
             return
         written = []
@@ -99,6 +102,14 @@ class SqliteJournal:
                 written.append((*row, value, check))
         deleted = [row for row in self.changed if row not in self.rows]
         self.generation += 1
+        try:
+            self._write(written, deleted)
+        except InputError as error:
+            self.failed = error
+            raise
+        self.changed.clear()
+
+    def _write(self, written: list[tuple[str, str, str, int]], deleted: list[_Row]) -> None:
         with self._failures("written"):
             run = self.connection.execute
             run("begin immediate")
@@ -107,7 +118,6 @@ class SqliteJournal:
             run("update header set generation = ?, total = ?", (self.generation, self.total))
             run("commit")
             self._bear_witness()
-        self.changed.clear()
 
     def close(self) -> None:
         """Let go of the file; what is not synced is lost."""

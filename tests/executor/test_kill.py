@@ -1,6 +1,7 @@
 """Runs that are killed (SIGKILL) at any moment and taken up: nothing is lost, nothing done twice, nothing guessed."""
 
 import asyncio
+import io
 import json
 import subprocess
 import sys
@@ -13,9 +14,16 @@ from support.cells import decomposition_of, plant_of
 from support.examples import seeds
 
 from firable.executor import State, execute
+from firable.executor.cell.plant import Plant
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.simulated import SimulatedDriver
+from firable.executor.journal.journal import MemoryJournal
+from firable.executor.operating.execution import Execution
+from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.running import Operator, RunReport
 from firable.executor.protocol.commands import Answer
-from firable.nets.diagnostics import InputError
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.net import Place
 from firable.semantics.replaying import replay
 from firable.semantics.trace import CommandSent, Fired, Noted, Trace, read_trace
 
@@ -197,3 +205,38 @@ def test_trace_that_has_lost_lines_is_not_gone_on_with(tmp_path: Path) -> None:
     code, message = refused(tmp_path)
     assert code == "F1017"
     assert "shorter than its journal says" in message
+
+
+class Failing(MemoryJournal):
+    """A journal whose disk is full after some syncs."""
+
+    def __init__(self, syncs: int) -> None:
+        super().__init__()
+        self.left = syncs
+
+    def sync(self) -> None:
+        self.left -= 1
+        if self.left < 0:
+            raise InputError([Diagnostic("F5034", "the disk is full", "make room")])
+
+
+@pytest.mark.parametrize("syncs", [0, 1, 5, 20])
+def test_nothing_leaves_that_the_journal_does_not_have(syncs: int) -> None:
+    net, stream = decomposition_of("one_robot").net, io.StringIO()
+    plant = Plant(plant_of("one_robot"), workpieces=2)
+    sent: list[tuple[int, str]] = []
+    journal = Failing(syncs)
+
+    class Noting(SimulatedDriver):
+        def send(self, place: Place, entry: int) -> None:
+            sent.append((journal.left, place.name))
+            super().send(place, entry)
+
+    driver = Noting(plant, net)
+    execution = Execution(decomposition_of("one_robot"), driver, Recorder(net, "", stream), journal=journal)
+    with pytest.raises(InputError, match="the disk is full"):
+        run_in_virtual_time(execution.main())
+    assert all(left >= 0 for left, _ in sent)
+    assert driver.stopped  # the safe outputs were driven
+    written = [json.loads(line) for line in stream.getvalue().splitlines()]
+    assert [line["command"] for line in written if "command" in line] == [place for _, place in sent]

@@ -238,6 +238,10 @@ def test_write_that_fails_ends_the_journal(tmp_path: Path) -> None:
     code, message = refused(journal.sync)
     assert code == "F5034"
     assert "full" in message
+    journal.connection.execute("pragma max_page_count = 100000")
+    assert refused(journal.sync) == (code, message)  # not tried again: nobody knows what is stored
+    left = sqlite(crashed(journal, tmp_path / "left"))
+    assert left.kept("a")["word"] == "1d"
 
 
 def test_journal_without_the_file_beside_it_is_refused(tmp_path: Path) -> None:
