@@ -87,7 +87,7 @@ class SqliteJournal:
                     self.rows[row] = effect.value
 
     def sync(self) -> None:
-        """Make all acts written until now durable; raises `InputError` F5034, and then always: the process has to end."""
+        """Make all acts written until now durable; raises `InputError` F5034, and then always: the process must end."""
         if self.failed is not None:
             raise self.failed
         if not self.changed:
