@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -58,6 +59,8 @@ def takeover(
         written.sync()
     finally:
         written.close()
+    if Path(f"{journal}.cell").is_file():  # the simulated cell that the journal is of, if it is one
+        shutil.copyfile(f"{journal}.cell", f"{into}.cell")
     click.echo(f"{into}: '{after.net.name}' goes on with tokens on {', '.join(moved.marking)}")
     if moved.under_way:
         click.echo(f"  under way, and asked after at the start: the commands of {', '.join(moved.under_way)}")

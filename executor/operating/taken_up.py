@@ -26,7 +26,7 @@ from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
 from firable.nets.machines.plant_file import PlantModel
-from firable.nets.net import Marking
+from firable.nets.net import Marking, Net
 from firable.nets.source import printable
 
 TRACE = "\ntrace"
@@ -70,8 +70,8 @@ def opened(
                 cell = stack.enter_context(closing(CellLog(f"{journal_path}.cell", plant, workpieces, seed)))
         kept = journal.kept(TRACE).get(KEY)
         begun = any(journal.kept(subnet.name) for subnet in decomposition.subnets)
-        if cell is not None and begun and kept is not None and not cell.past:
-            _refuse_lost_cell(cell.path)
+        if cell is not None and begun:
+            _demand_the_cell(cell, net)
         if isinstance(trace, Path | str):
             if begun:
                 _demand_the_same(trace, kept)
@@ -99,9 +99,16 @@ def _lines_of(kept: Stored | None) -> str:
     return str(kept["lines"]) if isinstance(kept, dict) else ""
 
 
-def _refuse_lost_cell(path: Path) -> None:
-    message = f"{printable(str(path))}: the simulated cell of this journal is empty or gone"
+def _demand_the_cell(cell: CellLog, net: Net) -> None:
+    """What the journal tells of was done to this simulated cell, by places that the net still has."""
+    message = f"{printable(str(cell.path))}: the simulated cell of this journal is empty or gone"
     hint = "put it back, or begin with a new journal: its machines would not be where the journal left them"
+    sent = {str(arguments[0]) for _, what, arguments in cell.past if what == "send" and arguments}
+    if unknown := sorted(place for place in sent if place not in net.place_index):
+        message = f"{printable(str(cell.path))}: the simulated cell was commanded by '{unknown[0]}', which is no place"
+        hint = "a simulated cell is taken over only by a net that keeps the places which have commanded it"
+    elif cell.past:
+        return
     raise InputError([Diagnostic("F5035", message, hint)])
 
 

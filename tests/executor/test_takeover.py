@@ -16,6 +16,7 @@ from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.messages import EPOCH_BITS, Keep, Stored, VoteRequest
 from firable.nets.bundle import read_bundle
+from firable.nets.catalogue import catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
 from firable.nets.text import parse_net
@@ -220,3 +221,24 @@ def test_files_that_stand_in_the_way_or_are_missing_are_told_of(
     into.unlink()
     assert main(["takeover", str(new), str(old), "--journal", str(before), "--into", str(into)]) == 2
     assert "F5031" in capsys.readouterr().err
+
+
+def test_a_run_on_the_simulated_cell_goes_on_under_the_new_bundle(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = catalogue_path("one_robot").read_text("utf-8")
+    old = bundle(tmp_path, "old", text)
+    new = bundle(tmp_path, "new", text.replace("program: O0001", "program: O0002"))
+    renamed = bundle(tmp_path, "renamed", text.replace("machining", "milling"))
+    plant = ("--plant", "catalogue:one_robot", "--workpieces", "1")
+    before, after, other = (str(tmp_path / name) for name in ("before", "after", "other"))
+    assert main(["run", str(old), *plant, "--journal", before]) == 0
+    assert main(["takeover", str(old), str(new), "--journal", before, "--into", after]) == 0
+    assert main(["run", str(new), *plant, "--journal", after]) == 3  # held
+    assert main(["run", str(new), *plant, "--journal", after, "--resume"]) == 0
+    assert main(["takeover", str(old), str(renamed), "--journal", before, "--into", other]) == 0
+    assert main(["run", str(renamed), *plant, "--journal", other]) == 2
+    assert "which is no place" in capsys.readouterr().err
+    Path(f"{after}.cell").unlink()
+    assert main(["run", str(new), *plant, "--journal", after]) == 2
+    assert "empty or gone" in capsys.readouterr().err
