@@ -35,23 +35,23 @@ def takeover(
     """
     from firable.executor.journal.sqlite_journal import SqliteJournal
     from firable.executor.journal.takeover import take_over
-    from firable.executor.links.link import COORDINATOR
     from firable.executor.operating.running import load
+    from firable.executor.protocol.deciders import coordinators
     from firable.executor.protocol.messages import Keep
     from firable.nets.bundle import read_bundle
 
     before, after = read_bundle(old), load(new)
     _refuse_missing(journal)
     _refuse_standing(into)
-    machines = [COORDINATOR, *(subnet.name for subnet in before.decomposition.subnets)]
+    machines = [*coordinators(before.decomposition), *(subnet.name for subnet in before.decomposition.subnets)]
     read = SqliteJournal(journal, before.digest, machines)
     try:
         kept = {machine: dict(read.kept(machine)) for machine in machines}
     finally:
         read.close()
-    moved = take_over(before.decomposition, after.decomposition, kept, [COORDINATOR])
+    moved = take_over(before.decomposition, after.decomposition, kept, coordinators(after.decomposition))
     _demand_reachable(after.net, moved.marking, budget(max_markings, max_memory, max_seconds))
-    names = [COORDINATOR, *(subnet.name for subnet in after.decomposition.subnets)]
+    names = [*coordinators(after.decomposition), *(subnet.name for subnet in after.decomposition.subnets)]
     written = SqliteJournal(into, after.digest, names)
     try:
         for machine, of in moved.kept.items():

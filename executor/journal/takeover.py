@@ -27,6 +27,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from firable.executor.protocol.commands import PREFIX, Stage
+from firable.executor.protocol.deciders import closed_key
 from firable.executor.protocol.messages import EPOCH_BITS, Stored
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.decomposition import Decomposition
@@ -137,6 +138,7 @@ class _Moving:
         """
         epoch = self.epoch + 1
         begun: dict[str, Kept] = {name: {"epoch": epoch} for name in coordinators}
+        none_open: dict[str, Stored] = {closed_key(name): (epoch << EPOCH_BITS, ()) for name in begun}
         for subnet in self.new.subnets:
             player = TokenPlayer.of(subnet)
             word = sum(1 << i for i, place in enumerate(subnet.places) if place.name in self.marking)
@@ -144,7 +146,7 @@ class _Moving:
             kept: dict[str, Stored] = {
                 "epoch": epoch,
                 "word": f"{word:x}",
-                "closed": (epoch << EPOCH_BITS, ()),
+                **none_open,
             }
             for key, value in self._records(subnet):
                 kept[key] = value

@@ -1,6 +1,6 @@
 """The execution: the tasks of one process that run a decomposition, and the operator's controls over them.
 
-One task for the coordinator, one for each local controller, one for the driver; they talk through mailboxes and share
+One task for each coordinator, one for each local controller, one for the driver; they talk through mailboxes and share
 nothing else. The machines they wrap are pure, so this file is the edge: here is the clock, here effects become
 messages, commands and lines of the trace.
 
@@ -29,7 +29,6 @@ from typing import Final, assert_never
 
 from firable.executor.drivers.driver import Driver
 from firable.executor.journal.journal import Journal, MemoryJournal
-from firable.executor.links.link import COORDINATOR
 from firable.executor.operating import restart
 from firable.executor.operating.mailbox import Continue, Mailbox, SignalRead
 from firable.executor.operating.recorder import Recorder
@@ -38,6 +37,7 @@ from firable.executor.operating.taken_up import TRACE
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
@@ -108,7 +108,10 @@ class Execution:
         self.speed = speed
         self.begin_seconds = begin_seconds
         self.journal = journal or MemoryJournal()
-        self.coordinator = Coordinator.restored(decomposition, self.journal.kept(COORDINATOR))
+        self.coordinators = {
+            name: Coordinator.restored(decomposition, self.journal.kept(name), name)
+            for name in coordinators(decomposition)
+        }
         self.controllers = {
             s.name: LocalController.restored(decomposition, s.name, self.journal.kept(s.name))
             for s in decomposition.subnets
@@ -120,7 +123,7 @@ class Execution:
         self.leaving: deque[Sending] = deque()
         """The commands that wait for the journal."""
         self.owner_of = {signal.name: subnet.name for subnet in decomposition.subnets for signal in subnet.signals}
-        self.mailboxes = {name: Mailbox() for name in (COORDINATOR, *self.controllers)}
+        self.mailboxes = {name: Mailbox() for name in (*self.coordinators, *self.controllers)}
         self.under_way = 0
         self.messages = 0
         self.paused = False
@@ -146,11 +149,12 @@ class Execution:
         loop = asyncio.get_running_loop()
         self.clock = RunClock(loop, loop.time() - self.begin_seconds / self.speed, self.speed)
         self.outcome = loop.create_future()
-        self._act(COORDINATOR, self.coordinator.start())
+        for name, coordinator in self.coordinators.items():
+            self._act(name, coordinator.start())
         for name, controller in self.controllers.items():
             self._act(name, controller.start())
         tasks = [
-            asyncio.create_task(self._coordinate(), name="coordinator"),
+            *(asyncio.create_task(self._coordinate(name), name=f"coordinator {name}") for name in self.coordinators),
             *(asyncio.create_task(self._control(name), name=name) for name in self.controllers),
             asyncio.create_task(self.driver.run(self.clock, self), name="driver"),
         ]
@@ -212,7 +216,7 @@ class Execution:
         if not self.paused:
             self.paused = True
             self.recorder.note(self.now_seconds(), "paused")
-            self._act(COORDINATOR, self.coordinator.permit(0))
+            self._permit(0)
             self._settle()
 
     def resume(self) -> None:
@@ -222,7 +226,7 @@ class Execution:
         if self.paused and not self.stopping:
             self.paused = False
             self.recorder.note(self.now_seconds(), "resumed")
-            self._act(COORDINATOR, self.coordinator.permit(None))
+            self._permit(None)
             for name in self.controllers:
                 self._post(name, Continue())
 
@@ -233,17 +237,17 @@ class Execution:
         """
         await self.quiet()
         before = dict(self.recorder.firings)
-        # Locals of each controller and the coordinator take turns to be first.
-        names = [COORDINATOR, *self.controllers]
+        # Locals of each controller and the coordinators take turns to be first.
+        names = [*self.coordinators, *self.controllers]
         order = names[self.turn :] + names[: self.turn]
         for name in order:
             if not self.paused or self.stopping:
                 return None
-            if name == COORDINATOR:
-                self._act(COORDINATOR, self.coordinator.permit(1))
+            if (coordinator := self.coordinators.get(name)) is not None:
+                self._act(name, coordinator.permit(1))
                 await self.quiet()
                 if self.paused:
-                    self._act(COORDINATOR, self.coordinator.permit(0))
+                    self._act(name, coordinator.permit(0))
             else:
                 self._act(name, self.controllers[name].fire())
                 self._tick(name)
@@ -266,7 +270,7 @@ class Execution:
             return
         self.stopping = self.paused = True
         self.recorder.note(self.now_seconds(), "stopped by the operator")
-        self._act(COORDINATOR, self.coordinator.permit(0))
+        self._permit(0)
         self._settle()
 
     async def quiet(self) -> None:
@@ -317,13 +321,13 @@ class Execution:
 
     # The tasks
 
-    async def _coordinate(self) -> None:
-        box = self.mailboxes[COORDINATOR]
+    async def _coordinate(self, name: str) -> None:
+        box, coordinator = self.mailboxes[name], self.coordinators[name]
         while True:
             await box.wait()
             match box.items.popleft():
                 case Report() | Vote() | Acknowledgement() as message:
-                    self._act(COORDINATOR, self.coordinator.receive(message))
+                    self._act(name, coordinator.receive(message))
                 case unknown:
                     raise ProtocolError(f"the coordinator was sent {unknown!r}")
             self._handled()
@@ -398,7 +402,7 @@ class Execution:
                     self._post(effect.controller, effect)
                 case Report() | Vote() | Acknowledgement():
                     self.messages += 1
-                    self._post(COORDINATOR, effect)
+                    self._post(effect.coordinator, effect)
                 case Keep():
                     pass  # the journal has it
                 case _:
@@ -461,8 +465,13 @@ class Execution:
             self.fault = message
             self.stopping = self.paused = True  # first, so that nothing fires whatever happens to the trace
             self.recorder.note(self.now_seconds(), "fault", message=message)
-            self._act(COORDINATOR, self.coordinator.permit(0))
+            self._permit(0)
             self._settle()
+
+    def _permit(self, firings: int | None) -> None:
+        """Let each coordinator commit so many transitions from now on; None is without limit."""
+        for name, coordinator in self.coordinators.items():
+            self._act(name, coordinator.permit(firings))
 
     def _post(self, mailbox: str, item: Message | SignalRead | Continue) -> None:
         self.under_way += 1

@@ -27,17 +27,19 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import Final, assert_never
 
 from firable.executor.drivers.driver import Driver
 from firable.executor.journal.journal import Journal
-from firable.executor.links.link import COORDINATOR, Link, called
+from firable.executor.links.link import Link, called
 from firable.executor.operating.execution import FIRINGS_AT_ONCE_MAX, RunClock
 from firable.executor.operating.host_trace import TRACE, HostTrace
 from firable.executor.operating.situation import Blocked, Situation, State, blocked
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
@@ -106,9 +108,12 @@ class Host:
         self.said = said or {}
         """What an operator says of commands, by place, where the driver does not know."""
         self.tell = tell
-        self.coordinator: Coordinator | None = None
-        if COORDINATOR in machines:
-            self.coordinator = Coordinator.restored(decomposition, journal.kept(COORDINATOR))
+        self.deciding = coordinators(decomposition)
+        self.coordinators = {
+            name: Coordinator.restored(decomposition, journal.kept(name), name)
+            for name in self.deciding
+            if name in machines
+        }
         self.controllers = {
             subnet.name: LocalController.restored(decomposition, subnet.name, journal.kept(subnet.name))
             for subnet in decomposition.subnets
@@ -117,7 +122,7 @@ class Host:
         self.owner_of = {
             signal.name: name for name in self.controllers for signal in decomposition.subnet(name).signals
         }
-        self.peers = {COORDINATOR, *(subnet.name for subnet in decomposition.subnets)} - set(machines)
+        self.peers = {*self.deciding, *(subnet.name for subnet in decomposition.subnets)} - set(machines)
         """The machines of other hosts."""
         self.connected_to: set[str] = set()
         self.posted: deque[tuple[str, Message | SignalRead | None]] = deque()
@@ -159,8 +164,8 @@ class Host:
         for task in tasks:
             task.add_done_callback(self._task_ended)
         try:
-            if self.coordinator is not None:
-                self._act(COORDINATOR, self.coordinator.start())
+            for name, coordinator in self.coordinators.items():
+                self._act(name, coordinator.start())
             for name, controller in self.controllers.items():
                 self._act(name, controller.start())
                 self._post(name, None)
@@ -192,8 +197,8 @@ class Host:
 
     def waits(self) -> Iterator[str]:
         """What waits for another machine, in a sentence each."""
-        if self.coordinator is not None:
-            for opened in self.coordinator.rounds.values():
+        for coordinator in self.coordinators.values():
+            for opened in coordinator.rounds.values():
                 if opened.decided and opened.committed is None:
                     continue  # nothing has fired, and nothing needs to
                 what = opened.committed or " or ".join(opened.transitions)
@@ -203,10 +208,10 @@ class Host:
                     elif not opened.decided and name not in opened.votes:
                         yield f"{what} waits for the vote of {self._called(name)}"
         for name, controller in self.controllers.items():
-            for promise in controller.promises.values():
+            for number, promise in controller.promises.items():
                 if promise.promised:
-                    what = " or ".join(sorted(promise.promised))
-                    yield f"{called(name)} has promised {what}, and waits for {self._called(COORDINATOR)} to decide"
+                    what, decider = " or ".join(sorted(promise.promised)), controller.coordinator_of(number)
+                    yield f"{called(name)} has promised {what}, and waits for {self._called(decider)} to decide"
             if controller.held:
                 yield f"{called(name)} is held after a restart, until it is resumed"
 
@@ -217,8 +222,8 @@ class Host:
         if not self.stopping:
             self.stopping = True
             self.trace.note("stopped by the operator")
-            if self.coordinator is not None:
-                self._act(COORDINATOR, self.coordinator.permit(0))
+            for name, coordinator in self.coordinators.items():
+                self._act(name, coordinator.permit(0))
             asyncio.get_running_loop().call_later(self.settle_seconds, self._end)
             self._wake()
 
@@ -259,7 +264,8 @@ class Host:
     def arrived(self, sender: str, receiver: str, message: Message) -> None:
         """A message of another host; what its sender may not say is dropped."""
         is_order = isinstance(message, ToController)
-        if (sender, receiver) != ((COORDINATOR, message.controller) if is_order else (message.controller, COORDINATOR)):
+        way = (message.coordinator, message.controller)
+        if (sender, receiver) != (way if is_order else way[::-1]):
             self._told("dropped", f"{called(sender)} sent a {type(message).__name__} that is not its to send")
             return
         self._post(receiver, message)
@@ -313,9 +319,9 @@ class Host:
     def _give(self, machine: str, item: Message | SignalRead | None) -> None:
         """One act of one machine, and its turn to fire and to report."""
         if isinstance(item, ToCoordinator):
-            if self.coordinator is None:
+            if machine not in self.coordinators:
                 raise ProtocolError(f"there is no coordinator here for {item!r}")
-            self._act(COORDINATOR, self.coordinator.receive(item))
+            self._act(machine, self.coordinators[machine].receive(item))
             return
         controller = self.controllers[machine]
         match item:
@@ -356,7 +362,7 @@ class Host:
                 case Keep():
                     self.unsynced = True
                 case Firing(transition):
-                    self.trace.fired(transition, rounds.get(transition) if machine == COORDINATOR else None)
+                    self.trace.fired(transition, rounds.get(transition) if machine in self.coordinators else None)
                 case Taken(signal, value):
                     self.trace.signal(signal, value)
                 case Sending(place, _, again):
@@ -368,14 +374,14 @@ class Host:
                 case VoteRequest() | Decision() | Hello():
                     self._say(effect.controller, effect)
                 case Report() | Vote() | Acknowledgement():
-                    self._say(COORDINATOR, effect)
+                    self._say(effect.coordinator, effect)
                 case _:
                     assert_never(effect)
         self._wake()
 
     def _say(self, receiver: str, message: Message) -> None:
         self.messages += 1
-        if (receiver == COORDINATOR and self.coordinator is not None) or receiver in self.controllers:
+        if receiver in self.coordinators or receiver in self.controllers:
             self.posted.append((receiver, message))
         else:
             self.leaving.append(message)
@@ -393,9 +399,9 @@ class Host:
                 case Sending(place, entry):
                     self._send(place, entry)
                 case VoteRequest() | Decision() | Hello():
-                    self.link.send(COORDINATOR, effect.controller, effect)
+                    self.link.send(effect.coordinator, effect.controller, effect)
                 case Report() | Vote() | Acknowledgement():
-                    self.link.send(effect.controller, COORDINATOR, effect)
+                    self.link.send(effect.controller, effect.coordinator, effect)
 
     def _send(self, place: str, entry: int) -> None:
         self._watch(place)
@@ -435,8 +441,8 @@ class Host:
     def _say_again(self) -> None:
         """Repeat what is unanswered."""
         before = self.messages
-        if self.coordinator is not None:
-            self._act(COORDINATOR, self.coordinator.resend())
+        for name, coordinator in self.coordinators.items():
+            self._act(name, coordinator.resend())
         for name, controller in self.controllers.items():
             self._act(name, controller.resend())
         self.repeats += self.messages - before
@@ -477,14 +483,18 @@ class Host:
 
     def _is_settled(self) -> bool:
         """Whether nothing is open: whatever was decided is applied, and no part is promised."""
-        rounds = self.coordinator.rounds.values() if self.coordinator is not None else ()
+        rounds = (opened for coordinator in self.coordinators.values() for opened in coordinator.rounds.values())
         return all(opened.decided and opened.committed is None for opened in rounds) and not any(
             promise.promised for controller in self.controllers.values() for promise in controller.promises.values()
         )
 
     def _is_heard(self) -> bool:
-        """Whether nobody waits for a word of this host: the coordinator has ended, or here every round is closed."""
-        return COORDINATOR not in self.connected_to if self.coordinator is None else self.coordinator.idle
+        """Whether nobody waits for a word of this host: all rounds here are closed, and those above have ended.
+
+        Hosts end from the top down: each waits for the coordinators before its own, without any for all.
+        """
+        before = takewhile(lambda name: name not in self.coordinators, self.deciding)
+        return all(each.idle for each in self.coordinators.values()) and self.connected_to.isdisjoint(before)
 
     def _end(self) -> None:
         if self.outcome is None or self.outcome.done():

@@ -1,8 +1,8 @@
 """Starting a host of a cell: from a bundle and a few words on its link to a `Host` that runs.
 
-The coordinator runs beside the controller that the net calls its coordinator; where the net names none, one host is
-told to hold it. Each host checks for itself that the bundle may run and, if that is demanded, who has signed it; at
-connection the hosts compare what they hold.
+A coordinator runs beside the controller whose name it bears; where the net calls none its coordinator, one host is
+told to hold the one at the top. Each host checks for itself that the bundle may run and, if that is demanded, who has
+signed it; at connection the hosts compare what they hold.
 """
 
 from __future__ import annotations
@@ -16,14 +16,16 @@ from pathlib import Path
 
 from firable.executor.drivers.driver import Driver
 from firable.executor.journal.journal import Journal, MemoryJournal
-from firable.executor.links.link import COORDINATOR, Greeting, Link
+from firable.executor.links.link import Greeting, Link
 from firable.executor.operating.host import Host, Told
 from firable.executor.operating.host_trace import TRACE, HostTrace
 from firable.executor.operating.situation import Situation
 from firable.executor.protocol.commands import Answer
+from firable.executor.protocol.deciders import TOP, controller_of, coordinator_at, coordinators
 from firable.nets.bundle import Bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
+from firable.nets.layers import Layers
 from firable.nets.net import Net
 
 
@@ -53,6 +55,8 @@ def machines_of(net: Net, controllers: Sequence[str], *, coordinator: bool) -> t
     >>> from firable.nets.catalogue import catalogue_net
     >>> machines_of(catalogue_net("one_robot"), ["system", "mc"], coordinator=False)
     ('system', 'mc', '')
+    >>> machines_of(catalogue_net("two_cells"), ["cell_a", "robot_a"], coordinator=False)
+    ('cell_a', 'robot_a', 'coordinator cell_a')
     """
     known = [controller.name for controller in net.controllers]
     if unknown := [name for name in controllers if name not in known]:
@@ -61,7 +65,9 @@ def machines_of(net: Net, controllers: Sequence[str], *, coordinator: bool) -> t
         raise InputError([Diagnostic("F2005", message, hint)])
     names = tuple(dict.fromkeys(controllers))
     holds = coordinator or (net.coordinator is not None and net.coordinator.name in names)
-    return (*names, *((COORDINATOR,) if holds else ()))
+    below = (coordinator_at(name) for name in names if Layers(net).children.get(name))
+    at_the_top = net.coordinator.name if net.coordinator else None
+    return (*names, *((TOP,) if holds else ()), *(name for name in below if controller_of(name) != at_the_top))
 
 
 def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLine) -> Link:
@@ -70,8 +76,10 @@ def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLi
     if isinstance(way, SerialLine):
         from firable.executor.links.serial_line import MASTER, SerialLink, addresses_on_a_line
 
-        addresses = addresses_on_a_line((COORDINATOR,), tuple(c.name for c in bundle.net.controllers))
-        own = MASTER if COORDINATOR in machines else min(addresses[name] for name in machines)
+        addresses = addresses_on_a_line(
+            coordinators(bundle.decomposition), tuple(c.name for c in bundle.net.controllers)
+        )
+        own = MASTER if TOP in machines else min(addresses[name] for name in machines)
         return SerialLink(greeting, way.port, addresses, own, baud=way.baud, lease_seconds=way.lease_seconds)
     from firable.executor.links.zenoh_link import Certificates, ZenohLink
 

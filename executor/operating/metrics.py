@@ -72,7 +72,7 @@ class Metrics:
         self.fired_at: dict[str, float] = {}
         self.sent_at: dict[str, tuple[float, str]] = {}
         """For each completion signal, when the command that it completes was sent, and of which place."""
-        self.decided: set[int] = set()
+        self.decided: dict[str, set[int]] = {}
         """The rounds that are decided and not closed; each has a decision for every participant."""
         for place in net.places:
             self.marked.labels(place.name).set(place.marked)
@@ -109,8 +109,9 @@ class Metrics:
         match message:
             case Vote(controller, _, promised):
                 self.votes.labels(controller, "yes" if promised else "no").inc()
-            case Decision(round=number) if number not in self.decided:
-                self.decided = {one for one in self.decided if one >= message.closed_below} | {number}
+            case Decision(round=number) if number not in (decided := self.decided.get(message.coordinator, set())):
+                still = {one for one in decided if one >= message.closed_below}
+                self.decided[message.coordinator] = still | {number}
                 self.rounds.labels("aborted" if message.committed is None else "committed").inc()
 
     def inputs_coalesced(self, signal: str, changes: int = 1) -> None:

@@ -18,8 +18,8 @@ from pathlib import Path
 from firable.executor.cell.cell_log import CellLog
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.journal.sqlite_journal import SqliteJournal
-from firable.executor.links.link import COORDINATOR
 from firable.executor.operating.recorder import KEY, LineStream, Recorder, TraceFile, size_bytes_of
+from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Stored
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.decomposition import Decomposition
@@ -64,7 +64,7 @@ def opened(
         journal: Journal = MemoryJournal()
         cell = None
         if journal_path is not None:
-            names = [COORDINATOR, *(subnet.name for subnet in decomposition.subnets)]
+            names = [*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets)]
             journal = stack.enter_context(closing(SqliteJournal(journal_path, digest, names)))
             if plant is not None:
                 cell = stack.enter_context(closing(CellLog(f"{journal_path}.cell", plant, workpieces, seed)))

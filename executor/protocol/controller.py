@@ -1,6 +1,8 @@
 """The local controller: plays the tokens of one subnet, promises its parts, and commands its machines.
 
-It fires its local transitions by itself and its parts of coordinated transitions on the coordinator's commit only.
+It fires its local transitions by itself and its parts of coordinated transitions on their coordinator's commit only.
+With layers there are several coordinators above it, and what it knows of each stands apart (`Above`); a promise keeps
+away what disturbs it whoever asks.
 A yes vote is a promise (O1): until the round is decided, the parts promised are a *lock*. What disturbs a lock waits:
 local transitions, other promises, and changes of the signals that the promised parts read or clear, latched outside
 the process image and taken in when the lock is released. So an external gate that was open at the vote is open, in
@@ -23,8 +25,8 @@ What is kept in stable storage, and the fault that would show if it were not:
   needs would be gone when it comes. `word` holds the values of the signals that the promise reads, which stay in the
   image until it ends. A vote that promises nothing is not kept: given again, it may be another, and an undecided round
   takes the newer one, a decided one none.
-- `closed`, the rounds decided, and below which all are: a late copy of a request would be promised once more, and a
-  late copy of its commit then applied a second time.
+- `closed`, of each coordinator the rounds decided, and below which all are: a late copy of a request would be promised
+  once more, and a late copy of its commit then applied a second time.
 - `command/...`: see `commands`. A machine would be commanded twice, or never.
 - `turns` of the arbiter, if there are any: a rule "twice this, once that" would begin anew and break its own order.
 - `epoch`: reports would be numbered from 0 again, and ignored as old ones; then nobody asks for what is enabled here.
@@ -45,10 +47,11 @@ repeated, and their decisions applied, with the commands owed.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Self
 
 from firable.executor.protocol.commands import Answer, Commands
+from firable.executor.protocol.deciders import closed_key, coordinator_at, coordinators
 from firable.executor.protocol.enabled import EnabledSet, bits
 from firable.executor.protocol.messages import (
     EPOCH_BITS,
@@ -82,6 +85,28 @@ class Promise:
     reads: int
 
 
+@dataclass(slots=True)
+class Above:
+    """What a controller knows of one coordinator that decides some of its parts."""
+
+    name: str
+    parts: frozenset[str]
+    """The transitions that it decides and that have a part here."""
+    mask: int
+    """These parts, by their indexes."""
+    readiness: Readiness = field(default_factory=lambda: Readiness(-1, frozenset()))
+    ready_mask: int = 0
+    """The parts that the readiness names."""
+    told: int = -1
+    """The sequence number of the newest report that was sent."""
+    seen: int = -1
+    """The sequence number of the newest report that is known to have arrived, in this epoch of the coordinator."""
+    epoch: int = 0
+    """The epoch of the coordinator."""
+    closed_below: int = 0
+    """Every round of the coordinator with a smaller number is closed."""
+
+
 class LocalController:
     """The controller `name` of a decomposition, in its initial marking."""
 
@@ -99,8 +124,6 @@ class LocalController:
         self.rows = {t: part_of[c.name] for t, c in enumerate(self.transitions) if c.name in part_of}
         """The coordinated transition of each part, by the index of the part."""
         self.part_mask = sum(1 << t for t in self.rows)
-        self.ready_mask = 0
-        """The parts that the readiness names."""
         self.arbiter = Arbiter(self.subnet, (group for group in decomposition.groups if group.controller == name))
         self.kept_turns = self.arbiter.turns
         self.word = self.subnet.initial_marking
@@ -108,7 +131,13 @@ class LocalController:
         """The word that a restart would find."""
         self.promises: dict[int, Promise] = {}
         self.closed: set[int] = set()
-        self.closed_below = 0
+        """The rounds decided, of all coordinators, that are not below what is closed."""
+        self.coordinators = coordinators(decomposition)
+        at = {row.name: coordinator_at(row.at) for row in decomposition.coordinated if row.name in self.parts}
+        self.above: dict[str, Above] = {}
+        for coordinator in self.coordinators:
+            if mask := sum(1 << t for t, row in self.rows.items() if at[row] == coordinator):
+                self.above[coordinator] = Above(coordinator, frozenset(self.rows[t] for t in bits(mask)), mask)
         self.latched: dict[str, bool] = {}
         self.commands = Commands(self.subnet, {})
         self.timers = Timers(self.player)
@@ -116,12 +145,6 @@ class LocalController:
         """The sensors that have shown nothing since the restart."""
         self.held = False
         self.epoch = 0
-        self.readiness = Readiness(-1, frozenset())
-        self.told = -1
-        """The sequence number of the newest report that was sent."""
-        self.seen = -1
-        """The sequence number of the newest report that is known to have arrived, in this epoch of the coordinator."""
-        self.epoch_of_coordinator = 0
 
     @classmethod
     def restored(cls, decomposition: Decomposition, name: str, kept: Mapping[str, Stored]) -> Self:
@@ -160,14 +183,17 @@ class LocalController:
         return owed
 
     def receive(self, message: ToController) -> list[Effect]:
-        """Take a message of the coordinator."""
-        effects = list(self._close_below(message.closed_below))
-        if message.epoch > self.epoch_of_coordinator:
+        """Take a message of a coordinator; `ProtocolError` from one that decides nothing here."""
+        above = self.above.get(message.coordinator)
+        if above is None:
+            raise ProtocolError(f"{self.name}: '{message.coordinator}' decides nothing here")
+        effects = list(self._close_below(above, message.closed_below))
+        if message.epoch > above.epoch:
             # It has restarted, and has forgotten which rounds were open: to name them makes it abort them.
-            self.epoch_of_coordinator, self.seen = message.epoch, -1
-            effects += self.resend()
-        if message.epoch == self.epoch_of_coordinator:
-            self.seen = max(self.seen, message.seen)
+            above.epoch, above.seen = message.epoch, -1
+            effects += self._say_again(above)
+        if message.epoch == above.epoch:
+            above.seen = max(above.seen, message.seen)
         match message:
             case VoteRequest():
                 return [*effects, *self._vote(message)]
@@ -224,35 +250,38 @@ class LocalController:
         return effects
 
     def report(self) -> list[Effect]:
-        """Tell the coordinator which parts are enabled, if that has changed since it was last told."""
-        readiness = self._readiness()
-        if readiness.sequence <= self.told:
-            return []
-        self.told = readiness.sequence
-        return [Report(self.name, readiness)] if self.parts else []
+        """Tell each coordinator which parts are enabled, if that has changed since it was last told."""
+        return [
+            Report(self.name, self._told(above), above.name)
+            for above in self.above.values()
+            if self._readiness(above).sequence > above.told
+        ]
 
     def resend(self) -> list[Effect]:
         """Repeat what is unanswered, for links that lose messages: votes, and the last report if it is not seen."""
-        votes = [number for number, promise in self.promises.items() if promise.promised]
-        if votes:
-            return [Vote(self.name, number, self.promises[number].promised, self._told()) for number in votes]
-        if self.told <= self.seen or not self.parts:
-            return []
-        return [Report(self.name, self._told())]
+        return [effect for above in self.above.values() for effect in self._say_again(above)]
+
+    def _say_again(self, above: Above) -> list[Effect]:
+        promised = [n for n, promise in self.promises.items() if promise.promised and self._above(n) is above]
+        if promised:
+            return [Vote(self.name, n, self.promises[n].promised, self._told(above), above.name) for n in promised]
+        return [Report(self.name, self._told(above), above.name)] if above.told > above.seen else []
 
     def _restore(self, kept: Mapping[str, Stored]) -> None:
         self.held = True
         self.epoch = _number(kept.get("epoch", 0)) + 1
-        self.readiness = Readiness((self.epoch << EPOCH_BITS) - 1, frozenset())
-        self.told = self.readiness.sequence
+        for above in self.above.values():
+            above.readiness = Readiness((self.epoch << EPOCH_BITS) - 1, frozenset())
+            above.told = above.readiness.sequence
         self.word = self.kept_word = int(str(kept.get("word", f"{self.word:x}")), 16)
         self.commands = Commands(self.subnet, kept)
         for key, value in kept.items():
             match key.partition("/"), value:
                 case ("promise", _, number), [*names]:
                     self.promises[int(number)] = self._promise(map(str, names))
-                case ("closed", _, _), [int(below), [*numbers]]:
-                    self.closed_below, self.closed = below, set(map(_number, numbers))
+                case ("closed", _, coordinator), [int(below), [*numbers]] if coordinator in self.above:
+                    self.above[coordinator].closed_below = below
+                    self.closed |= set(map(_number, numbers))
                 case ("turns", _, _), [*turns]:
                     self.arbiter.turns = self.kept_turns = tuple(map(_number, turns))
         held = self._locked_reads()
@@ -271,7 +300,8 @@ class LocalController:
             if yes:
                 yield Keep(f"promise/{request.round}", yes)
                 yield from self._keep_word()
-        yield Vote(self.name, request.round, self.promises[request.round].promised, self._told())
+        above = self._above(request.round)
+        yield Vote(self.name, request.round, self.promises[request.round].promised, self._told(above), above.name)
 
     def _decided(self, decision: Decision) -> Iterator[Effect]:
         if not self._is_closed(decision.round):
@@ -280,7 +310,8 @@ class LocalController:
             if decision.committed in self.parts:
                 yield from self._apply(decision, promise)
             yield from self._release()
-        yield Acknowledgement(self.name, decision.round, self._told())
+        above = self._above(decision.round)
+        yield Acknowledgement(self.name, decision.round, self._told(above), above.name)
 
     def _apply(self, decision: Decision, promise: Promise | None) -> Iterator[Effect]:
         part = self.parts[str(decision.committed)]
@@ -295,16 +326,18 @@ class LocalController:
         promise = self.promises.pop(number, None)
         if promise is not None and promise.promised:
             yield Keep(f"promise/{number}", None)
-        if number >= self.closed_below:
+        above = self._above(number)
+        if number >= above.closed_below:
             self.closed.add(number)
-        yield Keep("closed", (self.closed_below, sorted(self.closed)))
+        numbers = sorted(n for n in self.closed if self._above(n) is above)
+        yield Keep(closed_key(above.name), (above.closed_below, numbers))
 
-    def _close_below(self, number: int) -> Iterator[Effect]:
+    def _close_below(self, above: Above, number: int) -> Iterator[Effect]:
         """Forget the rounds that nobody will speak of again; one promised and unheard of was aborted by a restart."""
-        if number > self.closed_below:
-            self.closed_below = number
-            self.closed = {closed for closed in self.closed if closed >= number}
-            if aborted := [promised for promised in self.promises if promised < number]:
+        if number > above.closed_below:
+            above.closed_below = number
+            self.closed = {closed for closed in self.closed if closed >= number or self._above(closed) is not above}
+            if aborted := [n for n in self.promises if n < number and self._above(n) is above]:
                 for promised in aborted:
                     yield from self._end(promised)
                 yield from self._release()
@@ -367,8 +400,15 @@ class LocalController:
         transition = self.transitions[t]
         return self._is_enabled(transition) and not self._disturbs_promises(transition)
 
+    def coordinator_of(self, number: int) -> str:
+        """The coordinator whose round it is."""
+        return self.coordinators[number % len(self.coordinators)]
+
+    def _above(self, number: int) -> Above:
+        return self.above[self.coordinator_of(number)]
+
     def _is_closed(self, number: int) -> bool:
-        return number < self.closed_below or number in self.closed
+        return number < self._above(number).closed_below or number in self.closed
 
     def _disturbs_promises(self, transition: Compiled) -> bool:
         return any(transition.disturbs(promise.writes, promise.reads) for promise in self.promises.values())
@@ -376,19 +416,19 @@ class LocalController:
     def _locked_reads(self) -> int:
         return _union(promise.reads | promise.writes for promise in self.promises.values())
 
-    def _readiness(self) -> Readiness:
-        ready = 0 if self.held else self.enabled.at(self.word) & self.part_mask
+    def _readiness(self, above: Above) -> Readiness:
+        ready = 0 if self.held else self.enabled.at(self.word) & above.mask
         if self.untold:
             ready = sum(1 << t for t in bits(ready) if self._is_enabled(self.transitions[t]))
-        if ready != self.ready_mask or self.readiness.sequence < self.epoch << EPOCH_BITS:
-            self.ready_mask = ready
+        if ready != above.ready_mask or above.readiness.sequence < self.epoch << EPOCH_BITS:
+            above.ready_mask = ready
             names = frozenset(self.rows[t] for t in bits(ready))
-            self.readiness = Readiness(self.readiness.sequence + 1, names)
-        return self.readiness
+            above.readiness = Readiness(above.readiness.sequence + 1, names)
+        return above.readiness
 
-    def _told(self) -> Readiness:
-        readiness = self._readiness()
-        self.told = max(self.told, readiness.sequence)
+    def _told(self, above: Above) -> Readiness:
+        readiness = self._readiness(above)
+        above.told = max(above.told, readiness.sequence)
         return readiness
 
 

@@ -1,4 +1,7 @@
-"""The coordinator: opens rounds over the transitions that no controller decides alone, and decides them.
+"""A coordinator: opens rounds over transitions that no controller decides alone, and decides them.
+
+In one layer there is one, which decides all of these. Where the net has layers there is one for each part of it, and
+each decides what stands in its own name; about the rounds of others it neither knows nor cares (`deciders`).
 
 A round asks for the transitions of one arbitration group (or one transition without conflicts) whose participants all
 report their parts enabled. Rounds run side by side as long as what they would write and read is disjoint as in O1; so
@@ -34,6 +37,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
+from firable.executor.protocol.deciders import TOP, coordinator_at, coordinators
 from firable.executor.protocol.messages import (
     EPOCH_BITS,
     Acknowledgement,
@@ -70,15 +74,21 @@ class Round:
 
 
 class Coordinator:
-    """The coordinator of a decomposition, before anything is known of the controllers."""
+    """The coordinator of this name, of a decomposition, before anything is known of the controllers."""
 
-    def __init__(self, decomposition: Decomposition) -> None:
+    def __init__(self, decomposition: Decomposition, name: str = TOP) -> None:
+        self.name = name
         self.player = TokenPlayer.of(decomposition.net)
+        names = coordinators(decomposition)
+        self.first_round, self.stride = names.index(name), len(names)
+        """Its rounds are this one, and every so many-th after it."""
         self.participants = {
-            row.name: tuple(part.controller for part in row.parts) for row in decomposition.coordinated
+            row.name: tuple(part.controller for part in row.parts)
+            for row in decomposition.coordinated
+            if coordinator_at(row.at) == name
         }
-        """For each coordinated transition, who has to promise it: those who own a gate of it alone, too (O3)."""
-        ours = [group for group in decomposition.groups if group.controller is None]
+        """For each transition that it decides, who has to promise it: those who own a gate of it alone, too (O3)."""
+        ours = [g for g in decomposition.groups if g.controller is None and coordinator_at(g.at) == name]
         self.arbiter = Arbiter(decomposition.net, ours)
         self.kept_turns = self.arbiter.turns
         together = [tuple(t for t in (*g.sequence, *g.rest) if t in self.participants) for g in ours]
@@ -94,14 +104,14 @@ class Coordinator:
         """The groups that may be asked for, in the order in which they became ready."""
         self.rounds: dict[int, Round] = {}
         self.epoch = 0
-        self.next_round = 0
+        self.next_round = self.first_round
         self.permits: int | None = None
         """How many more transitions may be committed; None is without limit."""
 
     @classmethod
-    def restored(cls, decomposition: Decomposition, kept: Mapping[str, Stored]) -> Self:
+    def restored(cls, decomposition: Decomposition, kept: Mapping[str, Stored], name: str = TOP) -> Self:
         """The coordinator with what stable storage kept of it; a fresh one where it kept nothing."""
-        machine = cls(decomposition)
+        machine = cls(decomposition, name)
         if kept:
             machine._restore(kept)
         return machine
@@ -148,7 +158,7 @@ class Coordinator:
         if self.epoch:
             for controller in dict.fromkeys(c for took_part in self.participants.values() for c in took_part):
                 if self.seen[controller] < 0:
-                    effects.append(Hello(controller, self.closed_below, -1, self.epoch))
+                    effects.append(Hello(controller, self.closed_below, -1, self.epoch, self.name))
         for open_round in self.rounds.values():
             for controller in open_round.participants:
                 if open_round.decided and controller not in open_round.acknowledged:
@@ -191,7 +201,7 @@ class Coordinator:
     def _ask(self, group: int, names: tuple[str, ...]) -> Iterator[Effect]:
         opened = self._round(self.next_round, group, names)
         self.rounds[opened.number] = opened
-        self.next_round += 1
+        self.next_round += self.stride
         for controller in opened.participants:
             yield self._request(opened, controller)
 
@@ -216,7 +226,8 @@ class Coordinator:
                     opened.decided, opened.committed = True, committed
                     self.rounds[opened.number] = opened
         self.rounds = dict(sorted(self.rounds.items()))
-        self.next_round = self.epoch << EPOCH_BITS
+        begin = self.epoch << EPOCH_BITS
+        self.next_round = begin + (self.first_round - begin) % self.stride
 
     def _voted(self, vote: Vote) -> Iterator[Effect]:
         voted = self.rounds.get(vote.round)
@@ -261,7 +272,9 @@ class Coordinator:
 
     def _request(self, asked: Round, controller: str) -> VoteRequest:
         names = tuple(t for t in asked.transitions if controller in self.participants[t])
-        return VoteRequest(controller, asked.number, names, self.closed_below, self.seen[controller], self.epoch)
+        seen = self.seen[controller]
+        return VoteRequest(controller, asked.number, names, self.closed_below, seen, self.epoch, self.name)
 
     def _decision(self, controller: str, number: int, committed: str | None) -> Decision:
-        return Decision(controller, number, committed, self.closed_below, self.seen[controller], self.epoch)
+        seen = self.seen[controller]
+        return Decision(controller, number, committed, self.closed_below, seen, self.epoch, self.name)

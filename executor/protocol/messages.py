@@ -17,6 +17,9 @@ hold each other's transitions up for ever, each promised where the other is need
 that whatever still arrives of it is an old copy. `seen` tells which report has arrived, so that only lost ones are
 repeated. Messages may be lost, delayed, doubled and overtaken; none is trusted for more than its round.
 
+Every message is between a controller and one `coordinator`; where the net has layers there are several, and each of
+them is told of its own transitions only (`firable.executor.protocol.deciders`).
+
 Whoever restarts begins a new *epoch*, and every number that it gives has the epoch in its high bits, so that none is
 ever given twice although not one of them is stored. A coordinator that has restarted knows which rounds it committed
 and nothing else: rounds of earlier epochs that it does not know are aborted (*presumed abort*), and it says `Hello`
@@ -29,6 +32,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
+
+from firable.executor.protocol.deciders import TOP
 
 EPOCH_BITS: Final = 32
 """A number is `epoch << EPOCH_BITS` and a count: 4 thousand million rounds before an epoch would run into the next."""
@@ -51,6 +56,7 @@ class Report:
 
     controller: str
     readiness: Readiness
+    coordinator: str = TOP
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +69,7 @@ class VoteRequest:
     closed_below: int
     seen: int
     epoch: int = 0
+    coordinator: str = TOP
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +80,7 @@ class Vote:
     round: int
     promised: frozenset[str]
     readiness: Readiness
+    coordinator: str = TOP
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +93,7 @@ class Decision:
     closed_below: int
     seen: int
     epoch: int = 0
+    coordinator: str = TOP
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +104,7 @@ class Hello:
     closed_below: int
     seen: int
     epoch: int
+    coordinator: str = TOP
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,13 +114,14 @@ class Acknowledgement:
     controller: str
     round: int
     readiness: Readiness
+    coordinator: str = TOP
 
 
 ToController = VoteRequest | Decision | Hello
-"""Messages from the coordinator; `controller` is the receiver."""
+"""Messages from a coordinator; `controller` is the receiver."""
 
 ToCoordinator = Report | Vote | Acknowledgement
-"""Messages to the coordinator; `controller` is the sender."""
+"""Messages to a coordinator; `controller` is the sender."""
 
 Message = ToController | ToCoordinator
 

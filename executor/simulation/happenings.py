@@ -88,8 +88,9 @@ def _step(world: World) -> None:
     world.permit(0)
     world.steps_allowed = 1
     process = world.any_process()
-    if process is world.coordinator:
-        world.permit(1)
+    if world.coordinating(process) is not None:
+        if process.machine is not None:
+            world.act(process, process.machine.permit(1))
     elif process.machine is not None:
         world.act(process, process.machine.fire())
 

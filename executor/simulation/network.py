@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
@@ -58,13 +59,13 @@ class Simulation:
         decomposition: Decomposition,
         seed: int,
         network: Network = Network(),
-        coordinator: Callable[[Decomposition], Coordinator] = Coordinator,
+        coordinator: Callable[[Decomposition, str], Coordinator] = Coordinator,
         controller: Callable[[Decomposition, str], LocalController] = LocalController,
     ) -> None:
         self.net = decomposition.net
         self.random = random.Random(seed)
         self.network = network
-        self.coordinator = coordinator(decomposition)
+        self.coordinators = {name: coordinator(decomposition, name) for name in coordinators(decomposition)}
         self.controllers = {subnet.name: controller(decomposition, subnet.name) for subnet in decomposition.subnets}
         self.owner_of = {signal.name: subnet.name for subnet in decomposition.subnets for signal in subnet.signals}
         self.sensors = [signal.name for signal in self.net.signals if signal.kind is SignalKind.SENSOR]
@@ -129,7 +130,8 @@ class Simulation:
             self.values[signal] = not self.values[signal]
             self._perform(self.controllers[self.owner_of[signal]].read(signal, self.values[signal]))
         elif choice >= 0.96:
-            self._perform(self.coordinator.resend())
+            for coordinator in self.coordinators.values():
+                self._perform(coordinator.resend())
             for controller in self.controllers.values():
                 self._perform(controller.resend())
 
@@ -156,7 +158,7 @@ class Simulation:
         if isinstance(message, VoteRequest | Decision | Hello):
             self._perform(self.controllers[message.controller].receive(message))
         else:
-            self._perform(self.coordinator.receive(message))
+            self._perform(self.coordinators[message.coordinator].receive(message))
 
     def _perform(self, effects: list[Effect]) -> None:
         at = float(len(self.events))
@@ -177,17 +179,19 @@ class Simulation:
 
     def _quieten(self, *, fire: bool) -> None:
         """Deliver everything in order and repeat what is unanswered until nothing is; with `fire`, until one fires."""
-        self._perform(self.coordinator.permit(None if fire else 0))
+        for coordinator in self.coordinators.values():
+            self._perform(coordinator.permit(None if fire else 0))
         before = self._firings()
         for _ in range(1000):
             for controller in self.controllers.values():
                 self._perform([*(controller.fire() if fire else []), *controller.report(), *controller.resend()])
-            self._perform(self.coordinator.resend())
+            for coordinator in self.coordinators.values():
+                self._perform(coordinator.resend())
             while self.in_flight:
                 self._receive(self.in_flight.pop(0))
                 if fire and self._firings() > before:
                     return
-            if self.coordinator.idle and not (fire and self._firings() > before):
+            if all(each.idle for each in self.coordinators.values()) and not (fire and self._firings() > before):
                 return
 
     def _firings(self) -> int:

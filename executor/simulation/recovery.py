@@ -79,7 +79,8 @@ def quieten(world: World) -> None:
         if _is_quiet(world) and arrived == before and all(isinstance(each, Report) for each in arrived):
             return
         before = arrived
-    open_rounds = list(world.coordinator.machine.rounds) if world.coordinator.machine else []
+    machines = [process.machine for process in world.coordinators.values() if process.machine]
+    open_rounds = [number for machine in machines for number in machine.rounds]
     raise ProgressLostError(f"it does not fall quiet: rounds {open_rounds} are open")
 
 
@@ -111,8 +112,9 @@ def _round(world: World) -> list[Message | str]:
         world.turn(process)
         if process.machine is not None:
             world.act(process, process.machine.resend())
-    if world.coordinator.machine is not None:
-        world.act(world.coordinator, world.coordinator.machine.resend())
+    for process in world.coordinators.values():
+        if process.machine is not None:
+            world.act(process, process.machine.resend())
     arrived: list[Message | str] = [*world.in_flight, *(signal for signal, _, _ in world.telling)]
     for _ in range(len(world.in_flight)):
         world.deliver(world.in_flight.pop(0))
@@ -125,8 +127,8 @@ def _round(world: World) -> list[Message | str]:
 
 
 def _is_quiet(world: World) -> bool:
-    machine = world.coordinator.machine
-    return machine is not None and machine.idle
+    machines = [process.machine for process in world.coordinators.values()]
+    return all(machine is not None and machine.idle for machine in machines)
 
 
 def _enabled(world: World) -> Iterator[str]:

@@ -26,6 +26,7 @@ from typing import Any, Final
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
@@ -80,9 +81,10 @@ class World:
         self.faults = faults
         self.machines = machines
         self.draw = random.Random(seed)
-        self.coordinator = machines.process(COORDINATOR, self.draw)
+        names = coordinators(subject.decomposition)
+        self.coordinators = {name: machines.process(name or COORDINATOR, self.draw) for name in names}
         self.controllers = {name: machines.process(name, self.draw) for name in subject.controllers}
-        self.processes = (self.coordinator, *self.controllers.values())
+        self.processes = (*self.coordinators.values(), *self.controllers.values())
         self.cell = Machinery(self.net, subject.apart, self.draw)
         self.values = dict.fromkeys(subject.sensors, False)
         self.in_flight: list[Message] = []
@@ -132,9 +134,9 @@ class World:
         for step, what, about in self.log:
             match about:
                 case Report() | Vote() | Acknowledgement():
-                    words = f"{what} from {about.controller} at the {COORDINATOR}: {_shown(about)}"
+                    words = f"{what} from {about.controller} at {about.coordinator or COORDINATOR}: {_shown(about)}"
                 case VoteRequest() | Decision() | Hello():
-                    words = f"{what} from the {COORDINATOR} at {about.controller}: {_shown(about)}"
+                    words = f"{what} from {about.coordinator or COORDINATOR} at {about.controller}: {_shown(about)}"
                 case _:
                     words = f"{what}: {_shown(about)}" if about else what
             yield f"{step:5}  {words}"
@@ -221,9 +223,10 @@ class World:
                     raise RunFailedError(f"'{effect.transition}' fires while the operator has paused")
 
     def permit(self, firings: int | None) -> None:
-        """Tell the coordinator how many transitions it may commit."""
-        if self.coordinator.machine is not None:
-            self.act(self.coordinator, self.coordinator.machine.permit(firings))
+        """Tell the coordinators how many transitions each may commit."""
+        for process in self.coordinators.values():
+            if process.machine is not None:
+                self.act(process, process.machine.permit(firings))
 
     def note(self, what: str, about: object = "") -> None:
         """Remember a step, for the log."""
@@ -237,8 +240,8 @@ class World:
         process.jumped_seconds = 0.0
         process.rate = 1.0 + self.faults["drift"] * self.draw.uniform(-0.5, 1.0) if self.faults["drift"] else 1.0
         decomposition = self.subject.decomposition
-        if process is self.coordinator:
-            coordinator = self.machines.coordinator.restored(decomposition, kept)
+        if (name := self.coordinating(process)) is not None:
+            coordinator = self.machines.coordinator.restored(decomposition, kept, name)
             process.machine = coordinator
             self.act(process, coordinator.start(), at_once=True)
             if self.paused and process.machine:
@@ -253,6 +256,10 @@ class World:
         for place, entry in controller.commands.questions:
             if process.machine:
                 self.answer(process, place, entry, self._asked(place, entry))
+
+    def coordinating(self, process: Process[Any]) -> str | None:
+        """The coordinator that is in a process; None of a controller's."""
+        return next((name for name, its in self.coordinators.items() if its is process), None)
 
     def _asked(self, place: str, entry: int) -> Answer:
         answer = self.cell.ask(place, entry)
@@ -291,7 +298,7 @@ class World:
         """Let a message arrive; where nobody is up, or is cut off, it is lost."""
         to_controller = isinstance(message, VoteRequest | Decision | Hello)
         controller = self.controllers[message.controller]
-        receiver = controller if to_controller else self.coordinator
+        receiver = controller if to_controller else self.coordinators[message.coordinator]
         if receiver.machine is None or controller.cut_off:
             self.counts["lost"] += 1
             return

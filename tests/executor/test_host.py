@@ -114,8 +114,9 @@ def test_what_a_host_may_not_say_is_dropped(tmp_path: Path) -> None:
         cell = Cell(tmp_path)
         await asyncio.sleep(0.5)
         centre, robot = cell.hosts[CENTRE], cell.hosts[ROBOT]
-        before = centre.coordinator and dict(centre.coordinator.seen)
-        centre.arrived("mc", COORDINATOR, Vote("robot", 0, frozenset({"G2"}), robot.controllers["robot"].readiness))
+        before = dict(centre.coordinators[COORDINATOR].seen)
+        readiness = robot.controllers["robot"].above[COORDINATOR].readiness
+        centre.arrived("mc", COORDINATOR, Vote("robot", 0, frozenset({"G2"}), readiness))
         robot.arrived("mc", "robot", Decision("robot", 0, "G2", 0, 0))
         robot.arrived(COORDINATOR, "robot", Decision("mc", 0, "G2", 0, 0))
         assert [kind for kind, _ in cell.told].count("dropped") == 3

@@ -107,23 +107,30 @@ class Watched(Simulation):
             if (t, controller) in self.takes_part:
                 yield (number, t, controller)
 
+    @property
+    def open_rounds(self) -> dict[int, Round]:
+        """The rounds of all coordinators that are not closed."""
+        return {number: opened for each in self.coordinators.values() for number, opened in each.rounds.items()}
+
     def _remember(self) -> None:
-        for number, opened in self.coordinator.rounds.items():
+        for number, opened in self.open_rounds.items():
             self.rounds[number] = (
                 opened.transitions, dict(opened.votes), opened.committed, set(opened.acknowledged)
             )  # fmt: skip
         for number, (transitions, votes, committed, _) in list(self.rounds.items()):
-            if number not in self.coordinator.rounds:  # closed: all have obeyed
+            if number not in self.open_rounds:  # closed: all have obeyed
                 self.rounds[number] = (transitions, votes, committed, set(self.controllers))
 
     def told(self) -> Structure:
         """The whole system in the relations of the proof."""
         keys = [(r, t, c) for r, (names, *_) in self.rounds.items() for t in names for c in self.controllers]
         asked = [(r, t, c) for r, t, c in keys if (t, c) in self.takes_part]
-        is_open = self.coordinator.rounds
+        is_open = self.open_rounds
         obeyed: set[Key] = {key for key in asked if self.controllers[key[2]]._is_closed(key[0])}
         for name, controller in self.controllers.items():
-            obeyed |= {(r, t.name, name) for r in range(controller.closed_below) for t in self.net.transitions}
+            for above in controller.above.values():
+                closed = [r for r in range(above.closed_below) if controller.coordinator_of(r) == above.name]
+                obeyed |= {(r, t.name, name) for r in closed for t in self.net.transitions}
         return with_relations(
             with_things(self.structure, rounds=tuple(self.rounds)),
             marked=[(name,) for name in (*self.net.names(self.marking), *self.image)],

@@ -154,8 +154,9 @@ class VotesFromMemory(LocalController):
 
     def _vote(self, request: VoteRequest) -> Iterator[Effect]:
         if not self._is_closed(request.round):
-            self.promises.setdefault(request.round, Promise(self.readiness.transitions, 0, 0))
-            yield Vote(self.name, request.round, self.promises[request.round].promised, self.readiness)
+            readiness = self._above(request.round).readiness
+            self.promises.setdefault(request.round, Promise(readiness.transitions, 0, 0))
+            yield Vote(self.name, request.round, self.promises[request.round].promised, readiness, request.coordinator)
 
     def _apply(self, decision: Decision, _promise: Promise | None) -> Iterator[Effect]:
         yield from self._fire(self.parts[str(decision.committed)])
@@ -240,7 +241,7 @@ class NeverRepeats(Coordinator):
 
 
 def found(
-    coordinator: Callable[[Decomposition], Coordinator] = Coordinator,
+    coordinator: Callable[[Decomposition, str], Coordinator] = Coordinator,
     controller: Callable[[Decomposition, str], LocalController] = LocalController,
 ) -> bool:
     """Whether some seed of some small or random net finds the fault."""
@@ -273,7 +274,7 @@ def test_planted_fault_in_a_controller_is_found(fault: Callable[[Decomposition, 
 
 
 @pytest.mark.parametrize("fault", [StaleVotes, CachedGates, OldReports, ForgetsLosers, DecidesEarly, NeverRepeats])
-def test_planted_fault_in_the_coordinator_is_found(fault: Callable[[Decomposition], Coordinator]) -> None:
+def test_planted_fault_in_the_coordinator_is_found(fault: Callable[[Decomposition, str], Coordinator]) -> None:
     assert found(coordinator=fault)
 
 

@@ -73,7 +73,7 @@ class Crashing(Simulation):
         decomposition: Decomposition,
         seed: int,
         network: Network,
-        coordinator: Callable[[Decomposition], Coordinator] = Coordinator,
+        coordinator: Callable[[Decomposition, str], Coordinator] = Coordinator,
         controller: Callable[[Decomposition, str], LocalController] = LocalController,
         crashes: float = 0.02,
         forgets: tuple[str, str] = ("nobody", ""),
@@ -84,7 +84,7 @@ class Crashing(Simulation):
         self.forgets = forgets
         """Whose stable storage loses what: "coordinator" or "controllers", and how the key begins."""
         self.crashed = 0
-        self.kept: dict[str, dict[str, Stored]] = {name: {} for name in ("", *self.controllers)}
+        self.kept: dict[str, dict[str, Stored]] = {name: {} for name in (*self.coordinators, *self.controllers)}
         self.issued: Counter[tuple[str, int]] = Counter()
         self.received: set[tuple[str, int]] = set()
         self.acting = ""
@@ -92,7 +92,7 @@ class Crashing(Simulation):
             self._act(name, self._machine(name).start())
 
     def _machine(self, name: str) -> Machine:
-        return self.controllers[name] if name else self.coordinator
+        return self.controllers[name] if name in self.controllers else self.coordinators[name]
 
     def _act(self, name: str, effects: list[Effect]) -> None:
         self.acting = name
@@ -129,7 +129,7 @@ class Crashing(Simulation):
         self._act(owner, self.controllers[owner].read(signal, entry is not None or self.values[signal], entry))
 
     def _receive(self, message: Message) -> None:
-        self.acting = message.controller if isinstance(message, ToController) else ""
+        self.acting = message.controller if isinstance(message, ToController) else message.coordinator
         super()._receive(message)
 
     def _perform(self, effects: list[Effect]) -> None:
@@ -155,7 +155,9 @@ class Crashing(Simulation):
 
     def _is_forgotten(self, write: Keep) -> bool:
         whose, prefix = self.forgets
-        return whose == ("controllers" if self.acting else "coordinator") and write.key.startswith(prefix)
+        return whose == ("controllers" if self.acting in self.controllers else "coordinator") and write.key.startswith(
+            prefix
+        )
 
     def _completes(self, place: str, entry: int) -> None:
         if completion := self.net.place(place).completion:
@@ -164,14 +166,14 @@ class Crashing(Simulation):
     def _crash(self, name: str) -> None:
         self.crashed += 1
         kept = self.kept[name]
-        if not name:
-            self.coordinator = type(self.coordinator).restored(self.decomposition, kept)
+        if name in self.coordinators:
+            self.coordinators[name] = type(self.coordinators[name]).restored(self.decomposition, kept, name)
         else:
             before = self.controllers[name]
             self.controllers[name] = after = type(before).restored(self.decomposition, name, kept)
             after.held = True  # also where nothing is left of what it kept
         self._act(name, self._machine(name).start())
-        if name:
+        if name in self.controllers:
             for signal in self.controllers[name].subnet.signals:
                 if signal.name in self.values and self.random.random() < 0.7:
                     self._read(signal.name)
@@ -194,16 +196,20 @@ class Crashing(Simulation):
                 self._resume(controller)
         for signal in self.sensors:
             self._read(signal)
-        self._act("", self.coordinator.permit(None if fire else 0))
+        for name in self.coordinators:
+            self._act(name, self.coordinators[name].permit(None if fire else 0))
         before = self._firings()
         for _ in range(1000):
             for name, controller in self.controllers.items():
                 self._act(name, [*(controller.fire() if fire else []), *controller.report(), *controller.resend()])
-            self._act("", self.coordinator.resend())
+            for name in self.coordinators:
+                self._act(name, self.coordinators[name].resend())
             for _ in range(100):  # not all: what is asked again at once, and refused, waits for what is repeated above
                 if self.in_flight:
                     self._receive(self.in_flight.pop(0))
-            if (not self.in_flight and self.coordinator.idle) or (fire and self._firings() > before):
+            if (not self.in_flight and all(each.idle for each in self.coordinators.values())) or (
+                fire and self._firings() > before
+            ):
                 return
 
     def finished(self, steps: int) -> int:

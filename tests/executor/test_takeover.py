@@ -92,7 +92,7 @@ def test_nothing_said_under_the_old_net_is_new_under_the_new_one() -> None:
     moved = take_over(old, new, kept_in({"robot.free", "table.empty"}, old), [COORDINATOR])
     coordinator = Coordinator.restored(new, moved.kept[COORDINATOR])
     robot = LocalController.restored(new, "robot", moved.kept["robot"])
-    assert coordinator.next_round >= robot.closed_below > (4 << EPOCH_BITS)
+    assert coordinator.next_round >= robot.above[COORDINATOR].closed_below > (4 << EPOCH_BITS)
     assert robot.epoch > 4
     late = VoteRequest("robot", (4 << EPOCH_BITS) + 17, ("begin",), 0, 0)
     assert not any(isinstance(effect, Keep) and effect.key.startswith("promise") for effect in robot.receive(late))

@@ -172,7 +172,7 @@ class AppliesTwice(LocalController):
     """An order that comes again is carried out again."""
 
     def _is_closed(self, number: int) -> bool:
-        return number < self.closed_below
+        return number < self._above(number).closed_below
 
     def _apply(self, decision: Decision, _promise: Promise | None) -> Iterator[Effect]:
         yield from self._fire(self.parts[str(decision.committed)])
@@ -183,8 +183,9 @@ class VotesFromMemory(LocalController):
 
     def _vote(self, request: VoteRequest) -> Iterator[Effect]:
         if not self._is_closed(request.round):
-            self.promises.setdefault(request.round, Promise(self.readiness.transitions, 0, 0))
-            yield Vote(self.name, request.round, self.promises[request.round].promised, self.readiness)
+            readiness = self._above(request.round).readiness
+            self.promises.setdefault(request.round, Promise(readiness.transitions, 0, 0))
+            yield Vote(self.name, request.round, self.promises[request.round].promised, readiness, request.coordinator)
 
     def _apply(self, decision: Decision, _promise: Promise | None) -> Iterator[Effect]:
         yield from self._fire(self.parts[str(decision.committed)])
