@@ -17,7 +17,6 @@ from firable.cli.sign import trust_option
 if TYPE_CHECKING:
     from firable.executor import Answer, RunReport
     from firable.nets.bundle import Bundle
-    from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
@@ -62,7 +61,7 @@ def run(
     format_: str,
     **host: Any,
 ) -> int:
-    """Run BUNDLE: a coordinator and a controller for each subnet, on a simulated cell of machines and workpieces.
+    """Run BUNDLE: its coordinators and a controller for each subnet, on a simulated cell of machines and workpieces.
 
     A bundle that is changed or not proved is refused, and with --trust one that none of these keys has signed. Ctrl-C
     stops the machines, and the run ends in order, with its report and its trace.
@@ -136,7 +135,6 @@ def run(
             loaded.net,
             _verdicts(report, workpieces, seed),
             files=(trace,) if trace else (),
-            notes=_notes(loaded.net),
             run={**report.to_json(), "workpieces": workpieces, "seed": seed},
         )
 
@@ -167,25 +165,6 @@ def _said(net: Net, say: tuple[str, ...], journal: str | None) -> dict[str, Answ
             raise click.UsageError(f"--say {option}: say {', '.join(words)}")
         said[place] = words[word]
     return said
-
-
-def _notes(net: Net) -> tuple[Diagnostic, ...]:
-    """What a person should know of how the net is run: by one coordinator, whatever its layers.
-
-    That is right: with one decider for each conflict, and the votes of all parts, it decides what the layers would.
-    """
-    from firable.nets.diagnostics import Diagnostic, Severity
-    from firable.nets.layers import Layers
-
-    layers = Layers(net)
-    if not layers.several:
-        return ()
-    below = [name for name in layers.coordinators() if name != layers.root]
-    message = (
-        f"nothing is decided by {', '.join(below)} in this run: one coordinator, {layers.root}, decides everything"
-    )
-    hint = "what is decided is the same (O8); that a cell goes on alone while the line is down is not to be seen here"
-    return (Diagnostic("F5006", message, hint, severity=Severity.WARNING),)
 
 
 def _plant_file(bundle: Bundle, argument: str | None) -> Path:
@@ -268,10 +247,15 @@ def _show(report: Report) -> None:
         f"{text.counted(len(done['delivered']), 'workpiece')} carried through, {len(done['lost'])} lost, "
         f"{len(done['doubled'])} doubled, {len(done['inside'])} still inside"
     )
+    several = len(done["decided"]) > 1
+    between = f"between {'coordinators' if several else 'coordinator'} and controllers"
     click.echo(
         f"  {text.counted(sum(done['firings'].values()), 'firing')}, {text.counted(done['commands'], 'command')} to "
-        f"machines, {text.counted(done['messages'], 'message')} between coordinator and controllers"
+        f"machines, {text.counted(done['messages'], 'message')} {between}"
     )
+    if several:
+        told = ", ".join(f"{count:,} by {name}" for name, count in done["decided"].items())
+        click.echo(f"  decided: {told}")
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
     if refuted:
         text.show_verdicts(report.net, refuted)

@@ -26,7 +26,7 @@ SAYS: Final = {
     "O5": "orders carry a round, are applied once, repeated until acknowledged, all or nothing",
     "O6": "votes and decisions are in stable storage, and a promise outlasts a crash",
     "O7": "commands go to machines only after the local apply",
-    "O8": "a coordinator below another one votes for its children and keeps their locks",
+    "O8": "each coordinator decides what those below it take part in, and what competes meets in one",
     "O9": "synchronous steps are equal only in lock-step rounds",
 }
 """What each obligation says, in a line."""
@@ -84,8 +84,6 @@ def standing(decomposition: Decomposition, verdicts: Iterable[Verdict]) -> Itera
         ):
             found = found if found is Status.VIOLATED else Status.UNKNOWN
             by += f", which assumes of the split what is not proved here: {', '.join(doubted)}"
-        if name == "O8":  # what is proved is the table
-            by += "; a run is in one layer, so that no coordinator keeps locks for others"
         yield Standing(name, says, " and ".join(kinds) if found is Status.PROVED else found.value, by)
 
 

@@ -31,6 +31,7 @@ from firable.executor.protocol.commands import Answer
 from firable.nets.bundle import Bundle, read_bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.layers import Layers
 from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.nets.net import Net
 from firable.nets.right_to_run import unproved
@@ -51,6 +52,8 @@ class RunReport:
     firings: Mapping[str, int]
     commands: int
     messages: int
+    decided: Mapping[str, int]
+    """How many transitions each coordinator has committed."""
     simulated_seconds: float
 
     @property
@@ -72,6 +75,7 @@ class RunReport:
             "firings": dict(self.firings),
             "commands": self.commands,
             "messages": self.messages,
+            "decided": dict(self.decided),
             "simulated_seconds": self.simulated_seconds,
         }
 
@@ -186,6 +190,7 @@ def execute(
         firings=files.recorder.firings,
         commands=files.recorder.commands,
         messages=execution.messages,
+        decided=_decided(decomposition, files.recorder.firings),
         simulated_seconds=execution.now_seconds(),
     )
 
@@ -230,8 +235,26 @@ def run_bound(
         recorder = files.recorder
         recorder.end(execution.now_seconds(), situation.state.value)
     return RunReport(
-        situation, (), (), (), (), recorder.firings, recorder.commands, execution.messages, execution.now_seconds()
+        situation,
+        (),
+        (),
+        (),
+        (),
+        recorder.firings,
+        recorder.commands,
+        execution.messages,
+        _decided(decomposition, recorder.firings),
+        execution.now_seconds(),
     )
+
+
+def _decided(decomposition: Decomposition, firings: Mapping[str, int]) -> dict[str, int]:
+    """How much each coordinator has decided: no other one can have fired what stands in its name."""
+    layers = Layers(decomposition.net)
+    of_each = Counter({layers.root: 0})
+    for row in decomposition.coordinated:
+        of_each[row.at or layers.root] += firings.get(row.name, 0)
+    return {name: of_each[name] for name in (layers.root, *layers.coordinators()) if name in of_each}
 
 
 async def _terminable(execution: Execution) -> Situation:

@@ -1,0 +1,262 @@
+"""A coordinator for each layer: each decides its own, cells go on while the line is down, and no round is another's."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import replace
+
+import pytest
+from support.examples import seeds
+from support.layered_nets import cells_in_a_line
+from support.owned_nets import owned_net
+
+from firable.decompose.splitting.cut import split
+from firable.executor.operating.running import execute
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.deciders import TOP, coordinators
+from firable.executor.protocol.messages import (
+    EPOCH_BITS,
+    Decision,
+    Effect,
+    Firing,
+    Hello,
+    Keep,
+    Message,
+    ProtocolError,
+    ToController,
+    ToCoordinator,
+    VoteRequest,
+)
+from firable.executor.simulation.campaign import Passed, Run, rehearse
+from firable.executor.simulation.judge import Subject
+from firable.executor.simulation.network import Network, ProgressLostError, Simulation
+from firable.nets.catalogue import catalogue_net, catalogue_plant
+from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Controller, Net, Place, Transition
+from firable.semantics.replaying import replay
+from firable.semantics.trace import Fired
+
+TWO_CELLS = split(catalogue_net("two_cells"))
+LINE = split(cells_in_a_line())
+BAD = Network(loss=0.2, duplication=0.3)
+CELL_A, CELL_B = "coordinator cell_a", "coordinator cell_b"
+
+
+def layered(net: Net, under: dict[str, str]) -> Net:
+    return replace(net, controllers=tuple(replace(c, under=under.get(c.name)) for c in net.controllers))
+
+
+def test_each_coordinator_decides_what_is_its_own() -> None:
+    assert coordinators(TWO_CELLS) == (TOP, CELL_A, CELL_B)
+    for name in coordinators(TWO_CELLS):
+        machine = Coordinator(TWO_CELLS, name)
+        at = name.partition(" ")[2] or None
+        assert set(machine.participants) == {row.name for row in TWO_CELLS.coordinated if row.at == at}
+    robot = LocalController(TWO_CELLS, "robot_a")
+    assert {name: sorted(above.parts) for name, above in robot.above.items()} == {
+        TOP: ["fetched_a", "load_a", "placed_a", "unload_a"],
+        CELL_A: ["put_a", "taken_a"],
+    }
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("network", [Network(), BAD], ids=str)
+def test_layers_run_as_the_central_net(network: Network) -> None:
+    for decomposition, steps in ((TWO_CELLS, 1500), (LINE, 600)):
+        firings = [
+            replay(decomposition.net, Simulation(decomposition, s, network).run(steps)).firings for s in seeds(3)
+        ]
+        assert min(firings) > 0
+
+
+@pytest.mark.seeds
+def test_random_nets_in_layers_run_as_the_central_net() -> None:
+    fired = 0
+    for seed in seeds(30):
+        net = owned_net(seed)
+        names = [controller.name for controller in net.controllers if not controller.coordinator]
+        layers = layered(net, dict(zip(names[1:], names, strict=False)))
+        fired += replay(layers, Simulation(split(layers), seed, BAD).run(300)).firings
+    assert fired > 50
+
+
+@pytest.mark.seeds
+def test_layers_survive_faults_of_every_kind() -> None:
+    subject = Subject(TWO_CELLS)
+    happened: Counter[str] = Counter()
+    for seed in seeds(25):
+        result = rehearse(subject, Run(seed))
+        assert isinstance(result, Passed), result
+        happened += result.counts
+    assert happened["firings"] > 50
+    assert happened["restarts"] > 50
+
+
+def test_the_run_of_the_two_cells_shows_who_has_decided_what() -> None:
+    report = execute(TWO_CELLS, catalogue_plant("two_cells"), workpieces=3)
+    assert len(report.delivered) == 3
+    by = {row.at or "line": 0 for row in TWO_CELLS.coordinated}
+    for row in TWO_CELLS.coordinated:
+        by[row.at or "line"] += report.firings[row.name]
+    assert report.decided == by == {"line": 24, "cell_a": 6, "cell_b": 6}
+
+
+# --- Somebody is dead
+
+
+def dead(name: str) -> type[Coordinator]:
+    """Coordinators of which one does nothing any more."""
+
+    class Dead(Coordinator):
+        def receive(self, message: ToCoordinator) -> list[Effect]:
+            return [] if self.name == name else super().receive(message)
+
+        def resend(self) -> list[Effect]:
+            return [] if self.name == name else super().resend()
+
+    return Dead
+
+
+def fired_while_dead(name: str, steps: int = 3000) -> set[str]:
+    simulation = Simulation(LINE, 1, coordinator=dead(name))
+    for controller in simulation.controllers.values():
+        simulation._perform(controller.report())
+    for _ in range(steps):
+        simulation._something()
+    events = [event for event in simulation.events if isinstance(event, Fired)]
+    late = [t for event in events[len(events) // 2 :] for t in event.transitions]
+    return {t for t in late if late.count(t) > 3}
+
+
+def test_cells_go_on_while_the_coordinator_of_the_line_is_dead() -> None:
+    assert fired_while_dead(TOP) == {"fill_a", "clear_a", "fill_b", "clear_b"}
+
+
+def test_all_but_its_own_cell_goes_on_while_the_coordinator_of_a_cell_is_dead() -> None:
+    assert fired_while_dead(CELL_A) == {"back_a", "fill_b", "clear_b", "back_b", "hand_over"}
+
+
+# --- The names of rounds
+
+
+def test_no_two_rounds_have_one_name_not_even_after_a_restart() -> None:
+    for epoch in (0, 1, 2):
+        kept = {"epoch": epoch - 1} if epoch else {}
+        machines = [Coordinator.restored(TWO_CELLS, kept, name) for name in coordinators(TWO_CELLS)]
+        numbers = [machine.next_round + i * machine.stride for machine in machines for i in range(5)]
+        assert len(set(numbers)) == len(numbers)
+        assert {number >> EPOCH_BITS for number in numbers} == {epoch}
+        robot = LocalController(TWO_CELLS, "robot_a")
+        assert [robot.coordinator_of(machine.next_round) for machine in machines] == list(coordinators(TWO_CELLS))
+
+
+def test_what_one_coordinator_has_closed_says_nothing_of_the_rounds_of_another() -> None:
+    robot = LocalController(LINE, "robot_a")
+    own, line = ("fill_a",), ("hand_over",)
+    robot.receive(VoteRequest("robot_a", 1, own, 0, -1, 0, CELL_A))
+    robot.receive(VoteRequest("robot_a", 0, line, 0, -1, 0, TOP))
+    assert {number: promise.promised for number, promise in robot.promises.items()} == {1: {"fill_a"}, 0: {"hand_over"}}
+    robot.receive(Hello("robot_a", 300, -1, 1, TOP))  # the line has restarted, and aborts what it had open
+    assert set(robot.promises) == {1}
+    assert robot.above[CELL_A].closed_below == 0
+    kept = [
+        effect.key
+        for effect in robot.receive(Decision("robot_a", 1, None, 1, -1, 0, CELL_A))
+        if isinstance(effect, Keep)
+    ]
+    assert kept == ["promise/1", f"closed/{CELL_A}"]
+
+
+def test_who_decides_nothing_at_a_controller_may_not_speak_to_it() -> None:
+    with pytest.raises(ProtocolError, match="decides nothing here"):
+        LocalController(LINE, "robot_a").receive(Hello("robot_a", 0, -1, 1, CELL_B))
+
+
+class NumbersOfItsOwn(Coordinator):
+    """Each coordinator counts its rounds from 0, and a number is taken for a name."""
+
+    def __init__(self, decomposition: Decomposition, name: str = TOP) -> None:
+        super().__init__(decomposition, name)
+        self.next_round, self.stride = 0, 1
+
+
+def test_rounds_that_are_numbered_by_each_coordinator_alone_are_found() -> None:
+    class Trusting(LocalController):
+        """It takes a round for that of whoever sends the message."""
+
+        def receive(self, message: ToController) -> list[Effect]:
+            self.speaking = message.coordinator
+            return super().receive(message)
+
+        def coordinator_of(self, number: int) -> str:
+            return getattr(self, "speaking", "") or super().coordinator_of(number)
+
+    for seed in range(20):
+        for machine in (LocalController, Trusting):
+            with pytest.raises((ProtocolError, ProgressLostError, InputError, KeyError)):
+                replay(LINE.net, Simulation(LINE, seed, BAD, NumbersOfItsOwn, machine).run(400))
+
+
+# --- Who contends has one decider
+
+
+def contending() -> Net:
+    """The cell's `within` and the line's `over` each close a gate of the other, at two controllers."""
+    below = [Controller(name, under="cell") for name in ("r", "m")]
+    controllers = (Controller("line", coordinator=True), Controller("cell"), *below, Controller("x"))
+    names = ("r.a", "r.b", "m.a", "m.b", "r.c", "r.d", "m.c", "m.d", "x.c", "x.d")
+    places = tuple(Place(name, name[0], marked=name[2] in "ac") for name in names)
+    within = Transition("within", ("r.a", "m.a"), ("r.b", "m.b"), ("m.c",))
+    over = Transition("over", ("r.c", "m.c", "x.c"), ("r.d", "m.d", "x.d"), ("r.a",))
+    return Net("contending", places, (within, over), controllers=controllers)
+
+
+def left_below(decomposition: Decomposition) -> Decomposition:
+    """The table with `within` in the hands of the cell."""
+    rows = tuple(replace(row, at="cell") if row.name == "within" else row for row in decomposition.coordinated)
+    return replace(decomposition, coordinated=rows)
+
+
+def in_step(decomposition: Decomposition, turns: int) -> tuple[list[str], int]:
+    """What fires, and how many rounds are opened, where `r` always hears the cell first, and `m` the line."""
+    machines = {name: Coordinator(decomposition, name) for name in coordinators(decomposition)}
+    controllers = {subnet.name: LocalController(decomposition, subnet.name) for subnet in decomposition.subnets}
+    fired, opened, under_way = [], set[int](), deque[Message]()
+
+    def say(effects: list[Effect]) -> None:
+        for effect in effects:
+            if isinstance(effect, Firing):
+                fired.append(effect.transition)
+            elif isinstance(effect, ToController | ToCoordinator):
+                under_way.append(effect)
+
+    for controller in controllers.values():
+        say(controller.report())
+    for _ in range(turns):
+        now, under_way = sorted(under_way, key=_in_step), deque()
+        for message in now:
+            if isinstance(message, ToController):
+                opened |= {message.round} if isinstance(message, VoteRequest) else set()
+                controller = controllers[message.controller]
+                say([*controller.receive(message), *controller.report()])
+            else:
+                say(machines[message.coordinator].receive(message))
+    return fired, len(opened)
+
+
+def _in_step(message: Message) -> tuple[str, str]:
+    way_of_m = message.controller == "m"
+    return message.controller, "" if (message.coordinator == TOP) == way_of_m else "later"
+
+
+def test_two_deciders_of_what_contends_may_give_up_for_ever_and_one_does_not() -> None:
+    decomposition = split(contending())
+    assert {row.name: row.at for row in decomposition.coordinated} == {"within": None, "over": None}
+    fired, opened = in_step(left_below(decomposition), 400)
+    assert fired == []
+    assert opened > 50
+    fired, opened = in_step(decomposition, 400)
+    assert len(fired) == 1  # each closes the gate of the other
+    assert opened <= 3
