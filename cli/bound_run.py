@@ -23,7 +23,6 @@ def run_bound_of(
     bundle: Bundle,
     bind: str,
     trace: str | None,
-    notes: tuple[Diagnostic, ...],
     operator: Operator | None,
     journal: str | None,
     said: Mapping[str, Answer],
@@ -52,7 +51,6 @@ def run_bound_of(
         bundle.net,
         (_verdict(report, bind),),
         files=(trace,) if trace else (),
-        notes=notes,
         run={**{key: known[key] for key in kept}, "seconds": report.simulated_seconds, "binding": bind},
     )
 

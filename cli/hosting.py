@@ -121,7 +121,6 @@ def run_host_of(
     bundle: Bundle,
     options: HostOptions,
     trace: str | None,
-    notes: tuple[Diagnostic, ...],
     said: Mapping[str, Answer],
 ) -> Report:
     """Run this host until it is stopped or fails, and report how it ended."""
@@ -152,7 +151,6 @@ def run_host_of(
         bundle.net,
         (_verdict(situation, machines),),
         files=(trace,) if trace else (),
-        notes=notes,
         run={
             "state": situation.state.value,
             "message": situation.message,

@@ -94,7 +94,7 @@ def run(
             if trace is not None:
                 _refuse_to_overwrite(trace, bundle, *filter(None, (options.bind, options.journal)))
             said = _said(loaded.net, say, options.journal)
-            return run_host_of(bundle, loaded, options, trace, _notes(loaded.net), said)
+            return run_host_of(bundle, loaded, options, trace, said)
         if options.bind is not None:
             if plant is not None:
                 raise click.UsageError(
@@ -107,7 +107,6 @@ def run(
                 loaded,
                 options.bind,
                 trace,
-                _notes(loaded.net),
                 stepping(1.0, to_stderr=format_ == "json") if step else None,
                 options.journal,
                 _said(loaded.net, say, options.journal),

@@ -49,7 +49,7 @@ def encode(message: Message) -> bytes:
 
     >>> from firable.executor.protocol.messages import Acknowledgement, Readiness
     >>> encode(Acknowledgement("robot", 7, Readiness(3, frozenset({"G2", "G1"}))))[:60]
-    b'{"Acknowledgement":{"controller":"robot","readiness":{"seque'
+    b'{"Acknowledgement":{"controller":"robot","coordinator":"","r'
     """
     kind = type(message)
     return to_json({kind.__name__: _WRITERS[kind](message)})

@@ -71,14 +71,20 @@ def machines_of(net: Net, controllers: Sequence[str], *, coordinator: bool) -> t
 
 
 def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLine) -> Link:
-    """The link of a host; raises `ModuleNotFoundError` where the extra `zenoh` or `serial` is not installed."""
+    """The link of a host; raises `ModuleNotFoundError` where the extra `zenoh` or `serial` is not installed.
+
+    On a serial line controllers speak to the master alone: `InputError` F5021 where only some coordinators are there.
+    """
     greeting = Greeting(bundle.digest, machines)
     if isinstance(way, SerialLine):
         from firable.executor.links.serial_line import MASTER, SerialLink, addresses_on_a_line
 
-        addresses = addresses_on_a_line(
-            coordinators(bundle.decomposition), tuple(c.name for c in bundle.net.controllers)
-        )
+        deciding = coordinators(bundle.decomposition)
+        if (here := set(deciding).intersection(machines)) and len(here) < len(deciding):
+            message = f"the serial line {way.port} has one master, and not all coordinators are at it"
+            hint = "run the coordinators of the layers beside the one at the top, or link the hosts over a network"
+            raise InputError([Diagnostic("F5021", message, hint)])
+        addresses = addresses_on_a_line(deciding, tuple(c.name for c in bundle.net.controllers))
         own = MASTER if TOP in machines else min(addresses[name] for name in machines)
         return SerialLink(greeting, way.port, addresses, own, baud=way.baud, lease_seconds=way.lease_seconds)
     from firable.executor.links.zenoh_link import Certificates, ZenohLink

@@ -182,9 +182,7 @@ def test_a_round_that_was_aborted_keeps_nobody_waiting(tmp_path: Path) -> None:
         await asyncio.sleep(7.3)
         cell.exchange.cut(cell.links[ROBOT])
         await asyncio.sleep(5)
-        coordinator = cell.hosts[CENTRE].coordinator
-        assert coordinator is not None
-        coordinator.permit(0)
+        cell.hosts[CENTRE].coordinators[COORDINATOR].permit(0)
         assert not any("robot" in sentence for sentence in cell.hosts[CENTRE].waits())
 
     run_in_virtual_time(main())

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections import Counter, deque
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from support.examples import seeds
+from support.hosts import Cell
 from support.layered_nets import cells_in_a_line
 from support.owned_nets import owned_net
 
 from firable.decompose.splitting.cut import split
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.operating.hosting import SerialLine, machines_of, make_link
 from firable.executor.operating.running import execute
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
@@ -31,6 +36,7 @@ from firable.executor.protocol.messages import (
 from firable.executor.simulation.campaign import Passed, Run, rehearse
 from firable.executor.simulation.judge import Subject
 from firable.executor.simulation.network import Network, ProgressLostError, Simulation
+from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
@@ -260,3 +266,55 @@ def test_two_deciders_of_what_contends_may_give_up_for_ever_and_one_does_not() -
     fired, opened = in_step(decomposition, 400)
     assert len(fired) == 1  # each closes the gate of the other
     assert opened <= 3
+
+
+# --- Hosts
+
+
+def test_a_coordinator_runs_beside_the_controller_whose_name_it_bears() -> None:
+    net = TWO_CELLS.net
+    assert machines_of(net, ["cell_a", "robot_a"], coordinator=False) == ("cell_a", "robot_a", CELL_A)
+    assert machines_of(net, ["line"], coordinator=False) == ("line", TOP)
+
+
+def test_some_coordinators_alone_are_refused_on_a_serial_line() -> None:
+    bundle = Bundle(TWO_CELLS, ())
+    with pytest.raises(InputError) as refusal:
+        make_link(bundle, ("cell_a", CELL_A), SerialLine("/dev/null"))
+    assert refusal.value.diagnostics[0].code == "F5021"
+
+
+HOSTS = (
+    (TOP, "line", "conveyors"),
+    ("cell_a", CELL_A),
+    ("robot_a", "machine_a"),
+    ("cell_b", CELL_B, "robot_b", "machine_b"),
+)
+
+
+def test_hosts_of_layers_run_as_the_central_net(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path, HOSTS, "two_cells")
+        await asyncio.sleep(30)
+        await cell.stop()
+        joined = cell.replayed()
+        assert joined.firings > 20
+        assert {name for host in cell.hosts.values() for name in host.coordinators} == {TOP, CELL_A, CELL_B}
+
+    run_in_virtual_time(main())
+
+
+def test_what_another_coordinator_says_in_its_name_is_dropped(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path, HOSTS, "two_cells")
+        robots = cell.hosts["robot_a", "machine_a"]
+        await asyncio.sleep(0.5)
+        number = 1 + 3 * 1000
+        robots.arrived(CELL_A, "machine_a", VoteRequest("machine_a", number, ("taken_a",), 0, -1, 0, CELL_A))
+        robots.arrived(TOP, "machine_a", VoteRequest("machine_a", number, ("taken_a",), 0, -1, 0, CELL_A))
+        assert [sentence for kind, sentence in cell.told if kind == "dropped"] == [
+            "the coordinator sent a VoteRequest that is not its to send"
+        ]
+        await cell.stop()
+
+    run_in_virtual_time(main())
