@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
     from firable.executor import Answer, Operator, RunReport
     from firable.nets.bundle import Bundle
-    from firable.nets.diagnostics import Diagnostic
     from firable.nets.verdict import Verdict
 
 
