@@ -14,6 +14,7 @@ from typing import Final
 import executing
 import explicit
 import linking
+import protocols
 import public_nets
 import reading
 import splitting
@@ -25,6 +26,7 @@ BENCHMARKS: Final = {
     "whole_spaces": whole_spaces.tables,
     "reading": reading.tables,
     "splitting": splitting.tables,
+    "protocols": protocols.tables,
     "linking": linking.tables,
     "public_nets": public_nets.tables,
     "executing": executing.tables,

@@ -1,0 +1,70 @@
+"""Exploring the voting protocol of whole cells as a net of its own, without faults and with any number of each kind.
+
+Two orders of places race for the decision diagram; the processor seconds are those of both, so that they say what
+the answer cost and not who was first. Apart is told what finding all configurations took, and what the verdicts on
+them took besides.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Final
+
+from measuring import MET, MISSED, Table, timed
+
+from firable.analysis.deadline import Deadline
+from firable.analysis.goal import Limits
+from firable.decompose.protocol.exploring import Exploration, explore_protocol
+from firable.decompose.protocol.outages import fault_exploration, fault_verdicts
+from firable.decompose.splitting.cut import split
+from firable.nets.catalogue import catalogue_net
+from firable.nets.decomposition import Decomposition
+from firable.nets.verdict import Verdict
+
+NETS: Final = ("one_robot", "two_robots_shared", "two_robots_separate")
+SECONDS_MAX: Final = 60.0
+
+
+def explored(decomposition: Decomposition, *, faults: bool) -> Exploration:
+    """All configurations of the protocol."""
+    limits = Limits(Deadline.after(4 * SECONDS_MAX))
+    return fault_exploration(decomposition, limits) if faults else explore_protocol(decomposition, limits=limits)
+
+
+def decided(exploration: Exploration, *, faults: bool) -> tuple[Verdict, ...]:
+    """Every verdict on them."""
+    return fault_verdicts(exploration) if faults else exploration.verdicts
+
+
+def tables(repeat: int) -> list[Table]:
+    """One row for each net and kind of run."""
+    rows = []
+    for name in NETS:
+        decomposition = split(catalogue_net(name))
+        for faults in (False, True):
+            found, verdicts = [], []
+            for _ in range(repeat):
+                exploration, seconds = timed(partial(explored, decomposition, faults=faults))
+                found.append(seconds)
+                verdicts.append(timed(partial(decided, exploration, faults=faults)))
+            net, whole = exploration.protocol.net, min(found) + min(seconds for _, seconds in verdicts)
+            markings = exploration.space.n_markings
+            rows.append(
+                (
+                    f"{name}, {'any number of faults' if faults else 'no faults'}",
+                    f"{len(net.places)} / {len(net.transitions)}",
+                    f"{markings:,}" if markings < 10**9 else f"{float(markings):.1e}",
+                    f"{min(found):.1f}",
+                    f"{whole:.1f} (<= {SECONDS_MAX:g}: {MET if whole <= SECONDS_MAX else MISSED})",
+                    "yes" if all(verdict.holds for verdict in verdicts[0][0]) else "no",
+                )
+            )
+    return [
+        Table(
+            "The protocol of whole cells, explored",
+            "The voting protocol of a split as a net of its own: its configurations in a decision diagram. Processor "
+            "seconds of both orders that race, to find them, and to find them and decide every verdict.",
+            ("net", "places / transitions", "configurations", "found, s", "with all verdicts, s", "all hold"),
+            tuple(rows),
+        )
+    ]
