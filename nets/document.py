@@ -34,7 +34,8 @@ def _as_formula(value: object) -> object:
     return str(value).lower() if isinstance(value, bool) else value
 
 
-def _as_time(value: object) -> object:
+def as_time(value: object) -> object:
+    """A time alone as the mapping that says it."""
     return {"time": value} if isinstance(value, str) else value
 
 
@@ -109,7 +110,7 @@ class PlaceDocument(StrictDocument):
         Annotated[
             WithinDocument,
             BeforeValidator(
-                _as_time,
+                as_time,
                 json_schema_input_type=WithinDocument
                 | Annotated[str, Field(json_schema_extra={"pattern": TIME_PATTERN})],
             ),

@@ -30,8 +30,9 @@ from typing import Any, Final
 from firable.analysis.question import Answer, Question, no, yes
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.nets.formula import And, Formula, Holds, Not, Or
-from firable.nets.net import ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.nets.net import ExternalGate, Net, Place, Signal, SignalKind, TimeLimit, Transition
 from firable.nets.tasks.model import Gate, Move, Task
+from firable.nets.time_limits import fault_transition, timer_name
 from firable.nets.verdict import Verdict, Weight
 
 MARKINGS_MAX: Final = 1_000_000
@@ -80,6 +81,7 @@ def closed(task: Task) -> Net:
             command=step.command,
             completion=_done(name) if step.completion else None,
             description=step.description,
+            within=TimeLimit(step.within, timer_name(name)) if step.within else None,
         )
         for name, (_, step) in task.steps.items()
     ]
@@ -87,7 +89,11 @@ def closed(task: Task) -> Net:
     subtasks = [Place(subtask.name, description=subtask.description) for subtask in task.subtasks]
     roles = [role.name for role in task.roles]
 
+    of_step = {place.name: place for place in steps}
+
     def transition(move: Move, inputs: tuple[str, ...] = (), outputs: tuple[str, ...] = ()) -> Transition:
+        if move.late:
+            return fault_transition(of_step[move.sources[0]], move.targets[0], move.name)
         done = dict.fromkeys(completions[source] for source in move.sources if source in completions)
         return Transition(
             move.name,
@@ -120,6 +126,7 @@ def closed(task: Task) -> Net:
         (
             *(Signal(f"{role.name}.{name}.signal") for role in task.roles for name, _ in role.inputs),
             *(Signal(signal, kind=SignalKind.COMPLETION) for signal in completions.values()),
+            *(Signal(place.within.timer, kind=SignalKind.TIMER) for place in steps if place.within),
         ),
     )
 

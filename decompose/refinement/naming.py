@@ -20,8 +20,9 @@ from itertools import count
 from firable.decompose.refinement.opening import Opened, OpenPlace, OpenTransition
 from firable.decompose.splitting.cut import controller_numbers
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.net import Arbiter, ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.nets.net import Arbiter, ExternalGate, Net, Place, Signal, SignalKind, TimeLimit, Transition
 from firable.nets.printing import in_file_order
+from firable.nets.time_limits import fault_transition, fault_transition_name, timer_name
 
 
 @dataclass(frozen=True)
@@ -72,11 +73,12 @@ class _Naming:
         places = tuple(
             Place(
                 names[place.key], place.owner, place.marked, place.command, _full(place.completion, place.owner),
-                place.description, within=place.within,
+                place.description, within=self.timed(place, names[place.key]),
             )
             for place in order
         )  # fmt: skip
-        titles, numbers = self.transition_names()
+        titles, numbers = self.transition_names(names)
+        by_name = {place.name: place for place in places}
         completions = {place.name: place.completion for place in places}
 
         def arcs(keys: list[str]) -> tuple[str, ...]:
@@ -84,6 +86,8 @@ class _Naming:
 
         def transition(key: str) -> Transition:
             t = self.opened.transitions[key]
+            if t.late:
+                return fault_transition(by_name[names[t.inputs[0]]], names[t.outputs[0]], titles[key])
             inputs = arcs(t.inputs)
             said = [ExternalGate(_full(name, owner) or "", wanted) for owner, name, wanted in t.external]
             done = (ExternalGate(signal) for source in inputs if (signal := completions[source]))
@@ -135,7 +139,12 @@ class _Naming:
             raise InputError([Diagnostic("F4014", message, hint, ("places", keys[-1].partition("/")[0]))])
         return names
 
-    def transition_names(self) -> tuple[dict[str, str], dict[str, int]]:
+    def timed(self, place: OpenPlace, name: str) -> TimeLimit | None:
+        """The time limit of a place: that of a step has its timer under the name of the place."""
+        limit = place.within
+        return limit if limit is None or limit.timer else replace(limit, timer=timer_name(name))
+
+    def transition_names(self, places: Mapping[str, str]) -> tuple[dict[str, str], dict[str, int]]:
         """The name of each transition, and the numbers of those that get one."""
         transitions = self.opened.transitions
         rows = [key for key in self.flow if len(self.participants(transitions[key])) > 1]
@@ -144,7 +153,12 @@ class _Naming:
         kept = {key for key in local if not transitions[key].path}
         free = (name for name in (f"G{n}" for n in count(1)) if name not in kept)
         titles = {key: next(free) for key in rows}
-        wished = {key: self.local_name(transitions[key]) for key in local}
+        wished = {
+            key: fault_transition_name(places[transitions[key].inputs[0]])
+            if transitions[key].late
+            else self.local_name(transitions[key])
+            for key in local
+        }
         wanted = Counter([*wished.values(), *titles.values()])
         for key, name in wished.items():
             titles[key] = name if key in kept or wanted[name] == 1 else f"{name}-{self.suffix(transitions[key].path)}"
@@ -186,6 +200,8 @@ class _Naming:
         for place in places:
             if place.completion:
                 found.setdefault(place.completion, Signal(place.completion, place.owner, SignalKind.COMPLETION))
+            if place.within:
+                found.setdefault(place.within.timer, Signal(place.within.timer, place.owner, SignalKind.TIMER))
         for t in self.opened.transitions.values():
             for owner, name, _ in t.external:
                 full = _full(name, owner) or ""

@@ -63,6 +63,7 @@ class OpenTransition:
     path: str = ""
     words: list[str] = field(default_factory=list)
     starts: list[str] = field(default_factory=list)
+    late: bool = False
 
 
 @dataclass(frozen=True)
@@ -155,6 +156,7 @@ class _Opening:
                 self.gates(binding, move),
                 description=binding.text(move.description),
                 path=path,
+                late=move.late,
             )
             self.add(t)
         return {f"{path}/{subtask.name}": binding.within(subtask, self.catalogue) for subtask in task.subtasks}
@@ -187,6 +189,7 @@ class _Opening:
                 key, self.controller(resource), binding.text(step.place), command=command,
                 completion=binding.text(step.completion) if step.completion else None,
                 description=binding.text(step.description), resource=resource, path=path,
+                within=TimeLimit(step.within, "") if step.within else None,
             )  # fmt: skip
         root = self.places[path.partition("/")[0]]
         for subtask in binding.task.subtasks:

@@ -18,10 +18,19 @@ from firable.nets.document import (
     TaskUseDocument,
     Text,
     as_integer,
+    as_time,
 )
 from firable.nets.document_errors import Shape, keys_of
+from firable.nets.time_limits import TIME_PATTERN
 
 _NO_NAMES: Final[Any] = ()
+
+
+class StepWithinDocument(StrictDocument):
+    """How long a step may take, and the step of the same role that comes then; the time alone is the short form."""
+
+    time: str = Field(json_schema_extra={"pattern": TIME_PATTERN}, description="Such as 5s, 500ms or 2min.")
+    to: Name | None = Field(default=None, description="The fault step; else STEP_fault, which need not be declared.")
 
 
 class StepDocument(StrictDocument):
@@ -30,6 +39,17 @@ class StepDocument(StrictDocument):
     place: Name | None = Field(default=None, description="The local name of the place, a template.")
     send: CommandDocument | None = Field(default=None, description="The command sent when the step begins.")
     until: Name | None = Field(default=None, description="The completion signal that ends it, a template.")
+    within: (
+        Annotated[
+            StepWithinDocument,
+            BeforeValidator(
+                as_time,
+                json_schema_input_type=StepWithinDocument
+                | Annotated[str, Field(json_schema_extra={"pattern": TIME_PATTERN})],
+            ),
+        ]
+        | None
+    ) = Field(default=None, description="How long the completion may take before a fault step comes.")
     description: Text = ""
 
 

@@ -27,13 +27,17 @@ from firable.nets.net import Command, TaskUse
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A step of a role: the place that it becomes (a template for its local name), its command and its completion."""
+    """A step of a role: the place that it becomes (a template for its local name), its command and its completion.
+
+    `within` is how long the completion may take, in milliseconds; then a move that is `late` leads to a fault step.
+    """
 
     name: str
     place: str
     command: Command | None = None
     completion: str | None = None
     description: str = ""
+    within: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +75,8 @@ class Gate:
 class Move:
     """A transition of a task; `releases` are the roles whose machines are idle from here on.
 
-    `sources`, `targets` and the internal gates `permissive` and `inhibitive` name steps and subtasks.
+    `sources`, `targets` and the internal gates `permissive` and `inhibitive` name steps and subtasks. One that is
+    `late` leaves a step whose time is over.
     """
 
     name: str
@@ -83,6 +88,7 @@ class Move:
     releases: tuple[str, ...] = ()
     description: str = ""
     span: Span | None = field(default=None, compare=False)
+    late: bool = False
 
 
 @dataclass(frozen=True)

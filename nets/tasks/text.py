@@ -22,6 +22,7 @@ from firable.nets.source import Source, read_source
 from firable.nets.tasks import document as doc
 from firable.nets.tasks.model import Catalogue, Gate, Move, Role, Step, Subtask, Task
 from firable.nets.text_positions import bounded
+from firable.nets.time_limits import no_time, parse_time
 from firable.nets.well_formed import FORBIDDEN_IN_NAMES
 from firable.nets.yaml_tree import Node, Scalar, Sequence, data, node_span, nodes_along, parse_tree
 
@@ -101,6 +102,9 @@ class _Reading:
         self.parameters = tuple((body.parameters or {}).items())
         self.subtasks = body.subtasks or {}
         self.places = [f"{role}.{step}" for role, of in self.roles.items() for step in of.steps or {}]
+        self.given = [fault for fault in self.faults().values() if fault not in self.places]
+        """The fault steps that nobody declares."""
+        self.places += self.given
         self.sensors = {f"{role}.{name}": (role, name) for role, of in self.roles.items() for name in of.inputs or {}}
 
     def task(self) -> Task:
@@ -122,12 +126,35 @@ class _Reading:
                 "start", (), firsts if start.targets is None else start.targets, start_gates, start.release, start
             ),
             self.border("end", lasts if end.sources is None else end.sources, (), end_gates, (), end),
-            moves,
+            (*moves, *self.late()),
             tuple(self.subtask(name, of) for name, of in self.subtasks.items()),
             self.parameters,
             self.body.description,
             self.span(self.path, ""),
         )
+
+    def faults(self) -> dict[str, str]:
+        """For each step with a time limit that names no fault step, the one it gives."""
+        steps = ((f"{role}.{name}", step) for role, of in self.roles.items() for name, step in (of.steps or {}).items())
+        return {name: f"{name}_fault" for name, step in steps if step and step.within and not step.within.to}
+
+    def late(self) -> Iterator[Move]:
+        """The moves out of steps whose time is over."""
+        for role, of in self.roles.items():
+            for name, step in (of.steps or {}).items():
+                if step is None or step.within is None:
+                    continue
+                path = (*self.path, "roles", role, "steps", name, "within")
+                target = f"{role}.{step.within.to or f'{name}_fault'}"
+                if not step.until:
+                    message = f"'{role}.{name}' has a time limit, and waits for no completion that could come in time"
+                    self.problem("F2028", message, "add `until`, or leave out `within`", path)
+                if target not in self.places or target == f"{role}.{name}":
+                    message = f"'{role}' has no other step '{step.within.to}'"
+                    self.problem("F2025", message, "name a step of the same role", (*path, "to"))
+                yield Move(
+                    f"{role}_{name}_timeout", (f"{role}.{name}",), (target,), span=self.span(path, ""), late=True
+                )
 
     def check_names(self) -> None:
         tables: tuple[tuple[str, Iterable[str], Collection[str]], ...] = (
@@ -163,14 +190,22 @@ class _Reading:
         return Role(
             role,
             tuple(
-                self.step(name, step or doc.StepDocument(), (*path, "steps", name))
+                made
                 for name, step in (of.steps or {}).items()
+                for made in self.with_fault(role, self.step(name, step or doc.StepDocument(), (*path, "steps", name)))
             ),
             tuple(
                 (name, self.template(template or name, (*path, "inputs", name)))
                 for name, template in (of.inputs or {}).items()
             ),
         )
+
+    def with_fault(self, role: str, step: Step) -> Iterator[Step]:
+        """The step, and the fault step that its time limit gives where the file declares none."""
+        yield step
+        if self.faults().get(f"{role}.{step.name}") in self.given:
+            told = f"{step.command} was not done in time" if step.command else ""
+            yield Step(f"{step.name}_fault", f"{step.place}_fault", description=told)
 
     def step(self, name: str, step: doc.StepDocument, path: _Path) -> Step:
         send = step.send
@@ -188,7 +223,16 @@ class _Reading:
             command,
             self.template(step.until, (*path, "until")) if step.until else None,
             self.template(step.description, (*path, "description")),
+            self.milliseconds(step.within, name, (*path, "within")),
         )
+
+    def milliseconds(self, within: doc.StepWithinDocument | None, step: str, path: _Path) -> int | None:
+        if within is None:
+            return None
+        if (found := parse_time(within.time)) is None:
+            problem = no_time(step, within.time)
+            self.problem(problem.code, problem.message, problem.hint, path)
+        return found or 1
 
     def subtask(self, name: str, of: doc.SubtaskDocument) -> Subtask:
         path = (*self.path, "subtasks", name)
