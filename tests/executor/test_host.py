@@ -12,7 +12,7 @@ from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.links.link import COORDINATOR
 from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
-from firable.executor.protocol.messages import Decision, Vote
+from firable.executor.protocol.messages import Decision, Vote, VoteRequest
 from firable.nets.net import Place
 from firable.semantics.trace import Noted, read_trace
 
@@ -214,6 +214,38 @@ def test_what_no_machine_knows_an_operator_may_say_beforehand(tmp_path: Path) ->
         await asyncio.sleep(20)
         await cell.stop()
         assert cell.replayed().firings > 10
+
+    run_in_virtual_time(main())
+
+
+def test_a_host_that_is_stopping_promises_nothing_more(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(0.5)
+        host, controller = cell.hosts[ROBOT], cell.hosts[ROBOT].controllers["robot"]
+        name = next(n for n, part in controller.parts.items() if part.enabled(controller.word))
+        host.stop()
+        host.arrived(COORDINATOR, "robot", VoteRequest("robot", 7 << 40, (name,), 0, -1))
+        await asyncio.sleep(0.1)
+        assert not controller.promises
+        await cell.stop()
+
+    run_in_virtual_time(main())
+
+
+def test_what_was_missed_is_said_again_as_soon_as_the_line_is_back(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        for host in cell.hosts.values():
+            host.resend_seconds = 1e6
+        await asyncio.sleep(7.3)
+        cell.exchange.cut(cell.links[CENTRE])
+        await asyncio.sleep(5)
+        stood = cell.firings()
+        cell.exchange.mend(cell.links[CENTRE])
+        await asyncio.sleep(30)
+        await cell.stop()
+        assert cell.replayed().firings > stood + 20
 
     run_in_virtual_time(main())
 

@@ -140,6 +140,23 @@ def test_a_dead_station_does_not_keep_the_others_waiting() -> None:
     asyncio.run(main())
 
 
+def test_a_station_answers_a_poll_once_though_the_line_doubles_it() -> None:
+    async def main() -> None:
+        async with over_a_serial_line() as rig:
+            here, there = rig.link(Greeting("d", (COORDINATOR,))), rig.link(Greeting("d", ("robot",)))
+            async with running(there), running(here) as centre:
+                await centre.until_told(("connected", "robot"))
+                rig.cut()
+                await asyncio.sleep(0.1)
+                poll = Frame(2, 0, Kind.MESSAGES, 250, b"")
+                there.peers[0].queue.extend([b"one\n" * 100, b"two\n" * 100])
+                there._asked_for(poll)
+                there._asked_for(poll)
+                assert len(there.peers[0].queue) == 1  # each answer takes one
+
+    asyncio.run(main())
+
+
 def test_a_port_that_is_none_is_refused() -> None:
     async def main() -> None:
         link = SerialLink(Greeting("d", ("robot",)), "/dev/no-such-line", addresses_on_a_line(("",), CONTROLLERS), 2)
