@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from itertools import takewhile
 from typing import Final, assert_never
@@ -36,6 +36,7 @@ from firable.executor.links.link import Link, called
 from firable.executor.operating.execution import FIRINGS_AT_ONCE_MAX, RunClock
 from firable.executor.operating.host_trace import TRACE, HostTrace
 from firable.executor.operating.situation import Blocked, Situation, State, blocked
+from firable.executor.operating.waits import reached, waits
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
@@ -195,25 +196,9 @@ class Host:
         """The places of the machines here that hold a token."""
         return tuple(p for c in self.controllers.values() for p in c.subnet.names(c.marking))
 
-    def waits(self) -> Iterator[str]:
+    def waits(self) -> tuple[str, ...]:
         """What waits for another machine, in a sentence each."""
-        for coordinator in self.coordinators.values():
-            for opened in coordinator.rounds.values():
-                if opened.decided and opened.committed is None:
-                    continue  # nothing has fired, and nothing needs to
-                what = opened.committed or " or ".join(opened.transitions)
-                for name in opened.participants:
-                    if opened.decided and name not in opened.acknowledged:
-                        yield f"{what} has fired, and waits for {self._called(name)} to apply it"
-                    elif not opened.decided and name not in opened.votes:
-                        yield f"{what} waits for the vote of {self._called(name)}"
-        for name, controller in self.controllers.items():
-            for number, promise in controller.promises.items():
-                if promise.promised:
-                    what, decider = " or ".join(sorted(promise.promised)), controller.coordinator_of(number)
-                    yield f"{called(name)} has promised {what}, and waits for {self._called(decider)} to decide"
-            if controller.held:
-                yield f"{called(name)} is held after a restart, until it is resumed"
+        return tuple(waits(self.coordinators, self.controllers, self.peers - self.connected_to))
 
     # What the operator may do
 
@@ -281,7 +266,7 @@ class Host:
         """A peer can no longer be reached."""
         if peer in self.peers:
             self.connected_to.discard(peer)
-            waiting = [sentence for sentence in self.waits() if self._called(peer) in sentence]
+            waiting = [sentence for sentence in self.waits() if reached(peer, {peer}) in sentence]
             self._told("lost", "; ".join([f"{called(peer)} is lost", *waiting]))
 
     def refused(self, peer: str, problem: Diagnostic) -> None:
@@ -523,7 +508,3 @@ class Host:
         if self.tell is not None:
             self.tell(kind, sentence)
         self._wake()
-
-    def _called(self, name: str) -> str:
-        lost = name in self.peers and name not in self.connected_to
-        return f"{called(name)}, which is not connected" if lost else called(name)

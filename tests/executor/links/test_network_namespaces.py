@@ -108,10 +108,10 @@ class Cell:
             assert time.monotonic() < end, said
             time.sleep(0.05)
 
-    def goes_on(self) -> None:
-        """Whole workpieces' worth of transitions are fired from now on."""
+    def goes_on(self, transitions: int = 18) -> None:
+        """So many transitions of several controllers are fired from now on: nine carry a workpiece through."""
         now = self.fired()
-        self.until(lambda: self.fired() > now + 18)
+        self.until(lambda: self.fired() > now + transitions)
 
     def stop_and_judge(self) -> None:
         """Stop all hosts in order; their traces are one of the net."""
@@ -155,7 +155,7 @@ def test_a_line_that_takes_two_hundred_milliseconds(hosts: Network, bundle: str,
     relay = subprocess.Popen([*hosts.within(ROBOT), sys.executable, "-c", RELAY.format(prefix=PREFIX)])
     try:
         with Cell(hosts, bundle, tmp_path, f"tcp/{PREFIX}.2:7448") as cell:
-            cell.goes_on()
+            cell.goes_on(9)  # each takes a second
             cell.stop_and_judge()
     finally:
         relay.kill()
