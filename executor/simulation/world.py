@@ -51,6 +51,7 @@ from firable.semantics.replaying import Replayer
 from firable.semantics.trace import CommandSent, End, Event, Fired, Header, SignalChanged, Trace
 
 COORDINATOR = "coordinator"
+THE = f"the {COORDINATOR}"
 SECONDS_PER_STEP = 0.01
 _LOGGED_STEPS = 60
 
@@ -134,9 +135,9 @@ class World:
         for step, what, about in self.log:
             match about:
                 case Report() | Vote() | Acknowledgement():
-                    words = f"{what} from {about.controller} at {about.coordinator or COORDINATOR}: {_shown(about)}"
+                    words = f"{what} from {about.controller} at {about.coordinator or THE}: {_shown(about)}"
                 case VoteRequest() | Decision() | Hello():
-                    words = f"{what} from {about.coordinator or COORDINATOR} at {about.controller}: {_shown(about)}"
+                    words = f"{what} from {about.coordinator or THE} at {about.controller}: {_shown(about)}"
                 case _:
                     words = f"{what}: {_shown(about)}" if about else what
             yield f"{step:5}  {words}"
