@@ -55,7 +55,9 @@ class CellLog:
             whole = data[: data.rfind(b"\n") + 1]
             os.truncate(self.path, len(whole))
         first, *lines = whole.decode("utf-8", "replace").splitlines() or [""]
-        if not first:
+        self.is_new = not first
+        """Whether nothing was there: then no process has ever simulated this cell."""
+        if self.is_new:
             self._write(head)
         elif first != json.dumps(head):
             self._refuse(f"it is not of {workpieces} workpieces with the seed {seed} in this plant '{plant.plant}'")

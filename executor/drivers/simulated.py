@@ -80,7 +80,7 @@ class SimulatedDriver:
         """Let the plant's events happen when they are due."""
         self.clock, self.listener = clock, listener
         loop = asyncio.get_running_loop()
-        if self.log is not None and self.log.past:
+        if self.log is not None:  # perhaps of a controller that has restarted, and knows nothing of its sensors
             for signal in self.sensors & self.image.keys():
                 listener.signal(signal, bool(self.image[signal].value), None)
         while True:

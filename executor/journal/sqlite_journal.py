@@ -168,15 +168,16 @@ class SqliteJournal:
             self._damaged("rows are missing, or are older than the others")
         durable = self._durable()
         if not durable.isdigit():
-            self._damaged(f"{printable(self.witness.name)} beside it is {'no number' if durable else 'missing'}")
+            self._damaged(
+                f"{printable(self.witness.name)} beside it is {'no number' if durable else 'missing or empty'}"
+            )
         if int(durable) > self.generation:
             self._damaged(f"it has lost what was stored: it is at sync {self.generation}, and {int(durable)} were done")
 
     def _durable(self) -> str:
-        """What the witness says; before the first sync it need not be there."""
-        if self.witness.exists():
-            return self.witness.read_text("ascii", "replace").strip() or "empty"
-        return "" if self.generation else "0"
+        """What the witness says; before the first sync it need not be there, or be written."""
+        said = self.witness.read_text("ascii", "replace").strip() if self.witness.exists() else ""
+        return said or ("" if self.generation else "0")
 
     def _bear_witness(self) -> None:
         os.pwrite(self.witness_descriptor, f"{self.generation:020}\n".encode(), 0)

@@ -107,7 +107,7 @@ def _demand_the_cell(cell: CellLog, net: Net) -> None:
     if unknown := sorted(place for place in sent if place not in net.place_index):
         message = f"{printable(str(cell.path))}: the simulated cell was commanded by '{unknown[0]}', which is no place"
         hint = "a simulated cell is taken over only by a net that keeps the places which have commanded it"
-    elif cell.past:
+    elif not cell.is_new:
         return
     raise InputError([Diagnostic("F5035", message, hint)])
 

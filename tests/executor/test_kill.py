@@ -140,11 +140,19 @@ def test_operator_who_is_there_resumes_a_run(tmp_path: Path) -> None:
     assert (report.state, report.delivered) == (State.DONE, (1, 2))
 
 
-def half_done(folder: Path) -> Path:
-    """What a run leaves that is killed after a while."""
+@pytest.mark.parametrize("moment", [1, 3, 4, 7, 12, 19])
+def test_run_that_is_killed_as_it_begins_is_begun_again(moment: int, tmp_path: Path) -> None:
+    report, trace = run_here(half_done(tmp_path, moment), resume=True)
+    assert (report.state, report.delivered) == (State.DONE, (1, 2))
+    assert trace is not None
+    assert replay(decomposition_of("one_robot").net, trace).complete
+
+
+def half_done(folder: Path, moment: int = 600) -> Path:
+    """What a run leaves that is killed at a moment."""
     killed = folder / "killed"
     killed.mkdir()
-    arguments = [str(killed), "one_robot", "2", "0", "600"]
+    arguments = [str(killed), "one_robot", "2", "0", str(moment)]
     program = (
         "import sys; from pathlib import Path; from support.killing import live;"
         "live(Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), int(sys.argv[5]))"

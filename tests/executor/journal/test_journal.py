@@ -249,7 +249,7 @@ def test_journal_without_the_file_beside_it_is_refused(tmp_path: Path) -> None:
     (tmp_path / "cell.journal.generation").unlink()
     code, message = refused(lambda: sqlite(tmp_path))
     assert code == "F5032"
-    assert message.endswith("cell.journal.generation beside it is missing")
+    assert message.endswith("cell.journal.generation beside it is missing or empty")
 
 
 HOLDER = """
