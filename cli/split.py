@@ -108,9 +108,9 @@ def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | 
     from firable.decompose.splitting.persistence import persistence
     from firable.nets.printing import format_net
 
-    loaded = load_net(argument)
+    loaded, rules = load_net(argument), _rules(asked)
     with loaded.placing():
-        net, suggestion = _owned(loaded.net, asked)
+        net, suggestion = _owned(loaded.net, asked, rules)
         decomposition = split_net(net)
     found = persistence(decomposition, limits=Limits(Deadline.after(asked.max_seconds)))
     files = write_folder(subnet_dir, _subnets(decomposition)) if subnet_dir is not None else ()
@@ -133,18 +133,25 @@ def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | 
     )
 
 
-def _owned(net: Net, asked: _Asked) -> tuple[Net, Suggestion | None]:
+def _rules(asked: _Asked) -> dict[str, list[str]]:
+    """The rules of ownership that the options give, whose mistakes are nowhere in the file of the net."""
+    from firable.decompose.splitting.rules import read_rules, rules_of_options
+
+    rules = {} if asked.rules is None else read_rules(asked.rules)
+    for controller, patterns in rules_of_options(asked.own).items():
+        rules.setdefault(controller, []).extend(patterns)
+    return rules
+
+
+def _owned(net: Net, asked: _Asked, rules: dict[str, list[str]]) -> tuple[Net, Suggestion | None]:
     """The net with the owners that were asked for."""
     from firable.analysis.deadline import Deadline
-    from firable.decompose.splitting.rules import owned_by_rules, read_rules, rules_of_options
+    from firable.decompose.splitting.rules import owned_by_rules
     from firable.decompose.splitting.suggesting import suggest
 
     if asked.suggest is not None:
         found = suggest(net, asked.suggest, slack=asked.slack, deadline=Deadline.after(asked.max_seconds))
         return found.net, found
-    rules = {} if asked.rules is None else read_rules(asked.rules)
-    for controller, patterns in rules_of_options(asked.own).items():
-        rules.setdefault(controller, []).extend(patterns)
     return (owned_by_rules(net, rules) if rules else net), None
 
 

@@ -28,7 +28,7 @@ from firable.nets.archive import SIGNATURE, ArchiveError, pack, unpack
 from firable.nets.bundle_records import JudgedRecord, ManifestRecord, TableRecord, VersionRecord, table_to_json
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError, Span
-from firable.nets.interchange import canonical_json, net_from_json, net_to_json
+from firable.nets.interchange import FORMAT, canonical_json, net_from_json, net_to_json
 from firable.nets.knowledge import split_to_json
 from firable.nets.net import Net
 from firable.nets.source import printable, read_bytes
@@ -99,11 +99,18 @@ class Bundle:
         """Read a bundle back; raises `InputError` F5001 for any bytes that `to_bytes` does not make."""
         try:
             bundle = _bundle(unpack(archive))
+        except _OtherVersionError as other:
+            message = f"the bundle was made by another version of firable: {printable(str(other))}"
+            raise InputError([Diagnostic("F5001", message, _HINT, span=Span(printable(file), 1, 1))]) from None
         except (_DamageError, ArchiveError) as damage:
             _refuse(file, printable(str(damage)))
         if bundle.to_bytes() != archive:
             _refuse(file, "its content is not as it was written")
         return bundle
+
+
+class _OtherVersionError(Exception):
+    """The bundle is whole, and written in the format of another version."""
 
 
 class _DamageError(Exception):
@@ -168,6 +175,9 @@ def _net(files: Mapping[str, bytes], name: str) -> Net:
         data = from_json(_member(files, name))
     except ValueError:
         raise _DamageError(f"'{name}' is not JSON") from None
+    written = data.get("format") if isinstance(data, dict) else None
+    if isinstance(written, str) and written != FORMAT and written.startswith(FORMAT.partition("/")[0] + "/"):
+        raise _OtherVersionError(f"'{name}' is '{written[:40]}', and this one reads '{FORMAT}'")
     try:
         return net_from_json(data)
     except InputError as error:

@@ -44,7 +44,10 @@ def write_whole(path: str | Path, data: bytes | str) -> None:
 def make_folder(path: str | Path) -> None:
     """Make a folder, and those around it, where it is missing; raises `InputError` F1017."""
     with _failures(path):
-        Path(path).mkdir(parents=True, exist_ok=True)
+        try:
+            Path(path).mkdir(parents=True, exist_ok=True)
+        except FileExistsError:
+            raise OSError(None, "this is a file, and a folder is wanted") from None
 
 
 def _refuse_what_is_no_file(path: str, target: Path) -> None:

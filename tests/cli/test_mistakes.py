@@ -268,3 +268,13 @@ def test_a_net_of_the_catalogue_goes_by_the_name_that_was_written(capsys: pytest
     column = lines[line - 1].index("carrying_in") + 1
     assert said.startswith(f"catalogue:one_robot:{line}:{column}: error")
     assert str(catalogue_path("one_robot").parent) not in said
+
+
+def test_a_mistake_in_an_option_stands_nowhere_in_the_net(capsys: pytest.CaptureFixture[str]) -> None:
+    assert refused(capsys, "split", "catalogue:one_robot", "--own", "a").startswith("error[F1010]: 'a' is no rule")
+
+
+def test_a_file_where_a_folder_is_wanted_is_said_to_be_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "taken").write_text("x")
+    said = refused(capsys, "prove", "catalogue:conceptual_one_robot", "--smt-dir", str(tmp_path / "taken"))
+    assert "taken: cannot be written: this is a file, and a folder is wanted" in said

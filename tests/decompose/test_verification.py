@@ -87,10 +87,11 @@ def test_what_is_read_back_is_shown_too() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["workshop-6", "vehicles-2-8", "philosophers-4", "grid-3", "counter-3", "interlocked-3"]
+    "name",
+    ["workshop-6", "vehicles-2-8", "philosophers-4", "grid-3", "counter-3", "interlocked-3", "one_robot_timed"],
 )
 def test_what_must_be_proved_is_stated_anew_as_the_prover_states_it(name: str) -> None:
-    decomposition = split(family_net(name))
+    decomposition = split(family_net(name) if "-" in name else catalogue_net(name))
     proof = prove(decomposition)
     examination = Examination(Bundle(decomposition, proof.verdicts, proof.files))
     cut = check_cut(decomposition)

@@ -72,6 +72,18 @@ def with_new_hashes(members: Mapping[str, bytes]) -> bytes:
     return pack({**files, "manifest.json": canonical_json(manifest)})
 
 
+def test_bundle_of_another_version_is_told_apart_from_a_damaged_one() -> None:
+    members = unpack(BUNDLE.to_bytes())
+    net = json.loads(members["net.json"])
+    older = with_new_hashes({**members, "net.json": canonical_json({**net, "format": "firable-net/0"})})
+    with pytest.raises(InputError) as refusal:
+        Bundle.from_bytes(older, "x.bundle")
+    (diagnostic,) = refusal.value.diagnostics
+    assert diagnostic.code == "F5001"
+    assert "made by another version of firable: 'net.json' is 'firable-net/0'" in diagnostic.message
+    assert "damaged" not in diagnostic.message
+
+
 def test_bundle_is_read_back_as_it_was_written(tmp_path: Path) -> None:
     write_bundle(tmp_path / "tiny.bundle", BUNDLE)
     bundle = read_bundle(tmp_path / "tiny.bundle")
