@@ -105,6 +105,8 @@ class Above:
     """The epoch of the coordinator."""
     closed_below: int = 0
     """Every round of the coordinator with a smaller number is closed."""
+    kept_below: int = 0
+    """What is kept of that."""
 
 
 class LocalController:
@@ -280,7 +282,7 @@ class LocalController:
                 case ("promise", _, number), [*names]:
                     self.promises[int(number)] = self._promise(map(str, names))
                 case ("closed", _, coordinator), [int(below), [*numbers]] if coordinator in self.above:
-                    self.above[coordinator].closed_below = below
+                    self.above[coordinator].closed_below = self.above[coordinator].kept_below = below
                     self.closed |= set(map(_number, numbers))
                 case ("turns", _, _), [*turns]:
                     self.arbiter.turns = self.kept_turns = tuple(map(_number, turns))
@@ -311,6 +313,8 @@ class LocalController:
                 yield from self._apply(decision, promise)
             yield from self._release()
         above = self._above(decision.round)
+        if decision.round >= above.kept_below and decision.round not in self.closed:
+            yield from self._keep_closed(above)  # closed by hearsay alone; what is acknowledged outlives a crash
         yield Acknowledgement(self.name, decision.round, self._told(above), above.name)
 
     def _apply(self, decision: Decision, promise: Promise | None) -> Iterator[Effect]:
@@ -329,6 +333,10 @@ class LocalController:
         above = self._above(number)
         if number >= above.closed_below:
             self.closed.add(number)
+        yield from self._keep_closed(above)
+
+    def _keep_closed(self, above: Above) -> Iterator[Effect]:
+        above.kept_below = above.closed_below
         numbers = sorted(n for n in self.closed if self._above(n) is above)
         yield Keep(closed_key(above.name), (above.closed_below, numbers))
 

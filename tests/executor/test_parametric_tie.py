@@ -14,6 +14,7 @@ import pytest
 from support.abstraction import Instance, broken, explain, net_structure, with_relations
 from support.examples import seeds
 from support.finite_structures import Structure, Thing
+from support.gated_nets import SENSOR
 from support.owned_nets import owned_net
 from support.reference import load_net
 
@@ -36,7 +37,7 @@ from firable.executor.protocol.token_player import Compiled, TokenPlayer
 from firable.executor.simulation.network import Network, Simulation
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
-from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
+from firable.nets.net import Controller, Net, Place, Transition
 
 Key = tuple[Thing, ...]
 
@@ -291,17 +292,6 @@ class ClosesEarly(Coordinator):
             self.rounds[message.round].acknowledged.update(self.rounds[message.round].participants[1:])
         yield from super()._acknowledged(message)
 
-
-SENSOR = Net(
-    "sensor",
-    (Place("a.p", "a", marked=True), Place("a.x", "a"), Place("b.q", "b", marked=True), Place("b.y", "b")),
-    (
-        Transition("G", ("a.p", "b.q"), ("a.x", "b.y"), external=(ExternalGate("a.s"),)),
-        Transition("G-back", ("a.x", "b.y"), ("a.p", "b.q"), external=(ExternalGate("b.s", wanted=False),)),
-    ),
-    (Signal("a.s", "a"), Signal("b.s", "b")),
-    (Controller("a"), Controller("b")),
-)
 
 FAULTS: list[tuple[str, type, str]] = [
     ("controller", NoLock, "O1"),

@@ -144,7 +144,7 @@ def test_a_run_that_is_told_its_kinds_suffers_as_much_of_each_as_where_they_were
 def test_the_log_of_a_failure_is_told_in_words() -> None:
     log = failing(Machines(coordinator=DecidesEarly)).log
     assert any("  fires: G" in line for line in log)
-    assert any("at the coordinator: round " in line and "promised" in line for line in log)
+    assert any("arrives from" in line and " at the coordinator: " in line for line in log)
 
 
 def test_every_cell_of_the_catalogue_tells_which_places_are_never_commanded_together() -> None:

@@ -1,6 +1,6 @@
-"""Two nets of two controllers in which a gate stands between a coordinated and a local transition."""
+"""Nets of two controllers with gates: between a coordinated and a local transition, and on sensors."""
 
-from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 
 
 def net_of(places: str, marked: str, *transitions: Transition) -> Net:
@@ -41,3 +41,15 @@ GATE_READ_AGAIN = net_of(
     Transition("l-back", ("a.x",), ("a.s",)),
 )
 """As `GATE_OF_A_LOCAL`, again and again."""
+
+SENSOR = Net(
+    "sensor",
+    (Place("a.p", "a", marked=True), Place("a.x", "a"), Place("b.q", "b", marked=True), Place("b.y", "b")),
+    (
+        Transition("G", ("a.p", "b.q"), ("a.x", "b.y"), external=(ExternalGate("a.s"),)),
+        Transition("G-back", ("a.x", "b.y"), ("a.p", "b.q"), external=(ExternalGate("b.s", wanted=False),)),
+    ),
+    (Signal("a.s", "a"), Signal("b.s", "b")),
+    (Controller("a"), Controller("b")),
+)
+"""A coordinated transition that reads sensors of both."""

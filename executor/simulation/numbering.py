@@ -1,0 +1,193 @@
+"""Numbers counted from the beginning: configurations that differ only in how far they have counted are one.
+
+Rounds, reports and commands are numbered upwards for ever, so no configuration would ever come again. But the machines
+only compare numbers, and count on from the largest. So a configuration behaves as the one in which its numbers are
+replaced, in their order, by the first ones of their epoch. This is the reduction by data symmetry of Ip and Dill
+(Formal Methods in System Design 9, 1996), for a type of which only the order matters. Rejected: to end after so many
+rounds; what needs one round more would never be seen.
+
+What counts what has to be known, and is said here once, in `apply` and `apply_message`: one walk over all numbers, with
+a `Numbering` that collects them or replaces them. A field of a machine that this walk has not been told of is refused:
+a number that it overlooks would keep apart what is the same or, worse, be compared to others that were replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final, Protocol
+
+from firable.executor.protocol.commands import PREFIX, Commands
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.messages import (
+    EPOCH_BITS,
+    Acknowledgement,
+    Decision,
+    Hello,
+    Message,
+    Readiness,
+    Report,
+    Stored,
+    Vote,
+    VoteRequest,
+)
+from firable.nets.net import Net
+
+Kept = dict[str, Stored]
+
+_CONTROLLER: Final = frozenset(
+    {
+        *("name", "subnet", "player", "parts", "transitions", "enabled", "rows", "part_mask", "arbiter", "kept_turns"),
+        *("word", "kept_word", "promises", "closed", "coordinators", "above", "latched", "commands", "timers"),
+        *("untold", "held", "epoch"),
+    }
+)
+_COORDINATOR: Final = frozenset(
+    {
+        *("name", "first_round", "stride", "player", "participants", "arbiter", "kept_turns", "groups", "group_of"),
+        *("seen", "ready", "waiting", "rounds", "epoch", "next_round", "permits"),
+    }
+)
+_LOW: Final = (1 << EPOCH_BITS) - 1
+
+
+class Numbering(Protocol):
+    """What is done with each number."""
+
+    def round(self, number: int) -> int:
+        """The number of a round."""
+        ...
+
+    def report(self, controller: str, number: int) -> int:
+        """The number of a report of a controller."""
+        ...
+
+    def entry(self, count: str, number: int) -> int:
+        """The number of a command, by what counts it: a completion signal or a place."""
+        ...
+
+
+class Collecting:
+    """Collects the numbers that there are."""
+
+    def __init__(self) -> None:
+        self.found: dict[tuple[str, str], set[int]] = {}
+
+    def round(self, number: int) -> int:
+        """Note the number of a round."""
+        return self._note(("round", ""), number)
+
+    def report(self, controller: str, number: int) -> int:
+        """Note the number of a report."""
+        return self._note(("report", controller), number)
+
+    def entry(self, count: str, number: int) -> int:
+        """Note the number of a command."""
+        return self._note(("entry", count), number)
+
+    def _note(self, kind: tuple[str, str], number: int) -> int:
+        self.found.setdefault(kind, set()).add(number)
+        return number
+
+
+class Ranking:
+    """Replaces each number by its rank among those of its epoch; what comes before the first of an epoch stays."""
+
+    def __init__(self, found: Iterable[tuple[tuple[str, str], set[int]]]) -> None:
+        self.ranks: dict[tuple[str, str], dict[int, int]] = {}
+        for kind, numbers in found:
+            ranks = self.ranks[kind] = {}
+            first = 1 if kind[0] == "entry" else 0
+            counted: dict[int, int] = {}
+            for number in sorted(numbers):
+                epoch = number >> EPOCH_BITS
+                if number & _LOW == _LOW or number < first:
+                    ranks[number] = number
+                else:
+                    ranks[number] = (epoch << EPOCH_BITS) + counted.get(epoch, first)
+                    counted[epoch] = counted.get(epoch, first) + 1
+        self.changes_nothing = all(n == rank for ranks in self.ranks.values() for n, rank in ranks.items())
+        """Whether each number is its rank."""
+
+    def round(self, number: int) -> int:
+        """The rank of a round."""
+        return self.ranks["round", ""][number]
+
+    def report(self, controller: str, number: int) -> int:
+        """The rank of a report."""
+        return self.ranks["report", controller][number]
+
+    def entry(self, count: str, number: int) -> int:
+        """The rank of a command."""
+        return self.ranks["entry", count][number]
+
+
+def apply_message(message: Message, on: Numbering) -> Message:
+    """A message with its numbers replaced."""
+    match message:
+        case Report():
+            return replace(message, readiness=_readiness(message.controller, message.readiness, on))
+        case Vote() | Acknowledgement():
+            readiness = _readiness(message.controller, message.readiness, on)
+            return replace(message, round=on.round(message.round), readiness=readiness)
+        case VoteRequest() | Decision():
+            return replace(
+                message,
+                round=on.round(message.round),
+                closed_below=on.round(message.closed_below),
+                seen=on.report(message.controller, message.seen),
+            )
+        case Hello():
+            seen = on.report(message.controller, message.seen)
+            return replace(message, closed_below=on.round(message.closed_below), seen=seen)
+
+
+def apply(machine: LocalController | Coordinator, kept: Kept, on: Numbering) -> Kept:
+    """Replace the numbers of a machine, and return what it kept with its numbers replaced."""
+    known = _CONTROLLER if isinstance(machine, LocalController) else _COORDINATOR
+    if unknown := vars(machine).keys() - known:
+        raise TypeError(f"it is not known whether {sorted(unknown)} of {type(machine).__name__} hold numbers")
+    if isinstance(machine, Coordinator):
+        machine.next_round = on.round(machine.next_round)
+        machine.seen = {name: on.report(name, number) for name, number in machine.seen.items()}
+        for opened in machine.rounds.values():
+            opened.number = on.round(opened.number)
+        machine.rounds = {opened.number: opened for opened in machine.rounds.values()}
+        return {_key(key, on): value for key, value in kept.items()}
+    machine.promises = {on.round(number): promise for number, promise in machine.promises.items()}
+    machine.closed = {on.round(number) for number in machine.closed}
+    for above in machine.above.values():
+        above.closed_below, above.kept_below = on.round(above.closed_below), on.round(above.kept_below)
+        above.readiness = _readiness(machine.name, above.readiness, on)
+        above.told, above.seen = on.report(machine.name, above.told), on.report(machine.name, above.seen)
+    _commands(machine.commands, on)
+    return {_key(key, on): _value(key, value, machine.subnet, on) for key, value in kept.items()}
+
+
+def count_of(place: str, net: Net) -> str:
+    """What counts the commands of a place."""
+    return net.place(place).completion or place
+
+
+def _commands(commands: Commands, on: Numbering) -> None:
+    for command in commands.newest.values():
+        command.entry = on.entry(count_of(command.place, commands.subnet), command.entry)
+
+
+def _readiness(controller: str, readiness: Readiness, on: Numbering) -> Readiness:
+    return replace(readiness, sequence=on.report(controller, readiness.sequence))
+
+
+def _key(key: str, on: Numbering) -> str:
+    kind, slash, number = key.partition("/")
+    return f"{kind}/{on.round(int(number))}" if slash and kind in ("promise", "round") else key
+
+
+def _value(key: str, value: Stored, net: Net, on: Numbering) -> Stored:
+    match value:
+        case [int(below), [*numbers]] if key.startswith("closed"):
+            return on.round(below), tuple(on.round(int(str(number))) for number in numbers)
+        case [str(place), int(entry), str(stage)] if key.startswith(PREFIX):
+            return place, on.entry(count_of(place, net), entry), stage
+    return value

@@ -1,0 +1,202 @@
+"""The code of the protocol explored to the end on small nets, with faults: each act of it is actions of the proof."""
+
+from collections import Counter
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import pytest
+import support.abstraction
+from support import planted
+from support.gated_nets import GATE_READ_AGAIN, SENSOR
+from support.local_tie import LocalTie
+from support.reference import load_net
+
+from firable.decompose.protocol.parametric.logic import same
+from firable.decompose.protocol.parametric.script import Action, Demand
+from firable.decompose.protocol.parametric.system import PROTOCOL, Protocol, r, shadow
+from firable.decompose.splitting.cut import split
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.messages import Firing, ProtocolError
+from firable.executor.protocol.token_player import TokenPlayer
+from firable.executor.simulation.exploring import Budget, Configuration, Explorer, Space, explore
+from firable.executor.simulation.numbering import Collecting, Ranking, apply
+from firable.executor.simulation.snapshots import clone, frozen
+from firable.nets.catalogue import catalogue_net
+from firable.nets.decomposition import Decomposition
+
+NETS = ["local_gate", "remote_gate", "local_conflict", "local_output_conflict", "read_before_order", "ring"]
+LOSS, COPY, CRASH, GIVE_UP = Budget(losses=1), Budget(copies=1), Budget(crashes=1), Budget(giving_up=1)
+
+
+@cache
+def decomposition_of(name: str) -> Decomposition:
+    return split({"gate_read_again": GATE_READ_AGAIN, "sensor": SENSOR}.get(name) or load_net(name))
+
+
+def explored(name: str, budget: Budget, most: int, tie: LocalTie | None = None) -> Space:
+    return explore(Explorer(decomposition_of(name)), budget, max_configurations=most, watch=tie)
+
+
+@pytest.mark.parametrize("name", NETS)
+def test_without_faults_every_act_is_some_actions_of_the_proof_and_all_there_is_is_explored(name: str) -> None:
+    tie = LocalTie(decomposition_of(name))
+    assert explored(name, Budget(), 20_000, tie).complete
+    assert tie.actions["decide"] > 0
+
+
+@pytest.mark.parametrize("budget", [LOSS, COPY, GIVE_UP], ids=["loss", "copy", "giving up"])
+@pytest.mark.parametrize("name", ["remote_gate", "read_before_order", "local_conflict"])
+def test_with_one_fault_every_act_is_some_actions_of_the_proof_and_all_there_is_is_explored(
+    name: str, budget: Budget
+) -> None:
+    assert explored(name, budget, 30_000, LocalTie(decomposition_of(name))).complete
+
+
+@pytest.mark.parametrize("name", ["remote_gate", "local_conflict", "ring", "sensor"])
+def test_with_a_crash_every_act_is_some_actions_of_the_proof_as_far_as_it_is_explored(name: str) -> None:
+    tie = LocalTie(decomposition_of(name))
+    explored(name, CRASH, 3000, tie)
+    assert tie.actions["restart"] > 0
+
+
+def test_every_action_of_the_proof_is_met_with_faults_of_every_kind() -> None:
+    met: Counter[str] = Counter()
+    for name in ("local_conflict", "gate_read_again", "ring"):
+        tie = LocalTie(decomposition_of(name))
+        explored(name, Budget(1, 1, 1, 1), 2000, tie)
+        met += tie.actions
+    assert {action.name for action in PROTOCOL.actions} - set(met) <= {"sense"}
+
+
+def test_every_act_on_the_cell_is_some_actions_of_the_proof_as_far_as_it_is_explored() -> None:
+    decomposition = split(catalogue_net("one_robot"))
+    tie = LocalTie(decomposition)
+    explore(Explorer(decomposition), Budget(crashes=1), max_configurations=2500, watch=tie)
+    assert tie.actions["sense"] > 0
+
+
+@pytest.mark.parametrize("name", ["local_gate", "gate_read_again"])
+def test_from_every_configuration_something_fires_again_without_any_more_faults(name: str) -> None:
+    """Unless nothing is enabled in the central net any more."""
+    central = TokenPlayer.of(decomposition_of(name).net)
+    space = explore(Explorer(decomposition_of(name)), Budget(losses=1), max_configurations=40_000, edges=True)
+    assert space.complete
+    before: dict[Configuration, list[Configuration]] = {}
+    alive = set()
+    for at, steps in space.edges.items():
+        if not any(compiled.enabled(at.central) for compiled in central.transitions.values()):
+            alive.add(at)
+        for step, after in steps:
+            if step.kind == "lose":
+                continue
+            before.setdefault(after, []).append(at)
+            if any(isinstance(effect, Firing) for effect in step.effects):
+                alive.add(at)
+    todo = list(alive)
+    while todo:
+        for at in before.get(todo.pop(), ()):
+            if at not in alive:
+                alive.add(at)
+                todo.append(at)
+    assert len(alive) == space.configurations
+
+
+# --- What makes it end
+
+
+def test_numbers_are_replaced_in_their_order_and_within_their_epoch() -> None:
+    found = {("round", ""): {7, 9, (1 << 32) + 3}, ("report", "a"): {-1, (1 << 32) - 1, 5}}
+    ranking = Ranking(found.items())
+    assert [ranking.round(n) for n in (7, 9, (1 << 32) + 3)] == [0, 1, 1 << 32]
+    assert [ranking.report("a", n) for n in (-1, 5, (1 << 32) - 1)] == [-1, 0, (1 << 32) - 1]
+
+
+def test_a_field_that_may_hold_numbers_and_is_not_known_is_refused() -> None:
+    machine = LocalController(decomposition_of("ring"), "c1")
+    vars(machine)["added_later"] = 3
+    with pytest.raises(TypeError, match="added_later"):
+        apply(machine, {}, Collecting())
+
+
+def test_a_copy_of_a_machine_is_equal_and_shares_nothing_that_changes() -> None:
+    machine = LocalController(decomposition_of("ring"), "c1")
+    copy = clone(machine)
+    assert frozen(copy) == frozen(machine)
+    copy.closed.add(3)
+    copy.commands.newest.clear()
+    assert frozen(copy) != frozen(machine)
+    assert not machine.closed
+
+
+# --- A drift of the code is found
+
+
+CODE: list[tuple[type[Any], str, Budget]] = [
+    (planted.NoLock, "gate_read_again", Budget()),
+    (planted.ReadsUnlocked, "gate_read_again", Budget()),
+    (planted.AppliesTwice, "remote_gate", COPY),
+    (planted.VotesFromMemory, "gate_read_again", Budget()),
+    (planted.KeepsNoPromise, "remote_gate", CRASH),
+    (planted.KeepsNoMarking, "remote_gate", CRASH),
+    (planted.KeepsNoLocalFiring, "local_gate", CRASH),
+    (planted.ForgetsClosedRounds, "remote_gate", CRASH),
+    (planted.DecidesEarly, "remote_gate", Budget()),
+    (planted.CachedVotes, "gate_read_again", COPY),
+    (planted.CachedGates, "remote_gate", Budget()),
+    (planted.CommitsAborted, "remote_gate", GIVE_UP),
+    (planted.ClosesEarly, "remote_gate", Budget()),
+    (planted.KeepsNoDecision, "remote_gate", CRASH),
+    (planted.DropsDecisions, "remote_gate", CRASH),
+]
+
+
+@pytest.mark.parametrize(("fault", "name", "budget"), CODE, ids=[fault.__name__ for fault, _, _ in CODE])
+def test_a_drift_of_the_code_is_no_action_of_the_proof(fault: type[Any], name: str, budget: Budget) -> None:
+    decomposition = decomposition_of(name)
+    explorer = (
+        Explorer(decomposition, controller=fault)
+        if issubclass(fault, LocalController)
+        else Explorer(decomposition, coordinator=fault)
+    )
+    with pytest.raises((AssertionError, ProtocolError)):
+        explore(explorer, budget, max_configurations=8000, watch=LocalTie(decomposition))
+
+
+# --- A drift of the proof is found
+
+
+def drifts() -> list[tuple[str, Action]]:
+    """Each action, with one update left out, or with a demand that never holds."""
+    found = []
+    never = Demand("never", ~same(r, r))
+    for action in PROTOCOL.actions:
+        for update in action.updates:
+            if update.relation is not shadow:
+                left = tuple(each for each in action.updates if each is not update)
+                found.append((f"{action.name} without {update.relation.name}", replace(action, updates=left)))
+        if r in action.parameters:
+            found.append((f"{action.name} never", replace(action, demands=(*action.demands, never))))
+    return found
+
+
+@pytest.mark.parametrize(("words", "drifted"), drifts(), ids=[words for words, _ in drifts()])
+def test_a_drift_of_the_proof_is_found(words: str, drifted: Action, monkeypatch: pytest.MonkeyPatch) -> None:
+    actions = tuple(drifted if action.name == drifted.name else action for action in PROTOCOL.actions)
+    monkeypatch.setattr(support.abstraction, "PROTOCOL", Protocol(PROTOCOL.static, actions))
+    with pytest.raises(AssertionError):
+        explore_some()
+
+
+def explore_some() -> None:
+    """Enough for every action of the proof to be met."""
+    cases = (
+        ("local_conflict", Budget()),
+        ("remote_gate", COPY),
+        ("sensor", CRASH),
+        ("local_gate", COPY),
+        ("local_gate", GIVE_UP),
+        ("gate_read_again", Budget(1, 0, 1, 1)),
+    )
+    for name, budget in cases:
+        explored(name, budget, 2500, LocalTie(decomposition_of(name)))

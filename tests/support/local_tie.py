@@ -1,0 +1,288 @@
+"""Each act of a machine as actions of the proof, told of what this machine and the message that it met say alone.
+
+The actions of the parametric proof change either what one controller holds, or what the coordinator holds, and send
+messages. So an act of the code is held to them by one machine before and after it: its memory is told in the relations
+of the proof, with the messages that it may rely on having arrived; then `explain` must find actions that lead there,
+and whatever the act sends must be in the sets of messages that these actions have filled. As the same act is met in
+very many configurations and told once, all acts of an exhaustive exploration are held to the proof.
+
+What the code does beyond the proof is said here: a coordinator that has restarted answers votes of rounds that it does
+not know by an abort, which is none of the proof's where the round was committed and is over; whoever gets it has obeyed
+that round. A yes that was heard may be replaced by a newer no: that is a vote which was lost. And a coordinator that
+has restarted has forgotten votes and acknowledgements, which the proof only ever adds to: it hears them again.
+"""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
+
+from support.abstraction import Instance, differences, explain, net_structure, play, with_relations
+from support.finite_structures import Structure, Thing
+
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.deciders import TOP, closed_key
+from firable.executor.protocol.messages import (
+    Acknowledgement,
+    Decision,
+    Firing,
+    Hello,
+    Message,
+    Sending,
+    Vote,
+    VoteRequest,
+)
+from firable.executor.simulation.exploring import COORDINATOR, Configuration, Explorer, Step
+from firable.nets.decomposition import Decomposition
+
+Key = tuple[Thing, ...]
+Closed = tuple[int, frozenset[int]]
+"""Below which round all are closed, and which others."""
+
+
+class LocalTie:
+    """A watcher of an exploration that holds every act to the actions of the proof."""
+
+    def __init__(self, decomposition: Decomposition) -> None:
+        self.net = decomposition.net
+        self.structure = net_structure(decomposition, (), signals=True)
+        self.takes_part = self.structure.relations["takes-part"]
+        self.actions: Counter[str] = Counter()
+        self.acts: set[object] = set()
+
+    def __call__(self, explorer: Explorer, before: Configuration, step: Step, after: Configuration) -> None:
+        del after
+        if step.machine < 0:
+            return  # a message is lost: nobody does anything
+        coordinator = explorer.machine(before.machines[COORDINATOR])
+        assert isinstance(coordinator, Coordinator)
+        message = step.about if isinstance(step.about, Message) else None
+        asked: tuple[str, ...] = ()
+        if isinstance(message, Decision):
+            asked = self._asked(coordinator, message)
+        act = (step.kind, step.machine, step.before, step.after, step.about, asked)
+        if act in self.acts:
+            return
+        self.acts.add(act)
+        was, now = explorer.machine(step.before), explorer.machine(step.after)
+        if isinstance(was, Coordinator) and isinstance(now, Coordinator):
+            self._coordinator(was, now, step, message)
+        elif isinstance(was, LocalController) and isinstance(now, LocalController):
+            kept = [explorer.machines[number].kept.get(closed_key(TOP)) for number in (step.before, step.after)]
+            self._controller(was, now, _obeyed(kept[0]), _obeyed(kept[1]), step, message, asked)
+
+    def _asked(self, coordinator: Coordinator, message: Decision) -> tuple[str, ...]:
+        """What the round of a decision had asked of the controller; nothing is known of one that is over."""
+        opened = coordinator.rounds.get(message.round)
+        names = opened.transitions if opened is not None else ()
+        return tuple(t for t in names if (t, message.controller) in self.takes_part)
+
+    def _told(self, rounds: Iterable[int], **relations: Iterable[Key]) -> Structure:
+        numbers = tuple(sorted(set(rounds)))
+        things = {**self.structure.things, "Round": numbers, "Coordinator": ("",)}
+        one: dict[Thing, Thing] = dict.fromkeys(numbers, "")
+        functions = {**self.structure.functions, "coordinator-of": one}
+        return with_relations(replace(self.structure, things=things, functions=functions), **relations)
+
+    # --- A controller
+
+    def _controller(
+        self,
+        was: LocalController,
+        now: LocalController,
+        obeyed_before: Closed,
+        obeyed_after: Closed,
+        step: Step,
+        message: Message | None,
+        asked: tuple[str, ...],
+    ) -> None:
+        name = was.name
+        below = max(obeyed_before[0], obeyed_after[0])
+        rounds = {*was.promises, *now.promises, *obeyed_before[1], *obeyed_after[1]}
+        asked_of: dict[int, set[str]] = {}
+        for machine in (was, now):
+            for number, promise in machine.promises.items():
+                asked_of.setdefault(number, set()).update(promise.promised)
+        if isinstance(message, VoteRequest):
+            asked_of.setdefault(message.round, set()).update(message.transitions)
+        if isinstance(message, Decision):
+            asked_of.setdefault(message.round, set()).update(asked)
+            asked_of[message.round] |= {message.committed} if message.committed in was.parts else set()
+        rounds |= set(asked_of)
+        # Below what is closed, a promise that still stands is of a round that a restart of the coordinator gave up.
+        given_up = {number for number in was.promises if number < _below(now)}
+        asked_keys = [(r, t, name) for r, names in asked_of.items() for t in names]
+        commit = [
+            k for k in asked_keys if isinstance(message, Decision) and k[:2] == (message.round, message.committed)
+        ]
+        abort = [k for k in asked_keys if isinstance(message, Decision) and k[0] == message.round and k not in commit]
+        abort += [key for key in asked_keys if key[0] in given_up]
+        request = [k for k in asked_keys if isinstance(message, VoteRequest) and k[0] == message.round]
+
+        def told(machine: LocalController, kept: Closed) -> Structure:
+            marked = [*machine.subnet.names(machine.marking)]
+            marked += [s.name for s in machine.subnet.signals if machine.word & machine.player.signal_bit(s.name)]
+            promised = [(r, t, name) for r, promise in machine.promises.items() for t in promise.promised]
+            # Obeyed is what outlives a crash. Below what is closed, each round is closed or given up: told as closed.
+            obeyed = {key for key in asked_keys if key[0] < kept[0] or key[0] in kept[1]}
+            forgotten = {r for r in rounds if r < kept[0] and r not in given_up}
+            obeyed |= {(r, t.name, name) for r in forgotten for t in self.net.transitions}
+            return self._told(
+                rounds,
+                marked=[(each,) for each in marked],
+                begun=[(r,) for r in rounds],
+                closed=[(r,) for r in rounds if r < below and r not in given_up],
+                committed=[key[:2] for key in commit],
+                promised=promised,
+                obeyed=obeyed,
+                request=request,
+                commit_order=commit,
+                abort_order=abort,
+            )
+
+        first, last = told(was, obeyed_before), told(now, obeyed_after)
+        first = self._sending(first, "vote", first.relations["promised"])
+        first = self._sending(first, "acknowledgement", first.relations["obeyed"])
+        last = self._sending(last, "vote", first.relations["vote"] | last.relations["promised"])
+        fresh = last.relations["obeyed"] - first.relations["obeyed"]
+        ordered = frozenset(key for key in fresh if (key[0],) not in first.relations["closed"])
+        last = self._sending(last, "acknowledgement", first.relations["acknowledgement"] | ordered)
+        # What has been given up is released before anything else is done.
+        released: list[Instance] = [("release", (r, t, name)) for r in given_up for t in was.promises[r].promised]
+        first = play(first, released)
+        self.actions.update(action for action, _ in released)
+        fired = [e.transition for e in step.effects if isinstance(e, Firing)]
+        cleared = {self.net.place(e.place).completion for e in step.effects if isinstance(e, Sending)}
+        places = {place.name for place in self.net.places}
+        changed = {key[0] for key in first.relations["marked"] ^ last.relations["marked"]} - places
+        held = {key[0] for key in last.relations["marked"]}
+        sensed = sorted(str(each) for each in changed if each not in cleared or each in held)
+        self._explained(first, last, fired, sensed, step)
+        for effect in step.effects:
+            match effect:
+                case Vote():
+                    assert {(effect.round, t, name) for t in effect.promised} <= last.relations["vote"], step
+                case Acknowledgement() if effect.round in rounds:
+                    assert {k for k in asked_keys if k[0] == effect.round} <= last.relations["obeyed"], step
+
+    # --- The coordinator
+
+    def _coordinator(self, was: Coordinator, now: Coordinator, step: Step, message: Message | None) -> None:
+        known = {**now.rounds, **was.rounds}
+        rounds = set(known)
+        is_crash = step.kind.endswith("crash")
+        participants = {r: opened.participants for r, opened in known.items()}
+        keys = [(r, t, c) for r, o in known.items() for t in o.transitions for c in participants[r]]
+        asked_keys = [key for key in keys if key[1:] in self.takes_part]
+        votes: list[tuple[int, str, str]] = []
+        if isinstance(message, Vote) and message.round in rounds:
+            votes = [(message.round, t, message.controller) for t in message.promised]
+        notes: list[tuple[int, str, str]] = []
+        if isinstance(message, Acknowledgement):
+            notes = [key for key in asked_keys if (key[0], key[2]) == (message.round, message.controller)]
+
+        def told(machine: Coordinator) -> Structure:
+            begun = {r for r in rounds if r in was.rounds or r in machine.rounds}
+            over = {r for r in begun if r not in machine.rounds}
+            # A round that a crash has taken from memory was given up, then or before; any other that is gone is over.
+            lost = {r for r in over if is_crash and was.rounds[r].committed is None}
+            of = {r: machine.rounds.get(r) or was.rounds[r] for r in begun}
+            decided = over | {r for r in begun if of[r].decided}
+            committed = {r: str(of[r].committed) for r in decided if of[r].committed is not None}
+            heard = {
+                (r, t, c) for r in begun for c, yes in of[r].votes.items() for t in yes if (t, c) in self.takes_part
+            }
+            if machine is now and is_crash:  # votes and acknowledgements are not kept: to hear them again is no harm
+                heard |= {(r, t, c) for r, o in was.rounds.items() for c, yes in o.votes.items() for t in yes}
+                heard |= set(votes)
+            noted = {
+                key
+                for key in asked_keys
+                if key[0] in decided and (key[0] in over - lost or key[2] in of[key[0]].acknowledged)
+            }
+            if machine is now and is_crash:
+                noted |= {
+                    key for key in asked_keys if key[0] in was.rounds and key[2] in was.rounds[key[0]].acknowledged
+                }
+                noted |= {key for key in notes if was.rounds[key[0]].decided}
+            mine = [key for key in asked_keys if key[0] in begun]
+            return self._told(
+                rounds,
+                begun=[(r,) for r in begun],
+                asked=[key[:2] for key in mine],
+                heard=heard,
+                decided=[(r,) for r in decided],
+                committed=list(committed.items()),
+                noted=noted,
+                closed=[(r,) for r in over - lost],
+                request=mine,
+                vote=[*heard, *votes],
+                commit_order=[k for k in mine if k[0] in decided and committed.get(k[0]) == k[1]],
+                abort_order=[k for k in mine if k[0] in decided and committed.get(k[0]) != k[1]],
+                acknowledgement=[*noted, *notes],
+            )
+
+        first, last = told(was), told(now)
+        if is_crash:
+            self._keep(first, last, known)
+        # A yes that a newer no has replaced is a vote that was lost.
+        taken_back = first.relations["heard"] - last.relations["heard"]
+        if taken_back:
+            kept = first.relations["heard"] - taken_back
+            first = with_relations(first, heard=kept)
+        both = first.relations["vote"] | last.relations["vote"]
+        first, last = self._sending(first, "vote", both), self._sending(last, "vote", both)
+        arrived = first.relations["acknowledgement"]
+        last = self._sending(last, "acknowledgement", arrived)
+        if step.kind == "crash":
+            reached = play(first, [("restart", ("",))])
+            assert not differences(reached, last), (step, differences(reached, last))
+            self.actions["restart"] += 1
+        else:
+            self._explained(first, last, [], [], step)
+        for effect in step.effects if not is_crash else ():
+            match effect:
+                case VoteRequest():
+                    sent = {(effect.round, t, effect.controller) for t in effect.transitions}
+                    assert sent <= last.relations["request"], step
+                case Decision() if effect.round in rounds:
+                    orders = last.relations["commit-order"] | last.relations["abort-order"]
+                    sent = {k for k in asked_keys if (k[0], k[2]) == (effect.round, effect.controller)}
+                    assert sent <= orders, step
+                    assert (effect.round, effect.committed) in last.relations["committed"] or not effect.committed
+                case Decision():
+                    assert effect.committed is None, f"{effect} of a round that is not known"
+                    self.actions["(an old round is said to be over)"] += 1
+            if isinstance(effect, VoteRequest | Decision | Hello):
+                assert all(r >= effect.closed_below for r in now.rounds), f"{effect} while an older round is open"
+
+    def _keep(self, first: Structure, last: Structure, known: object) -> None:
+        lost = first.relations["committed"] - last.relations["committed"]
+        assert not lost, f"a crash has lost what was committed: {lost}, {known}"
+
+    # --- Both
+
+    def _sending(self, structure: Structure, relation: str, keys: Iterable[Key]) -> Structure:
+        return with_relations(structure, **{relation: keys})
+
+    def _explained(self, first: Structure, last: Structure, fired: list[str], sensed: list[str], step: Step) -> None:
+        # What the central net holds is not in one machine; that it can follow is proved of these same actions.
+        def compared(structure: Structure) -> Structure:
+            return with_relations(structure, shadow=last.relations["shadow"])
+
+        try:
+            steps: list[Instance] = explain(first, last, fired, sensed, compared)
+        except AssertionError as failed:
+            raise AssertionError(f"{step.kind} at {step.machine} of {step.about}: {failed}") from failed
+        self.actions.update(name for name, _ in steps)
+
+
+def _obeyed(kept: object) -> Closed:
+    match kept:
+        case [int(below), [*numbers]]:
+            return below, frozenset(int(str(number)) for number in numbers)
+    return 0, frozenset()
+
+
+def _below(machine: LocalController) -> int:
+    return max((above.closed_below for above in machine.above.values()), default=0)
