@@ -16,7 +16,8 @@ sent. Messages between the tasks do not wait, see `journal`. What a restart then
 Operator's controls. *Pause*: no further firing; rounds that are not decided are aborted, machines end the command they
 are at. *Step*: while paused, one firing. *Stop*: no further firing, ever; what is decided is applied and commanded,
 which takes no time in one process, then the driver drives the safe outputs, which stop every machine where it is.
-*Stop at the end of the cycle*: no new work comes in, and the run ends when the cell is at rest.
+*Stop at the end of the cycle*: no new work comes in, and the run ends when the cell is at rest. *Emergency stop*: the
+safe outputs first, then everything else.
 """
 
 from __future__ import annotations
@@ -30,10 +31,13 @@ from typing import Final, assert_never
 from firable.executor.drivers.driver import Driver
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.operating import restart
+from firable.executor.operating.figures import Figures
 from firable.executor.operating.mailbox import Continue, Mailbox, SignalRead
+from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import Situation, State, blocked
 from firable.executor.operating.taken_up import TRACE
+from firable.executor.operating.watching import Watching
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
@@ -97,11 +101,19 @@ class Execution:
         said: Mapping[str, Answer] | None = None,
         begin_seconds: float = 0.0,
         tell: Callable[[str, str], None] | None = None,
+        monitor: Monitor | None = None,
+        stop_at_divergence: bool = False,
+        figures: Figures | None = None,
     ) -> None:
         self.net = decomposition.net
         self.driver = driver
         self.recorder = recorder
         self.overdue_seconds = overdue_seconds
+        self.divergence: Divergence | None = None
+        self.stop_at_divergence = stop_at_divergence
+        self.watching = None if monitor is None else Watching(monitor, self._diverged)
+        self.figures = figures
+        recorder.observers += [one.seen for one in (self.watching, figures) if one is not None]
         self.is_complete = is_complete
         self.operator = operator
         self.tell = tell
@@ -129,6 +141,9 @@ class Execution:
         self.paused = False
         self.stopping = False
         self.draining = False
+        self.is_safe = False
+        """Whether the safe outputs are driven; commands that were issued and did not leave are asked after, later."""
+        self.ended_by = "stopped by the operator"
         self.fault = ""
         self.operated = operator is not None
         self.overdue: dict[str, asyncio.TimerHandle] = {}
@@ -149,6 +164,8 @@ class Execution:
         loop = asyncio.get_running_loop()
         self.clock = RunClock(loop, loop.time() - self.begin_seconds / self.speed, self.speed)
         self.outcome = loop.create_future()
+        if self.watching is not None:
+            self.watching.begin(self.clock)
         for name, coordinator in self.coordinators.items():
             self._act(name, coordinator.start())
         for name, controller in self.controllers.items():
@@ -179,6 +196,8 @@ class Execution:
             await asyncio.gather(*tasks, return_exceptions=True)
             for alarm in (*self.overdue.values(), *self.ticks.values()):
                 alarm.cancel()
+            if self.watching is not None:
+                self.watching.end()
 
     def now_seconds(self) -> float:
         """The time since the run began."""
@@ -272,6 +291,20 @@ class Execution:
         self.recorder.note(self.now_seconds(), "stopped by the operator")
         self._permit(0)
         self._settle()
+
+    def emergency_stop(self, reason: str) -> None:
+        """Drive the safe outputs at once, before anything is written or said; the run ends, and can be taken up."""
+        self.driver.stop()
+        self.is_safe = True
+        self.stopping = self.paused = True
+        self.ended_by = f"emergency stop: {reason}"
+        self.recorder.note(self.now_seconds(), "emergency stop", reason=reason)
+        self._permit(0)
+        self._settle()
+
+    def commanded(self, command: str, by: str) -> None:
+        """Who commanded what stands in the trace."""
+        self.recorder.note(self.now_seconds(), "commanded", command=command, by=by)
 
     async def quiet(self) -> None:
         """Wait until no message is under way."""
@@ -398,15 +431,19 @@ class Execution:
                         self.recorder.sent(self.now_seconds(), place)
                     self.leaving.append(effect)
                 case VoteRequest() | Decision() | Hello():
-                    self.messages += 1
-                    self._post(effect.controller, effect)
+                    self._say(effect.controller, effect)
                 case Report() | Vote() | Acknowledgement():
-                    self.messages += 1
-                    self._post(effect.coordinator, effect)
+                    self._say(effect.coordinator, effect)
                 case Keep():
                     pass  # the journal has it
                 case _:
                     assert_never(effect)
+
+    def _say(self, receiver: str, message: Message) -> None:
+        self.messages += 1
+        if self.figures is not None:
+            self.figures.message(message)
+        self._post(receiver, message)
 
     def _fired(self, transition: str) -> None:
         now = self.now_seconds()
@@ -426,7 +463,7 @@ class Execution:
             self.leaving.clear()  # the run ends, and nothing of this is ever sent
             raise
         self.recorder.flush()
-        while self.leaving:
+        while self.leaving and not self.is_safe:
             self._send(self.leaving.popleft())
 
     def _send(self, sending: Sending) -> None:
@@ -473,6 +510,13 @@ class Execution:
         for name, coordinator in self.coordinators.items():
             self._act(name, coordinator.permit(firings))
 
+    def _diverged(self, found: Divergence) -> None:
+        """The machines do what their model excludes."""
+        self.divergence = found
+        self.recorder.note(found.at_seconds, "divergence", message=str(found))
+        if self.stop_at_divergence:
+            self._fail(f"the machines are not as they are modelled: {found}")
+
     def _post(self, mailbox: str, item: Message | SignalRead | Continue) -> None:
         self.under_way += 1
         self.mailboxes[mailbox].post(item)
@@ -508,7 +552,7 @@ class Execution:
         if self.fault:
             return self.situation()
         if self.stopping:
-            return replace(self.situation(), state=State.STOPPED, message="stopped by the operator")
+            return replace(self.situation(), state=State.STOPPED, message=self.ended_by)
         if self.taking_up is not None:
             return self.situation() if self.taking_up.is_final and not self.operated else None
         # What a pause holds back still has to fire before the cycle, or the work, is at its end.

@@ -36,7 +36,7 @@ from firable.nets.machines.laws import Laws
 from firable.nets.machines.loop import Sending
 from firable.nets.machines.plant_file import Carry, PlantModel, Put, Stop
 from firable.nets.net import Marking, Net
-from firable.semantics.trace import CommandSent, Fired, Noted, SignalChanged, Trace
+from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged, Trace
 
 LATENCY_SECONDS: Final = 0.5
 """How long after its change a signal is taken at the latest, unless a caller knows better."""
@@ -132,6 +132,20 @@ class Monitor:
         self.divergence: Divergence | None = None
         """The first divergence; after it nothing is watched."""
         self.belief = self._closed({loop.net.initial_marking: (_NEVER,) * len(self.signals)}, 0.0)
+
+    def seen(self, event: Event) -> Divergence | None:
+        """An event of a trace; the divergence that it shows, if it is the first."""
+        match event:
+            case Fired(at, (transition,)):
+                return self.fired(at, transition)
+            case Fired():
+                raise ValueError("a cell fires one transition at a time, and this is a trace of steps")
+            case SignalChanged(at, name, value):
+                return self.signal(at, name, value)
+            case CommandSent(at, place):
+                return self.sent(at, place)
+            case Noted(at):
+                return self.passed(at)
 
     def fired(self, at_seconds: float, transition: str) -> Divergence | None:
         """A transition of the cell has fired."""
@@ -299,16 +313,7 @@ class Monitor:
 def watch(monitor: Monitor, trace: Trace) -> Divergence | None:
     """Hold a whole trace against the model, from its first event to its last line; the first divergence, if any."""
     for event in trace.events:
-        match event:
-            case Fired(at, transitions):
-                for transition in transitions:
-                    monitor.fired(at, transition)
-            case SignalChanged(at, name, value):
-                monitor.signal(at, name, value)
-            case CommandSent(at, place):
-                monitor.sent(at, place)
-            case Noted(at):
-                monitor.passed(at)
+        monitor.seen(event)
     if trace.end is not None:
         monitor.passed(trace.end.at_seconds)
     return monitor.divergence

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, Protocol
@@ -110,6 +110,8 @@ class Recorder:
         self.unwritten: list[str] = []
         self.waiting = 0
         """How many events were recorded since the last flush."""
+        self.observers: list[Callable[[Event], None]] = []
+        """Who is shown each event as it is recorded."""
         if isinstance(kept, Mapping):
             self.word = int(str(kept["word"]), 16)
             self.at_seconds = float(str(kept["at"]))
@@ -184,6 +186,9 @@ class Recorder:
             self.at_seconds = item.at_seconds
         if self.stream is not None:
             self.unwritten.append(json.dumps(item.to_json()) + "\n")  # in ASCII: as many bytes as characters
+        if not isinstance(item, Header | End):
+            for observer in self.observers:
+                observer(item)
 
 
 def size_bytes_of(kept: Stored | None) -> int:
