@@ -23,6 +23,7 @@ from firable.cli import (
     convert,
     draw,
     live_io,
+    operate,
     prove,
     refine,
     rehearse,
@@ -41,6 +42,7 @@ from firable.cli.text import show_errors
 EXTRAS = {
     **dict.fromkeys(("z3", "networkx", "numpy", "platformdirs"), ("prove", "all that checking and proving need")),
     "mtkahypar": ("split", "what looks for owners of large nets"),
+    **dict.fromkeys(("aiohttp", "prometheus_client"), ("serve", "what lets an operator act from elsewhere")),
     "zenoh": ("zenoh", "the link between hosts over a network"),
     "serial": ("serial", "what serial lines need"),
     "pymodbus": ("modbus", "what Modbus devices need"),
@@ -76,6 +78,7 @@ for _command in (
     bundle.bundle,
     sign.sign,
     run.run,
+    operate.operate,
     takeover.takeover,
     replay.replay,
     rehearse.rehearse,

@@ -10,6 +10,7 @@ import click
 from firable.cli import text
 from firable.cli.bound_run import run_bound_of, show_bound
 from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
+from firable.cli.operate import ServeOptions, serve_options
 from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
@@ -46,6 +47,14 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
     multiple=True,
     help="Of a command whose machine cannot tell, after a restart: done, working, or not-received.",
 )
+@click.option(
+    "--watch",
+    type=click.Choice(["tell", "stop", "ignore"]),
+    default="tell",
+    show_default=True,
+    help="What to do when the machines do what their plant file excludes.",
+)
+@serve_options
 @click.option("--step", is_flag=True, help="Fire one transition at a time, by the keys above.")
 @format_option
 def run(
@@ -57,6 +66,11 @@ def run(
     trace: str | None,
     trust: tuple[str, ...],
     say: tuple[str, ...],
+    watch: str,
+    serve: str | None,
+    token_file: str | None,
+    serve_tls: tuple[str, str] | None,
+    operators: str | None,
     step: bool,
     format_: str,
     **host: Any,
@@ -76,6 +90,12 @@ def run(
 
     With --bind, all runs on the machines of a binding, in real time, until Ctrl-C; what they carry it does not count.
 
+    While it runs, the machines are held against their plant file: the first thing that they do and cannot have done, or
+    have not done and must have, is told, and with --watch stop it ends the run.
+
+    With --serve, in real time, `firable operate` pauses, steps and stops the run from elsewhere, and Prometheus reads
+    its figures; everybody is asked for a token or a certificate, and beyond this host nothing goes without TLS.
+
     With --controller, only these controllers run here, on machines that --bind names, and the others on hosts that are
     linked to this one by --listen and --join, or by --serial. A host that holds another bundle is refused. The run ends
     by Ctrl-C; `firable replay` joins the traces of all hosts. Without machines, --dry-run tries all that.
@@ -84,9 +104,15 @@ def run(
     if not options.is_one_of_several:
         options.refuse_alone()
 
+    served = ServeOptions(serve, token_file, serve_tls, operators)
+    if serve is not None and _SPEEDS[speed] is None:
+        raise click.UsageError("in virtual time a run is over before anybody acts: with --serve, name --speed 1 or 10")
+    if serve is not None and options.is_one_of_several:
+        raise click.UsageError("--serve is of a run of the whole cell, and not of one host among others")
+
     def make() -> Report:
         from firable.cli.stepping import stepping
-        from firable.executor import load, read_plant
+        from firable.executor import Watch, load, read_plant
         from firable.executor import run as run_bundle
 
         loaded = load(bundle, trust)
@@ -116,6 +142,7 @@ def run(
         model = read_plant(plant_file)
         if trace is not None:
             _refuse_to_overwrite(trace, bundle, plant_file, *_files_beside(options.journal))
+        endpoint = served.endpoint()
         report = run_bundle(
             loaded,
             model,
@@ -126,6 +153,9 @@ def run(
             journal_path=options.journal,
             resume=options.resume,
             said=_said(loaded.net, say, options.journal),
+            watch=Watch(watch),
+            endpoint=endpoint,
+            served=None if endpoint is None else lambda address: _tell_served(address, endpoint.token, token_file),
             operator=stepping(_SPEEDS[speed], to_stderr=format_ == "json") if step else None,
         )
         return Report(
@@ -138,6 +168,11 @@ def run(
         )
 
     return answer("run", format_, make, _show)
+
+
+def _tell_served(address: str, token: str, token_file: str | None) -> None:
+    who = f"the token in {token_file}" if token_file is not None else f"the token {token}"
+    click.echo(f"operate this run at {address} with {who}", err=True)
 
 
 def _files_beside(journal: str | None) -> tuple[str, ...]:
@@ -210,7 +245,7 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
         report.state, Status.VIOLATED
     )
     intact = not report.lost and not report.doubled
-    return (
+    verdicts = [
         Verdict(
             "workpieces-carried-through",
             ended,
@@ -227,7 +262,20 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
             method,
             subjects=tuple(f"workpiece {i}" for i in (*report.lost, *report.doubled)),
         ),
-    )
+    ]
+    if report.watched:
+        found = report.divergence
+        verdicts.append(
+            Verdict(
+                "machines-as-modelled",
+                Status.PROVED if found is None else Status.VIOLATED,
+                "the machines did what the plant file allows, as far as signals show",
+                method,
+                hint="" if found is None else f"at {found.at_seconds:.2f} s: {found.message}",
+                subjects=() if found is None else found.places,
+            )
+        )
+    return tuple(verdicts)
 
 
 def _show(report: Report) -> None:
@@ -255,6 +303,8 @@ def _show(report: Report) -> None:
     if several:
         told = ", ".join(f"{count:,} by {name}" for name, count in done["decided"].items())
         click.echo(f"  decided: {told}")
+    if done["state"] == "stopped":
+        click.echo(f"  {done['message']}")
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
     if refuted:
         text.show_verdicts(report.net, refuted)

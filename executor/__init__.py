@@ -18,7 +18,7 @@ imports `semantics` and `nets` and nothing that proves.
 from firable.executor.cell.plant import Disturbance, Drops, NeverCompletes, StuckSensor
 from firable.executor.drivers.driver import Driver
 from firable.executor.operating.execution import Execution
-from firable.executor.operating.running import Operator, RunReport, execute, load, run
+from firable.executor.operating.running import Operator, RunReport, Watch, execute, load, run
 from firable.executor.operating.situation import Blocked, Situation, State
 from firable.executor.protocol.commands import Answer
 from firable.nets.machines.plant_file import PlantModel, read_plant
@@ -37,6 +37,7 @@ __all__ = [
     "Situation",
     "State",
     "StuckSensor",
+    "Watch",
     "execute",
     "load",
     "read_plant",

@@ -115,6 +115,7 @@ CODES: Final[dict[str, str]] = {
     "F5060": "an operator's endpoint that is open to everybody",
     "F5061": "an operator's endpoint that cannot be served",
     "F5062": "a certificate that cannot be used",
+    "F5063": "a run that cannot be operated",
     "F5101": "the binding does not fit the net",
     "F5102": "not an address that the device has",
     "F5103": "unknown or unusable driver",

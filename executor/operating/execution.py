@@ -304,7 +304,7 @@ class Execution:
 
     def commanded(self, command: str, by: str) -> None:
         """Who commanded what stands in the trace."""
-        self.recorder.note(self.now_seconds(), "commanded", command=command, by=by)
+        self.recorder.note(self.now_seconds(), "commanded", what=command, by=by)
 
     async def quiet(self) -> None:
         """Wait until no message is under way."""

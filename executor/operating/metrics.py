@@ -11,9 +11,10 @@ count into each other.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Final
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Summary, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Metric, Summary, generate_latest
 
 from firable.executor.protocol.messages import Decision, Message, Vote
 from firable.nets.net import Net
@@ -22,6 +23,18 @@ from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChan
 CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
 
 _CYCLE_SECONDS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 45, 60, 90, 120, 300, 600, 1800, 3600)
+
+
+class _WithoutBirthdays:
+    """A registry without the times at which its series were made, one for each number: they say nothing of the cell."""
+
+    def __init__(self, registry: CollectorRegistry) -> None:
+        self.registry = registry
+
+    def collect(self) -> Iterator[Metric]:
+        for metric in self.registry.collect():
+            metric.samples = [sample for sample in metric.samples if not sample.name.endswith("_created")]
+            yield metric
 
 
 class Metrics:
@@ -120,7 +133,7 @@ class Metrics:
 
     def text(self) -> bytes:
         """All figures in Prometheus' text format."""
-        return generate_latest(self.registry)
+        return generate_latest(_WithoutBirthdays(self.registry))
 
     def _fired(self, at_seconds: float, name: str) -> None:
         self.firings.labels(name).inc()

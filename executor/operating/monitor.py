@@ -57,6 +57,15 @@ class Divergence:
     message: str
     places: tuple[str, ...]
 
+    def to_json(self) -> dict[str, object]:
+        """The divergence as JSON data."""
+        return {
+            "at_seconds": self.at_seconds,
+            "subject": self.subject,
+            "message": self.message,
+            "places": list(self.places),
+        }
+
     def __str__(self) -> str:
         touched = f" (touches {', '.join(self.places)})" if self.places else ""
         return f"{self.message}{touched}"

@@ -12,11 +12,12 @@ from __future__ import annotations
 import asyncio
 import signal
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from firable.executor.cell.plant import Disturbance, Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
@@ -24,6 +25,7 @@ from firable.executor.drivers.binding import Binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.operating.execution import Execution
+from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.recorder import LineStream
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.taken_up import opened
@@ -35,6 +37,19 @@ from firable.nets.layers import Layers
 from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.nets.net import Net
 from firable.nets.right_to_run import unproved
+
+if TYPE_CHECKING:  # these need the extra `serve`
+    from firable.executor.operating.control import Endpoint
+    from firable.executor.operating.metrics import Metrics
+
+
+class Watch(StrEnum):
+    """What to do when the machines do what their model excludes: tell, or stop them too; or do not look."""
+
+    TELL = "tell"
+    STOP = "stop"
+    IGNORE = "ignore"
+
 
 Operator = Callable[[Execution], Awaitable[None]]
 """A coroutine that runs beside the cell and uses its controls."""
@@ -55,6 +70,10 @@ class RunReport:
     decided: Mapping[str, int]
     """How many transitions each coordinator has committed."""
     simulated_seconds: float
+    watched: bool = False
+    """Whether the machines were held against their plant file, from the beginning."""
+    divergence: Divergence | None = None
+    """The first thing that they did and could not have done, or did not and must have."""
 
     @property
     def state(self) -> State:
@@ -77,6 +96,7 @@ class RunReport:
             "messages": self.messages,
             "decided": dict(self.decided),
             "simulated_seconds": self.simulated_seconds,
+            **({} if self.divergence is None else {"divergence": self.divergence.to_json()}),
         }
 
 
@@ -109,12 +129,18 @@ def run(
     journal_path: Path | str | None = None,
     resume: bool = False,
     said: Mapping[str, Answer] | None = None,
+    watch: Watch = Watch.TELL,
+    endpoint: Endpoint | None = None,
+    served: Callable[[str], None] | None = None,
 ) -> RunReport:
     """Run a bundle on the simulated cell of a plant until `workpieces` workpieces have gone through.
 
     With a journal, a run whose process was killed is taken up where it was. It is held then, and ends at once as
     `State.HELD`, unless an operator is there, or `resume` says beforehand that it may go on as soon as each command is
     accounted for; `said` gives the operator's word on those that no machine can tell of, by place.
+
+    The machines are held against their plant file as the run goes (`watch`). With an `endpoint` an operator may act
+    from elsewhere, in real time; `served` is told the address.
 
     `speed` None is virtual time, 1.0 real time, 10.0 ten times as fast. A command that is not completed within
     `overdue_seconds` (of the cell's time) is a fault. Raises `InputError` F5002 where the bundle is not proved, F5003
@@ -137,6 +163,9 @@ def run(
         digest=bundle.digest,
         resume=resume,
         said=said,
+        watch=watch,
+        endpoint=endpoint,
+        served=served,
     )
 
 
@@ -155,6 +184,9 @@ def execute(
     digest: str = "",
     resume: bool = False,
     said: Mapping[str, Answer] | None = None,
+    watch: Watch = Watch.TELL,
+    endpoint: Endpoint | None = None,
+    served: Callable[[str], None] | None = None,
 ) -> RunReport:
     """Run a decomposition, proved or not, on the simulated cell of a plant; parameters as for `run`.
 
@@ -163,6 +195,9 @@ def execute(
     _check(plant, decomposition.net, workpieces, speed, overdue_seconds)
     cell = Plant(plant, workpieces=workpieces, seed=seed, disturbances=disturbances)
     with opened(decomposition, digest, plant, workpieces, seed, journal_path, trace) as files:
+        # A run that is taken up may begin in any marking of the machines, which no model of them tells.
+        watched = watch is not Watch.IGNORE and not files.is_taken_up
+        figures = _figures(decomposition.net) if endpoint is not None else None
         execution = Execution(
             decomposition,
             SimulatedDriver(cell, decomposition.net, files.cell),
@@ -175,8 +210,13 @@ def execute(
             resume=resume,
             said=said,
             begin_seconds=files.begin_seconds,
+            monitor=Monitor(decomposition.net, plant) if watched else None,
+            stop_at_divergence=watch is Watch.STOP,
+            figures=figures,
         )
         main = _terminable(execution)
+        if endpoint is not None and figures is not None:
+            main = _serving(main, execution, endpoint, figures.text, served)
         situation = run_in_virtual_time(main) if speed is None else asyncio.run(main)
         files.recorder.end(execution.now_seconds(), situation.state.value)
     delivered = tuple(workpiece.id for workpiece in cell.delivered)
@@ -192,6 +232,8 @@ def execute(
         messages=execution.messages,
         decided=_decided(decomposition, files.recorder.firings),
         simulated_seconds=execution.now_seconds(),
+        watched=watched,
+        divergence=execution.divergence,
     )
 
 
@@ -265,6 +307,31 @@ async def _terminable(execution: Execution) -> Situation:
         with suppress(NotImplementedError, RuntimeError, ValueError):
             asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
     return await execution.main()
+
+
+async def _serving(
+    main: Coroutine[Any, Any, Situation],
+    execution: Execution,
+    endpoint: Endpoint,
+    figures: Callable[[], bytes],
+    served: Callable[[str], None] | None,
+) -> Situation:
+    """The execution, on which an operator may act from elsewhere for as long as it lasts."""
+    from firable.executor.operating.control import serving
+
+    try:
+        async with serving(execution, endpoint, figures) as address:
+            if served is not None:
+                served(address)
+            return await main
+    finally:
+        main.close()
+
+
+def _figures(net: Net) -> Metrics:
+    from firable.executor.operating.metrics import Metrics
+
+    return Metrics(net)
 
 
 def _check(

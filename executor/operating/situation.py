@@ -47,7 +47,7 @@ class Blocked:
         reasons = [f"a token on {place}" for place in self.empty]
         reasons += [f"{place} to become empty" for place in self.full]
         reasons += [f"{signal}" if wanted else f"not {signal}" for signal, wanted in self.gates]
-        return f"{self.transition} waits for {', '.join(reasons)}"
+        return f"{self.transition} waits for {', '.join(reasons)}" if reasons else f"{self.transition} is enabled"
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,6 +41,8 @@ class Files:
     recorder: Recorder
     cell: CellLog | None
     begin_seconds: float
+    is_taken_up: bool
+    """Whether it goes on from where an earlier process, or bundle, was."""
 
 
 @contextmanager
@@ -79,7 +81,9 @@ def opened(
         recorder = Recorder(net, net_digest(net), trace, kept)
         if begun and kept is None:
             recorder.word = _joint(decomposition, journal)
-        yield Files(journal, recorder, cell, max(recorder.at_seconds, cell.end_seconds if cell is not None else 0.0))
+        yield Files(
+            journal, recorder, cell, max(recorder.at_seconds, cell.end_seconds if cell is not None else 0.0), begun
+        )
 
 
 def _demand_the_same(path: Path | str, kept: Stored | None) -> None:

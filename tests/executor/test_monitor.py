@@ -10,7 +10,8 @@ import pytest
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.plant import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.operating.monitor import Divergence, Monitor, watch
-from firable.executor.operating.running import execute
+from firable.executor.operating.running import RunReport, Watch, execute
+from firable.executor.operating.situation import State
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.plant_file import Move, PlantModel
@@ -153,3 +154,30 @@ def test_a_plant_of_another_cell_is_refused() -> None:
     with pytest.raises(InputError) as caught:
         Monitor(catalogue_net("one_robot"), catalogue_plant("two_cells"))
     assert {diagnostic.code for diagnostic in caught.value.diagnostics} == {"F5003"}
+
+
+def test_a_run_tells_of_silence_when_it_begins_and_goes_on_or_stops_as_was_said() -> None:
+    def run(watch: Watch) -> RunReport:
+        return execute(
+            split(catalogue_net("one_robot")),
+            catalogue_plant("one_robot"),
+            workpieces=3,
+            disturbances=[NeverCompletes("R", "MOVE", 3)],
+            watch=watch,
+        )
+
+    told, stopped, ignored = run(Watch.TELL), run(Watch.STOP), run(Watch.IGNORE)
+    assert told.divergence is not None
+    assert told.divergence == stopped.divergence
+    assert "overdue" in told.situation.message
+    assert "the machines are not as they are modelled" in stopped.situation.message
+    assert stopped.state is State.FAULT
+    assert stopped.simulated_seconds < told.divergence.at_seconds + 0.001 < told.simulated_seconds - 100
+    assert (ignored.watched, ignored.divergence) == (False, None)
+
+
+def test_a_run_of_machines_as_they_are_modelled_diverges_nowhere() -> None:
+    report = execute(split(catalogue_net("two_cells")), catalogue_plant("two_cells"), workpieces=5, watch=Watch.STOP)
+    assert report.state is State.DONE
+    assert report.watched
+    assert report.divergence is None

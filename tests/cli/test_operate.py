@@ -1,0 +1,114 @@
+"""A run in real time that an operator acts on from another process."""
+
+from __future__ import annotations
+
+import json
+import re
+import stat
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from firable.cli.main import main
+from firable.executor.operating.control import new_token
+from firable.semantics.trace import CommandSent, Noted, read_trace
+
+SECONDS_MAX = 60.0
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("operate") / "cell.bundle"
+    assert main(["bundle", "catalogue:one_robot", "-o", str(path)]) == 0
+    return path
+
+
+@pytest.fixture
+def served(bundle: Path, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str, Path]]:
+    """A run of 50 workpieces, which would take minutes; its address and its folder."""
+    arguments = ["--speed", "1", "--workpieces", "50", "--serve", "127.0.0.1:0", "--format", "json"]
+    files = ["--token-file", str(tmp_path / "token"), "--trace", str(tmp_path / "run.trace")]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "firable.cli", "run", str(bundle), *arguments, *files],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stderr is not None
+        told = re.search(r"http://\S+", process.stderr.readline())
+        assert told is not None
+        yield process, told.group(), tmp_path
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def operate(address: str, command: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    assert main(["operate", address, command, "--token-file", str(folder / "token")]) == 0
+    return capsys.readouterr().out
+
+
+def test_an_operator_pauses_steps_resumes_and_stops_a_run_at_once(
+    served: tuple[subprocess.Popen[str], str, Path], bundle: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    process, address, folder = served
+    assert "tokens on" in operate(address, "situation", folder, capsys)
+    assert operate(address, "pause", folder, capsys).startswith("paused")
+    deadline = time.monotonic() + SECONDS_MAX
+    while not (told := operate(address, "step", folder, capsys)).startswith("fired"):
+        assert told.startswith("nothing is enabled")
+        assert time.monotonic() < deadline
+    assert "firable_firings_total" in operate(address, "metrics", folder, capsys)
+    operate(address, "resume", folder, capsys)
+    operate(address, "emergency-stop", folder, capsys)
+    out, _ = process.communicate(timeout=SECONDS_MAX)
+    assert process.returncode == 3, "whether all workpieces go through is not known"
+    report = json.loads(out)["reports"][0]["run"]
+    assert report["message"] == "emergency stop: by token"
+    trace = read_trace(folder / "run.trace")
+    notes = [event for event in trace.events if isinstance(event, Noted)]
+    assert {note.data.get("what") for note in notes} >= {"pause", "step", "resume", "emergency-stop"}
+    stopped = next(note.at_seconds for note in notes if note.note == "emergency stop")
+    assert not [e for e in trace.events if isinstance(e, CommandSent) and e.at_seconds > stopped]
+    assert main(["replay", str(folder / "run.trace"), "--net", str(bundle)]) == 0
+
+
+def test_the_token_is_for_its_owner_alone_and_no_other_gets_in(
+    served: tuple[subprocess.Popen[str], str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, address, folder = served
+    assert stat.S_IMODE((folder / "token").stat().st_mode) == 0o600
+    (folder / "other").write_text(new_token())
+    assert main(["operate", address, "stop", "--token-file", str(folder / "other")]) == 2
+    assert "error[F5063]" in capsys.readouterr().err
+    assert "tokens on" in operate(address, "situation", folder, capsys)
+
+
+def test_a_run_that_is_not_there_is_one_clear_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "token").write_text(new_token())
+    assert main(["operate", "http://127.0.0.1:9", "stop", "--token-file", str(tmp_path / "token")]) == 2
+    assert "error[F5063]" in capsys.readouterr().err
+    assert main(["operate", "http://127.0.0.1:9", "stop", "--token-file", str(tmp_path / "none")]) == 2
+    assert "error[F1001]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--serve", "127.0.0.1:8080"], "in virtual time a run is over"),
+        (["--serve", "8080", "--speed", "1"], "write ADDRESS:PORT"),
+        (["--serve", "0.0.0.0:8080", "--speed", "1"], "F5060"),
+        (["--token-file", "t"], "say with --serve"),
+        (["--serve", "127.0.0.1:8080", "--speed", "1", "--operators", "ca.pem"], "name --serve-tls"),
+    ],
+)
+def test_what_cannot_be_served_is_refused_before_the_run_begins(
+    bundle: Path, arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", str(bundle), *arguments]) == 2
+    assert told in capsys.readouterr().err
