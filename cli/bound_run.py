@@ -8,11 +8,13 @@ import click
 
 from firable.cli import text
 from firable.cli.report import Report
+from firable.cli.watched import machines_verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
-    from firable.executor import Answer, Operator, RunReport
+    from firable.executor import Answer, Operator, PlantModel, RunReport, Watch
+    from firable.executor.operating.control import Endpoint
     from firable.nets.bundle import Bundle
     from firable.nets.verdict import Verdict
 
@@ -27,6 +29,10 @@ def run_bound_of(
     said: Mapping[str, Answer],
     *,
     resume: bool,
+    plant: PlantModel | None,
+    watch: Watch,
+    endpoint: Endpoint | None,
+    served: Callable[[str], None] | None,
 ) -> Report:
     """Run until the operator stops it or nothing can go on, and report how it ended."""
     from firable.executor.drivers.binding import read_binding
@@ -41,16 +47,20 @@ def run_bound_of(
         journal_path=journal,
         resume=resume,
         said=said,
+        plant=plant,
+        watch=watch,
+        endpoint=endpoint,
+        served=served,
     )
     known = report.to_json()
-    kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages")
+    kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages", "divergence")
     return Report(
         "run",
         path,
         bundle.net,
-        (_verdict(report, bind),),
+        (_verdict(report, bind), *machines_verdict(report, f"run on the machines of {bind}")),
         files=(trace,) if trace else (),
-        run={**{key: known[key] for key in kept}, "seconds": report.simulated_seconds, "binding": bind},
+        run={**{key: known[key] for key in kept if key in known}, "seconds": report.simulated_seconds, "binding": bind},
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from firable.cli.operate import ServeOptions, serve_options
 from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
+from firable.cli.watched import machines_verdict
 
 if TYPE_CHECKING:
     from firable.executor import Answer, RunReport
@@ -90,8 +92,9 @@ def run(
 
     With --bind, all runs on the machines of a binding, in real time, until Ctrl-C; what they carry it does not count.
 
-    While it runs, the machines are held against their plant file: the first thing that they do and cannot have done, or
-    have not done and must have, is told, and with --watch stop it ends the run.
+    While it runs, the machines are held against their plant file (with --bind, against the one that --plant names): the
+    first thing that they do and cannot have done, or have not done and must have, is told, and with --watch stop it
+    ends the run.
 
     With --serve, in real time, `firable operate` pauses, steps and stops the run from elsewhere, and Prometheus reads
     its figures; everybody is asked for a token or a certificate, and beyond this host nothing goes without TLS.
@@ -105,7 +108,7 @@ def run(
         options.refuse_alone()
 
     served = ServeOptions(serve, token_file, serve_tls, operators)
-    if serve is not None and _SPEEDS[speed] is None:
+    if serve is not None and _SPEEDS[speed] is None and options.bind is None:
         raise click.UsageError("in virtual time a run is over before anybody acts: with --serve, name --speed 1 or 10")
     if serve is not None and options.is_one_of_several:
         raise click.UsageError("--serve is of a run of the whole cell, and not of one host among others")
@@ -121,11 +124,9 @@ def run(
                 _refuse_to_overwrite(trace, bundle, *filter(None, (options.bind, options.journal)))
             said = _said(loaded.net, say, options.journal)
             return run_host_of(bundle, loaded, options, trace, said)
+        endpoint = served.endpoint()
+        told = None if endpoint is None else partial(_tell_served, endpoint.token, token_file)
         if options.bind is not None:
-            if plant is not None:
-                raise click.UsageError(
-                    "--plant is for the simulated cell and --bind for real machines: give one of them"
-                )
             if trace is not None:
                 _refuse_to_overwrite(trace, bundle, options.bind, *_files_beside(options.journal))
             return run_bound_of(
@@ -137,12 +138,15 @@ def run(
                 options.journal,
                 _said(loaded.net, say, options.journal),
                 resume=options.resume,
+                plant=None if plant is None else read_plant(_plant_file(loaded, plant)),
+                watch=Watch(watch),
+                endpoint=endpoint,
+                served=told,
             )
         plant_file = _plant_file(loaded, plant)
         model = read_plant(plant_file)
         if trace is not None:
             _refuse_to_overwrite(trace, bundle, plant_file, *_files_beside(options.journal))
-        endpoint = served.endpoint()
         report = run_bundle(
             loaded,
             model,
@@ -155,7 +159,7 @@ def run(
             said=_said(loaded.net, say, options.journal),
             watch=Watch(watch),
             endpoint=endpoint,
-            served=None if endpoint is None else lambda address: _tell_served(address, endpoint.token, token_file),
+            served=told,
             operator=stepping(_SPEEDS[speed], to_stderr=format_ == "json") if step else None,
         )
         return Report(
@@ -170,7 +174,7 @@ def run(
     return answer("run", format_, make, _show)
 
 
-def _tell_served(address: str, token: str, token_file: str | None) -> None:
+def _tell_served(token: str, token_file: str | None, address: str) -> None:
     who = f"the token in {token_file}" if token_file is not None else f"the token {token}"
     click.echo(f"operate this run at {address} with {who}", err=True)
 
@@ -263,19 +267,7 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
             subjects=tuple(f"workpiece {i}" for i in (*report.lost, *report.doubled)),
         ),
     ]
-    if report.watched:
-        found = report.divergence
-        verdicts.append(
-            Verdict(
-                "machines-as-modelled",
-                Status.PROVED if found is None else Status.VIOLATED,
-                "the machines did what the plant file allows, as far as signals show",
-                method,
-                hint="" if found is None else f"at {found.at_seconds:.2f} s: {found.message}",
-                subjects=() if found is None else found.places,
-            )
-        )
-    return tuple(verdicts)
+    return (*verdicts, *machines_verdict(report, method))
 
 
 def _show(report: Report) -> None:

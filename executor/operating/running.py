@@ -248,19 +248,26 @@ def run_bound(
     journal_path: Path | str | None = None,
     resume: bool = False,
     said: Mapping[str, Answer] | None = None,
+    plant: PlantModel | None = None,
+    watch: Watch = Watch.TELL,
+    endpoint: Endpoint | None = None,
+    served: Callable[[str], None] | None = None,
 ) -> RunReport:
     """Run a bundle on the machines of a binding, in real time, until the operator stops it or nothing can go on.
 
     What workpieces there are is not to be known; the report counts none. `tell` is told of links that come and go, by
-    device and sentence; journal, `resume` and `said` are as for `run`. Raises `InputError` F5002 where the bundle is
+    device and sentence; journal, `resume` and `said` are as for `run`, and so are `watch`, where a `plant` says what
+    the machines do, and `endpoint` and `served`. Raises `InputError` F5002 where the bundle is
     not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the trace cannot
     be written, and F5031 to F5034 where the journal cannot be gone on with.
     """
-    if problems := unproved(bundle):
+    if problems := (*unproved(bundle), *(misfits(plant, bundle.net) if plant is not None else ())):
         raise InputError(problems)
     driver = bound_driver(binding, bundle.net)
     decomposition = bundle.decomposition
     with opened(decomposition, bundle.digest, None, 0, 0, journal_path, trace_path) as files:
+        watched = plant if watch is not Watch.IGNORE and not files.is_taken_up else None
+        figures = _figures(decomposition.net) if endpoint is not None else None
         execution = Execution(
             decomposition,
             driver,
@@ -272,8 +279,14 @@ def run_bound(
             resume=resume,
             said=said,
             begin_seconds=files.begin_seconds,
+            monitor=None if watched is None else Monitor(decomposition.net, watched),
+            stop_at_divergence=watch is Watch.STOP,
+            figures=figures,
         )
-        situation = asyncio.run(_terminable(execution))
+        main = _terminable(execution)
+        if endpoint is not None and figures is not None:
+            main = _serving(main, execution, endpoint, figures.text, served)
+        situation = asyncio.run(main)
         recorder = files.recorder
         recorder.end(execution.now_seconds(), situation.state.value)
     return RunReport(
@@ -287,6 +300,8 @@ def run_bound(
         execution.messages,
         _decided(decomposition, recorder.firings),
         execution.now_seconds(),
+        watched=watched is not None,
+        divergence=execution.divergence,
     )
 
 
