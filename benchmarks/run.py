@@ -16,6 +16,7 @@ import explicit
 import linking
 import protocols
 import public_nets
+import reacting
 import reading
 import splitting
 import whole_spaces
@@ -30,6 +31,7 @@ BENCHMARKS: Final = {
     "linking": linking.tables,
     "public_nets": public_nets.tables,
     "executing": executing.tables,
+    "reacting": reacting.tables,
 }
 
 BUSY: Final = (
