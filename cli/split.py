@@ -284,7 +284,7 @@ def _controllers(report: Report) -> Iterator[str]:
             ("votes on", [f"{name} ({part})" if name != part else name for name, part in one["votes"]]),
             ("must promise", one["promises"]),
             ("coordinates", one["coordinates"]),
-            ("relays", one["relays"]),
+            ("decided above", one["relays"]),
             ("locks for others", [f"{place} ({name})" for place, name in one["locks"]]),
             ("answers for", list(dict.fromkeys(signal for signal, _ in one["answers"]))),
             ("talks to", one["talks_to"]),

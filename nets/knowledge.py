@@ -66,8 +66,9 @@ class Knowledge:
     `undisturbing` are the parts that take no other yes back, by the arcs and by the completions that they clear, and
     whose gates nothing here closes: one that is persistent needs no promise
     (`firable.decompose.splitting.persistence`). It `coordinates` these transitions for those under it, and `relays`
-    those that are decided above it and in which one under it takes part: it asks them, votes for them, and passes the
-    order on. It `talks_to` the one above it and those under it, as far as it must.
+    those that are decided above it and in which one under it takes part: their AND is its vote to the layer above (O8).
+    Messages go between who decides and who takes part, whoever stands between them; so it `talks_to` the coordinators
+    of its votes, and to those who vote on what it coordinates.
     """
 
     controller: str
@@ -164,16 +165,17 @@ def split_to_json(decomposition: Decomposition) -> dict[str, Any]:
 def _passed_on(
     decomposition: Decomposition, layers: Layers
 ) -> tuple[Mapping[str, Iterable[str]], Mapping[str, Iterable[str]]]:
-    """For each controller what it passes on between the layers, and with whom it exchanges messages."""
+    """For each controller what is decided above it with those under it, and with whom it exchanges messages."""
     relays: dict[str, dict[str, None]] = {}
     talks: dict[str, dict[str, None]] = {}
     for row in decomposition.coordinated:
         at = row.at or layers.root
         for part in row.parts:
             now = part.controller
+            if now != at:
+                talks.setdefault(at, {})[now] = None
+                talks.setdefault(now, {})[at] = None
             while now != at and (above := layers.parent.get(now)) is not None:
-                talks.setdefault(above, {})[now] = None
-                talks.setdefault(now, {})[above] = None
                 if above != at:
                     relays.setdefault(above, {})[row.name] = None
                 now = above

@@ -115,12 +115,14 @@ def test_each_coordinator_has_a_table_of_its_own() -> None:
     assert b.count("\n") == 3
 
 
-def test_a_coordinator_relays_what_is_decided_above_it() -> None:
+def test_a_coordinator_stands_between_those_under_it_and_what_is_decided_above_it() -> None:
     known = {one.controller: one for one in knowledge(split(TWO_CELLS))}
-    assert known["line"].talks_to == ("conveyors", "cell_a", "cell_b")
+    assert known["line"].talks_to == (
+        *("conveyors", "cell_a", "robot_a", "machine_a", "cell_b", "robot_b", "machine_b"),
+    )
     assert known["cell_a"].coordinates == ("put_a", "taken_a")
     assert known["cell_a"].relays == ("load_a", "fetched_a", "unload_a", "placed_a")
-    assert known["robot_a"].talks_to == ("cell_a",)
+    assert known["robot_a"].talks_to == ("cell_a", "line")
     assert known["robot_a"].relays == ()
 
 
