@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
 import time
 from collections.abc import Mapping
@@ -13,6 +12,8 @@ import click
 from firable.cli.options import load_net
 
 if TYPE_CHECKING:
+    import asyncio
+
     from firable.executor.drivers.binding import Binding
     from firable.executor.drivers.bound import BoundDriver
     from firable.executor.drivers.driver import Reading
@@ -42,6 +43,8 @@ def live_io(
 
     Ctrl-C ends it. Exit code 3 where --once cannot read something.
     """
+    import asyncio
+
     from firable.executor.drivers.binding import read_binding
 
     binding = read_binding(bind)
@@ -147,6 +150,8 @@ async def _shown(
     binding: Binding, forced: list[tuple[str, bool]], places: list[Place], *, once: bool, seconds: float | None
 ) -> int:
     """Show the signals until the end; returns the exit code."""
+    import asyncio
+
     from firable.executor.drivers.bound import BoundDriver
     from firable.executor.drivers.driver import Quality
 
@@ -188,6 +193,8 @@ def _differ(one: Reading, other: Reading) -> bool:
 
 async def _connected(driver: BoundDriver, running: asyncio.Task[None]) -> bool:
     """Wait until every device has been read, as long as its start may take; whether all were."""
+    import asyncio
+
     for device in driver.devices.values():
         ready = asyncio.create_task(device.is_ready.wait())
         await asyncio.wait([ready, running], timeout=device.document.start_s, return_when=asyncio.FIRST_COMPLETED)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import signal
 from contextlib import suppress
 from pathlib import Path
@@ -58,6 +57,8 @@ def sim(
 
     It ends by Ctrl-C, or when something collides. N in --drop and --hang says which time, from 1.
     """
+    import asyncio
+
     from firable.executor.cell.plant import Plant
     from firable.executor.drivers.fitting import misfits as binding_misfits
     from firable.nets.diagnostics import InputError
@@ -123,6 +124,8 @@ async def _serve(
     binding: Binding, net: Net, plant: Plant, ends: dict[str, FarEnd], speed: float, seconds: float | None
 ) -> str:
     """Serve until something collides, whose sentence is returned, or until it is cancelled or the time is over."""
+    import asyncio
+
     from firable.executor.drivers.far_side.cell import CellServer
     from firable.nets.diagnostics import Diagnostic, InputError
 
