@@ -162,7 +162,7 @@ def test_obligations_are_written_as_smtlib(tmp_path: Path, capsys: pytest.Captur
     assert code == 0
     assert {Path(file) for file in report["files"]} == set((tmp_path / "smt").iterdir())
     texts = {Path(file).name: Path(file).read_text() for file in report["files"]}
-    assert all(f'(echo "{v["name"]}")' in texts[file] for v in report["verdicts"] for file in v["evidence"])
+    assert all(f'(echo "{v["name"]}")' in texts[file] for v in report["verdicts"] for file in v.get("evidence", ()))
     assert [line["name"] for line in report["standing"]] == [f"O{n}" for n in range(1, 10)]
     assert len(report["table"]) == 9
 
