@@ -472,6 +472,8 @@ class Execution:
         self.driver.send(sender, sending.entry)
         owner = str(sender.owner)
         self._act(owner, self.controllers[owner].sent(sending.place, sending.entry))
+        if sender.completion is None:  # its token waited for that
+            self._post(owner, Continue())
 
     def watch(self, place: str) -> None:
         """Give the alarm where the command of a place without a time limit is not completed in time, from now on."""

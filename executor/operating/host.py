@@ -390,9 +390,12 @@ class Host:
 
     def _send(self, place: str, entry: int) -> None:
         self._watch(place)
-        self.driver.send(self.net.place(place), entry)
-        owner = str(self.net.place(place).owner)
+        sender = self.net.place(place)
+        self.driver.send(sender, entry)
+        owner = str(sender.owner)
         self._act(owner, self.controllers[owner].sent(place, entry))
+        if sender.completion is None:  # its token waited for that
+            self._post(owner, None)
 
     def _watch(self, place: str) -> None:
         """Have an alarm, should a command not be completed in time; a place with a time of its own needs none."""

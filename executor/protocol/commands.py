@@ -16,6 +16,10 @@ at its driver, and where that does not know, at the operator; nothing is guessed
 is there. An issued command that was not received is sent again under the same number, so that a driver which has
 received it after all can tell.
 
+A command without a completion that its driver has not taken holds its token back: `unsent`. Otherwise the token could
+enter and leave between two syncs, and a crash before the command is sent would lose it, because after the restart a
+command whose token has gone on is void.
+
 Rejected: to keep each command until it is over and delete it then. Its number would have to be kept beside it, for the
 next one; the record that stays is both, and there are never more of them than signals and places.
 """
@@ -88,6 +92,12 @@ class Commands:
     def owed(self) -> tuple[tuple[str, int], ...]:
         """The place and entry of each command that will be sent when the controller is resumed."""
         return tuple((c.place, c.entry) for c in self.newest.values() if _is_owed(c))
+
+    @property
+    def unsent(self) -> tuple[str, ...]:
+        """The places whose command has no completion, and which no driver is known to have taken yet."""
+        open_ = (command.place for command in self.newest.values() if command.stage is not Stage.OVER)
+        return tuple(place for place in open_ if self.subnet.place(place).completion is None)
 
     def entry(self, completion: str) -> int:
         """The entry of the newest command that this signal completes; 0 before the first."""

@@ -143,6 +143,8 @@ class LocalController:
         self.latched: dict[str, bool] = {}
         self.commands = Commands(self.subnet, {})
         self.timers = Timers(self.player)
+        self.unsent: Word = 0
+        """The places whose token waits until a driver has its command (`commands`)."""
         self.untold: Word = 0
         """The sensors that have shown nothing since the restart."""
         self.held = False
@@ -169,18 +171,17 @@ class LocalController:
     def answer(self, place: str, entry: int, answer: Answer) -> list[Effect]:
         """Take what is said of a command in `commands.questions`."""
         completion = self.subnet.place(place).completion
-        if not self.commands.answer(place, entry, answer) or answer is not Answer.DONE:
+        if not self.commands.answer(place, entry, answer) or answer not in (Answer.DONE, Answer.WORKING):
             return []
-        return (
-            list(self.commands.sent(place, entry))
-            if completion is None
-            else self.read(completion, value=True, entry=entry)
-        )
+        if completion is None:
+            return self.sent(place, entry)  # it was received, and nothing else is asked of it
+        return self.read(completion, value=True, entry=entry) if answer is Answer.DONE else []
 
     def resume(self) -> list[Effect]:
         """End the hold after a restart, and send what is owed; `ProtocolError` while there are questions."""
         owed = list(self.commands.resume(frozenset(self.subnet.names(self.marking))))
         self.held = False
+        self._mark_unsent()
         self.timers.begin_anew(self.word)
         return owed
 
@@ -219,7 +220,10 @@ class LocalController:
 
     def sent(self, place: str, entry: int) -> list[Effect]:
         """Take the driver's word that it has the command of a place."""
-        return list(self.commands.sent(place, entry))
+        effects = list(self.commands.sent(place, entry))
+        if self.unsent:
+            self._mark_unsent()
+        return effects
 
     def tick(self, now_seconds: float) -> list[Effect]:
         """Take what the clock shows: set the timers whose time is over; a controller that is held times nothing."""
@@ -277,6 +281,7 @@ class LocalController:
             above.told = above.readiness.sequence
         self.word = self.kept_word = int(str(kept.get("word", f"{self.word:x}")), 16)
         self.commands = Commands(self.subnet, kept)
+        self._mark_unsent()
         for key, value in kept.items():
             match key.partition("/"), value:
                 case ("promise", _, number), [*names]:
@@ -361,6 +366,8 @@ class LocalController:
                     yield Taken(signal, value=False)
             self.timers.enter(place)
             yield from self.commands.enter(place, held=self.held)
+            if self.subnet.place(place).completion is None:
+                self.unsent |= 1 << self.subnet.place_index[place]
 
     def _release(self) -> Iterator[Effect]:
         """Take in the signals that changed while a promise read them."""
@@ -395,14 +402,23 @@ class LocalController:
             yield Keep("word", f"{self.word:x}")
 
     def _is_enabled(self, transition: Compiled) -> bool:
-        """Enabled by what is known: a sensor untold since the restart closes its gates, unless a promise holds it."""
+        """Enabled by what is known.
+
+        A sensor untold since the restart closes its gates, unless a promise holds it; a token whose command is not
+        sent yet is not taken.
+        """
+        if transition.takes & self.unsent:
+            return False
         if self.untold and transition.reads & self.untold & ~self._locked_reads():
             return False
         return transition.enabled(self.word)
 
+    def _mark_unsent(self) -> None:
+        self.unsent = sum(1 << self.subnet.place_index[place] for place in self.commands.unsent)
+
     def _is_bound(self) -> bool:
         """Whether anything but the word decides what may fire."""
-        return bool(self.promises or self.untold)
+        return bool(self.promises or self.untold or self.unsent)
 
     def _is_free(self, t: int) -> bool:
         transition = self.transitions[t]
@@ -426,7 +442,7 @@ class LocalController:
 
     def _readiness(self, above: Above) -> Readiness:
         ready = 0 if self.held else self.enabled.at(self.word) & above.mask
-        if self.untold:
+        if self.untold or self.unsent:
             ready = sum(1 << t for t in bits(ready) if self._is_enabled(self.transitions[t]))
         if ready != above.ready_mask or above.readiness.sequence < self.epoch << EPOCH_BITS:
             above.ready_mask = ready

@@ -172,6 +172,8 @@ class Simulation:
                     self.events.append(CommandSent(at, place))
                     if completion := self.net.place(place).completion:
                         self.completing.append((completion, entry))
+                    owner = str(self.net.place(place).owner)
+                    self.controllers[owner].sent(place, entry)  # of which only a restart would know
                 case VoteRequest() | Decision() | Hello() | Report() | Vote() | Acknowledgement():
                     self.in_flight.append(effect)
                 case Keep():

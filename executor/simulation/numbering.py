@@ -40,7 +40,7 @@ _CONTROLLER: Final = frozenset(
     {
         *("name", "subnet", "player", "parts", "transitions", "enabled", "rows", "part_mask", "arbiter", "kept_turns"),
         *("word", "kept_word", "promises", "closed", "coordinators", "above", "latched", "commands", "timers"),
-        *("untold", "held", "epoch"),
+        *("unsent", "untold", "held", "epoch"),
     }
 )
 _COORDINATOR: Final = frozenset(

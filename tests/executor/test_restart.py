@@ -47,6 +47,7 @@ from firable.nets.net import (
     SignalKind,
     Transition,
 )
+from firable.nets.text import parse_net
 from firable.semantics.replaying import replay
 
 Machine = LocalController | Coordinator
@@ -424,3 +425,44 @@ def test_both_of_two_commands_that_share_a_completion_are_asked_after_and_over_t
     assert {(e.place, e.entry) for e in again.resume() if isinstance(e, Sending)} == {("a.fill", 1), ("a.heat", 2)}
     kept += again.read("a.done", value=True, entry=2)
     assert not restarted(again, decomposition, kept).commands.questions
+
+
+def test_a_token_waits_on_its_place_until_a_driver_has_the_command_that_has_no_completion() -> None:
+    text = """\
+firable: 1
+cell: flash
+controllers:
+  lamp:
+    start: dark
+    places:
+      dark:
+      lit: {send: {machine: L, command: FLASH}}
+transitions:
+  light: {from: lamp.dark, to: lamp.lit}
+  fade:  {from: lamp.lit, to: lamp.dark}
+"""
+    decomposition = split(parse_net(text))
+    lamp = LocalController.restored(decomposition, "lamp", {})
+    kept: dict[str, Stored] = {}
+
+    def keep(effects: list[Effect]) -> list[Effect]:
+        for effect in effects:
+            if isinstance(effect, Keep) and effect.value is not None:
+                kept[effect.key] = effect.value
+        return effects
+
+    keep(lamp.start())
+    assert Sending("lamp.lit", 1) in keep(lamp.fire())
+    assert lamp.fire() == [], "the command has not left yet"
+    again = LocalController.restored(decomposition, "lamp", kept)
+    assert again.commands.questions == (("lamp.lit", 1),)
+    again.answer("lamp.lit", 1, Answer.NOT_RECEIVED)
+    assert again.resume() == [Sending("lamp.lit", 1, again=True)]
+    assert again.fire() == []
+    again.sent("lamp.lit", 1)
+    assert Firing("fade") in again.fire()
+    for received in (Answer.DONE, Answer.WORKING):
+        found = LocalController.restored(decomposition, "lamp", kept)
+        found.answer("lamp.lit", 1, received)
+        assert found.resume() == []
+        assert Firing("fade") in found.fire()

@@ -125,6 +125,8 @@ def test_a_fault_that_needs_no_faults_is_shrunk_to_a_run_without_any() -> None:
 REGRESSIONS = [
     # Of two commands that are sent together and share a completion, the first was forgotten at a crash.
     (20, Run(202, ("duplication", "torn", "disk", "drift", "slow", "step"), 362)),
+    # A token entered and left a place without a completion between two syncs, and a crash lost its command.
+    (10584, Run(105840, ("delay", "crash", "torn", "unsynced", "disk", "stuck"), 66)),
 ]
 
 
