@@ -9,7 +9,8 @@ So the transitions that could falsify a yes are found at its places and at those
 their arcs, and most of them are cleared at once:
 
 - one that needs a place empty which the yes needs full, or the other way about, is never firable while the yes stands;
-- one that wants a signal 0 which the yes wants 1 is never open then, as the transition of a time limit that is over;
+- one that wants a completion or a timer 0 which the yes wants 1 is never open then, as the transition of a time limit
+  that is over (a sensor may drop and let it fire: O4);
 - one that needs two places full, with the yes, of a *unit* (`firable.analysis.structure.cover`) that holds one token
   can never be firable then either, and the unit is an invariant that a checker multiplies out;
 - one that can never fire at all falsifies nothing.
@@ -31,7 +32,7 @@ from firable.analysis.structure.cover import UnitSearch
 from firable.analysis.structure.invariants import columns
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import And, Firable, Formula, Holds, Not, Or
-from firable.nets.net import Net, Transition
+from firable.nets.net import Net, SignalKind, Transition
 
 FALSIFIERS_MAX: Final = 500
 """How many transitions that could take one yes back are looked at: a place with n consumers makes n^2 pairs."""
@@ -99,7 +100,11 @@ def _accused(decomposition: Decomposition) -> Iterator[Vote]:
         for signal in place.cleared:
             senders.setdefault(signal, []).append(i)
     required = [needs(transition) for transition in net.transitions]
-    bare = [{gate.signal for gate in transition.external if not gate.wanted} for transition in net.transitions]
+    levels = {signal.name for signal in net.signals if signal.kind is not SignalKind.SENSOR}
+    bare = [
+        {gate.signal for gate in transition.external if not gate.wanted and gate.signal in levels}
+        for transition in net.transitions
+    ]
     fires = [not full & empty and t.openable for t, (full, empty) in zip(net.transitions, required, strict=True)]
     for row in decomposition.coordinated:
         own = net.transition_index[row.name]

@@ -18,7 +18,7 @@ from firable.decompose.verification.refusal import NotShownError
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import And, Firable, Holds, Not, Or
 from firable.nets.formula import Formula as StateFormula
-from firable.nets.net import Net, Transition
+from firable.nets.net import Net, SignalKind, Transition
 
 PREFIX: Final = "persistent."
 
@@ -49,7 +49,8 @@ def votes(decomposition: Decomposition, formulas: Formulas) -> dict[str, Vote]:
                     touching |= clearers.get(gate.signal, set())
             others = sorted(touching - {row.name}, key=net.transition_index.__getitem__)
             awaited = {gate.signal for gate in voted.external if gate.wanted}
-            accused = [name for name in others if _can_take_back(net.transition(name), full, empty, awaited)]
+            levels = {name for name in awaited if net.signal(name).kind is not SignalKind.SENSOR}
+            accused = [name for name in others if _can_take_back(net.transition(name), full, empty, levels)]
             stands = [formulas.literal(place, place in full) for place in (*sorted(full), *sorted(empty))]
             goal = formulas.all_of([*stands, formulas.any_of(formulas.variable(f"firable({u})") for u in accused)])
             sentence = f"once '{part.name}' votes yes, no transition but '{row.name}' takes the yes back"
@@ -82,10 +83,10 @@ def _needs(t: Transition) -> tuple[set[str], set[str]]:
     return {*t.inputs, *t.permissive}, {*t.outputs, *t.inhibitive}
 
 
-def _can_take_back(t: Transition, full: set[str], empty: set[str], awaited: set[str]) -> bool:
-    """Whether a transition can be firable, and open, while these places are full and empty and these signals 1."""
+def _can_take_back(t: Transition, full: set[str], empty: set[str], levels: set[str]) -> bool:
+    """Whether a transition can be firable, and open, while these places are full and empty and these levels 1."""
     needs_full, needs_empty = _needs(t)
-    if any(gate.signal in awaited and not gate.wanted for gate in t.external):
+    if any(gate.signal in levels and not gate.wanted for gate in t.external):
         return False
     return t.openable and needs_full.isdisjoint(needs_empty | empty) and needs_empty.isdisjoint(full)
 

@@ -62,10 +62,18 @@ def falsified(decomposition: Decomposition) -> dict[str, tuple[str, ...]]:
                 for fired, after in edges
                 if net.transitions[fired[0]].name != row.name
                 and yes(marking)
+                and not closed_while_it_waits(net, fired[0], subnet.transition(part.name))
                 and (not yes(after) or sends_anew(net, fired[0], subnet.transition(part.name)))
             }
             found[part.name] = tuple(net.transitions[t].name for t in sorted(by))
     return found
+
+
+def closed_while_it_waits(net: Net, fired: int, part: Transition) -> bool:
+    """Whether a firing wants a completion 0 that stands at 1 as long as the part's yes does; sensors may drop (O4)."""
+    awaited = {gate.signal for gate in part.external if gate.wanted}
+    levels = {name for name in awaited if net.signal(name).kind is not SignalKind.SENSOR}
+    return any(gate.signal in levels and not gate.wanted for gate in net.transitions[fired].external)
 
 
 def sends_anew(net: Net, fired: int, part: Transition) -> bool:
@@ -378,3 +386,53 @@ def test_many_open_votes_are_looked_out_for_by_one_walk() -> None:
     found = persistence(split(family_net("workshop-40")))
     assert {verdict.method for verdict in found.verdicts if not verdict.holds} == {"walk at random, sliced"}
     assert not any(verdict.status is Status.UNKNOWN for verdict in found.verdicts)
+
+
+DROPPING = """\
+firable: 1
+cell: dropping
+controllers:
+  a:
+    start: lies
+    inputs: seen
+    places: {lies: , gone: }
+  b:
+    start: free
+    places: {free: , full: }
+transitions:
+  hand_over: {from: [a.lies, b.free], to: b.full, if: a.seen}
+  leave: {from: a.lies, to: a.gone, unless: a.seen}
+  again: {from: a.gone, to: a.lies}
+  empty: {from: b.full, to: b.free}
+"""
+STAYING = """\
+firable: 1
+cell: staying
+controllers:
+  a:
+    start: lies
+    places:
+      lies: {send: {machine: M, command: HOLD}, until: done, within: 5s}
+      lies_fault:
+  b:
+    start: free
+    places: {free: , full: }
+transitions:
+  hand_over: {from: [a.lies, b.free], to: b.full}
+  again: {from: a.lies_fault, to: a.lies}
+  empty: {from: b.full, to: b.free}
+"""
+
+
+@pytest.mark.parametrize(("text", "stands"), [(DROPPING, False), (STAYING, True)])
+def test_a_sensor_that_may_drop_excludes_nothing_and_a_completion_that_stays_does(text: str, stands: bool) -> None:
+    decomposition = split(parse_net(text))
+    found = persistence(decomposition)
+    (part,) = (
+        part.name
+        for row in decomposition.coordinated
+        for part in row.parts
+        if (row.name, part.controller) == ("hand_over", "a")
+    )
+    assert found.of(part).holds == stands
+    agree(decomposition, found)
