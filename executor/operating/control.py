@@ -83,7 +83,7 @@ class Endpoint:
     def __post_init__(self) -> None:
         if self.tls is None and not _is_loopback(self.host):
             message = f"the operator's endpoint would be open on {self.host}, without TLS"
-            hint = "give --tls-cert and --tls-key, or serve on 127.0.0.1 and come through a tunnel"
+            hint = "give --serve-tls CERT KEY, or serve on 127.0.0.1 and come through a tunnel"
             raise InputError([Diagnostic("F5060", message, hint)])
         if len(self.token) < 16:
             message = "the token of the operator's endpoint has fewer than 16 characters"

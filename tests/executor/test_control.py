@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import datetime
+import re
 import ssl
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
+from firable.cli.run import run
 from firable.executor.operating.control import Endpoint, new_token, serving, tls_context
 from firable.executor.operating.situation import Situation, State
 from firable.nets.diagnostics import InputError
@@ -126,6 +128,10 @@ def test_nothing_is_served_beyond_loopback_without_tls(host: str) -> None:
     with pytest.raises(InputError) as caught:
         Endpoint(host, 0, TOKEN)
     assert caught.value.diagnostics[0].code == "F5060"
+    options = {option for parameter in run.params for option in parameter.opts}
+    named = set(re.findall(r"--[a-z-]+", caught.value.diagnostics[0].hint))
+    assert named
+    assert named <= options
 
 
 def test_a_token_that_can_be_guessed_is_refused() -> None:
