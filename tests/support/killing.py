@@ -72,8 +72,8 @@ class Moments:
             self.pass_()
             add_input(log, at_seconds, what, *arguments)
 
-        setattr(TraceFile, "write", write)  # noqa: B010
-        setattr(CellLog, "add", add)  # noqa: B010
+        for owner, name, instead in ((TraceFile, "write", write), (CellLog, "add", add)):
+            setattr(owner, name, instead)
 
 
 def live(folder: Path, cell: str, workpieces: int, seed: int, last: int) -> None:
