@@ -24,7 +24,8 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Final, assert_never
 
@@ -234,8 +235,9 @@ class Execution:
         """Let nothing fire any more; machines end the command they are at."""
         if not self.paused:
             self.paused = True
-            self.recorder.note(self.now_seconds(), "paused")
-            self._permit(0)
+            with self._breaking():
+                self.recorder.note(self.now_seconds(), "paused")
+                self._permit(0)
             self._settle()
 
     def resume(self) -> None:
@@ -288,8 +290,9 @@ class Execution:
             self.moved()
             return
         self.stopping = self.paused = True
-        self.recorder.note(self.now_seconds(), "stopped by the operator")
-        self._permit(0)
+        with self._breaking():
+            self.recorder.note(self.now_seconds(), "stopped by the operator")
+            self._permit(0)
         self._settle()
 
     def emergency_stop(self, reason: str) -> None:
@@ -298,8 +301,9 @@ class Execution:
         self.is_safe = True
         self.stopping = self.paused = True
         self.ended_by = f"emergency stop: {reason}"
-        self.recorder.note(self.now_seconds(), "emergency stop", reason=reason)
-        self._permit(0)
+        with self._breaking():
+            self.recorder.note(self.now_seconds(), "emergency stop", reason=reason)
+            self._permit(0)
         self._settle()
 
     def commanded(self, command: str, by: str) -> None:
@@ -408,6 +412,16 @@ class Execution:
         if not task.cancelled() and (error := task.exception()) is not None:
             self._broken(error)
 
+    @contextmanager
+    def _breaking(self) -> Iterator[None]:
+        """What is raised within ends the run; before the run it is the caller's."""
+        try:
+            yield
+        except Exception as error:
+            if self.outcome is None:
+                raise
+            self._broken(error)
+
     def _broken(self, error: BaseException) -> None:
         """End the run by an error of the program or of the trace's file; the machines are stopped on the way out."""
         if self.outcome is not None and not self.outcome.done():
@@ -486,10 +500,8 @@ class Execution:
             )
 
     def _alarm(self, place: str, sent_at: float) -> None:
-        try:
+        with self._breaking():  # a timer has no caller: it must end the run, as an error in a task does
             self._overdue(place, sent_at)
-        except Exception as error:  # a timer has no caller: it must end the run, as an error in a task does
-            self._broken(error)
 
     def _overdue(self, place: str, sent_at: float) -> None:
         sender = self.net.place(place)
@@ -503,8 +515,9 @@ class Execution:
         if not self.fault:
             self.fault = message
             self.stopping = self.paused = True  # first, so that nothing fires whatever happens to the trace
-            self.recorder.note(self.now_seconds(), "fault", message=message)
-            self._permit(0)
+            with self._breaking():
+                self.recorder.note(self.now_seconds(), "fault", message=message)
+                self._permit(0)
             self._settle()
 
     def _permit(self, firings: int | None) -> None:
@@ -532,7 +545,15 @@ class Execution:
     # Quiescence
 
     def _settle(self) -> None:
-        """At quiescence, let leave what waits for it, wake who waits for it, and end the run if nothing will happen."""
+        """At quiescence, let leave what waits for it, wake who waits for it, and end the run if nothing will happen.
+
+        An error on the way ends the run, whoever called: a timer, or who serves an operator, would swallow it and leave
+        the machines on.
+        """
+        with self._breaking():
+            self._quiesce()
+
+    def _quiesce(self) -> None:
         if not self._is_quiet():
             return
         self._commit()

@@ -454,10 +454,13 @@ class Host:
     def _overdue(self, place: str) -> None:
         sender = self.net.place(place)
         self.overdue.pop(str(sender.completion), None)
-        self._fail(
-            f"'{sender.command}' of '{place}' is overdue: "
-            f"'{sender.completion}' has not come within {self.overdue_seconds:g} s"
-        )
+        try:
+            self._fail(
+                f"'{sender.command}' of '{place}' is overdue: "
+                f"'{sender.completion}' has not come within {self.overdue_seconds:g} s"
+            )
+        except Exception as error:  # a timer has no caller
+            self._broken(error)
 
     # The end
 

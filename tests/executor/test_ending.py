@@ -1,0 +1,113 @@
+"""However a run is ended, and whatever fails meanwhile: the machines are stopped, and nothing is commanded after."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from collections.abc import Callable
+
+import pytest
+
+from firable.decompose.splitting.cut import split
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.driver import Answer
+from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.operating.execution import Execution
+from firable.executor.operating.recorder import Recorder
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.interchange import net_digest
+from firable.nets.net import Place
+from firable.nets.text import parse_net
+
+LAMP = """\
+firable: 1
+cell: cell
+controllers:
+  robot:
+    start: free
+    inputs: key
+    places:
+      free:
+      working: {send: {machine: R, command: WORK}, until: worked}
+      waiting:
+transitions:
+  begin: {from: robot.free, to: robot.working}
+  end: {from: robot.working, to: robot.waiting, if: robot.key}
+"""
+
+
+class Machine(DryRunDriver):
+    """A machine that never completes anything, and notes what it is sent."""
+
+    sent: list[tuple[str, int]]
+
+    def send(self, place: Place, entry: int) -> None:
+        assert not self.is_stopped
+        self.sent.append((place.name, entry))
+
+    async def ask(self, place: Place, entry: int) -> Answer:
+        await asyncio.sleep(1)
+        return Answer.NOT_RECEIVED if place.command is not None and entry else Answer.UNKNOWN
+
+
+class Filling(MemoryJournal):
+    """A journal whose disk is full at some time."""
+
+    is_full = False
+
+    def sync(self) -> None:
+        if self.is_full:
+            raise InputError([Diagnostic("F5034", "the disk is full", "")])
+
+
+async def present(_: Execution) -> None:
+    await asyncio.sleep(60)
+
+
+def run_of(journal: Journal, *, overdue_seconds: float = 120.0, resume: bool = False) -> tuple[Execution, Machine]:
+    net = parse_net(LAMP)
+    decomposition = split(net)
+    machine = Machine(decomposition.subnets, 1.0, {"robot.key": False})
+    machine.sent = []
+    recorder = Recorder(net, net_digest(net), io.StringIO())
+    return (
+        Execution(
+            decomposition,
+            machine,
+            recorder,
+            journal=journal,
+            operator=present,
+            overdue_seconds=overdue_seconds,
+            resume=resume,
+        ),
+        machine,
+    )
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        Execution.stop,
+        Execution.pause,
+        lambda run: run.emergency_stop("a person"),
+        lambda run: run.driver_fault("R", "failed"),
+        Execution.moved,
+    ],
+    ids=["stop", "pause", "emergency stop", "fault", "moved"],
+)
+def test_an_error_ends_the_run_and_stops_the_machines_even_where_its_caller_swallows_it(
+    act: Callable[[Execution], None],
+) -> None:
+    async def main() -> None:
+        journal = Filling()
+        run, machine = run_of(journal)
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(1)
+        journal.is_full = True
+        act(run)  # as a timer of a driver, or the server of an operator, calls it
+        with pytest.raises(InputError, match="full"):
+            await asyncio.wait_for(ending, 5)
+        assert machine.is_stopped
+
+    run_in_virtual_time(main())
