@@ -242,9 +242,9 @@ class Execution:
 
     def resume(self) -> None:
         """Let transitions fire again after a pause, or after a restart once nothing about it is uncertain."""
-        if self.taking_up is not None and not restart.release(self, self.taking_up):
+        if self.stopping or (self.taking_up is not None and not restart.release(self, self.taking_up)):
             return
-        if self.paused and not self.stopping:
+        if self.paused:
             self.paused = False
             self.recorder.note(self.now_seconds(), "resumed")
             self._permit(None)

@@ -213,7 +213,12 @@ class Host:
             self._wake()
 
     def resume(self) -> bool:
-        """End the hold of the controllers after a restart; those with a command that nobody knows of stay held."""
+        """End the hold of the controllers after a restart; those with a command that nobody knows of stay held.
+
+        A host that is stopping, or has failed, stays held as it is: what is owed would be commanded after the stop.
+        """
+        if self.stopping:
+            return False
         for name, controller in self.controllers.items():
             if controller.held and not controller.commands.questions:
                 self.trace.note("resumed", controller=name)

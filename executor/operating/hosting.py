@@ -167,6 +167,6 @@ async def _terminable(host: Host, *, resume: bool) -> Situation:
 
 
 async def _resume(host: Host) -> None:
-    """End the hold as soon as every question has its answer."""
-    while not host.resume():
+    """End the hold as soon as every question has its answer, unless the host is stopped before."""
+    while not host.stopping and not host.resume():
         await asyncio.sleep(0.1)

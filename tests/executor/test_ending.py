@@ -15,6 +15,7 @@ from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.operating.execution import Execution
 from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.situation import State
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
 from firable.nets.net import Place
@@ -109,5 +110,42 @@ def test_an_error_ends_the_run_and_stops_the_machines_even_where_its_caller_swal
         with pytest.raises(InputError, match="full"):
             await asyncio.wait_for(ending, 5)
         assert machine.is_stopped
+
+    run_in_virtual_time(main())
+
+
+def crashed() -> MemoryJournal:
+    """The journal of a run that has crashed when its command was issued."""
+    journal = MemoryJournal()
+
+    async def main() -> None:
+        run, machine = run_of(journal)
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(1)
+        assert machine.sent == [("robot.working", 1)]
+        assert run.outcome is not None
+        run.outcome.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await ending
+
+    run_in_virtual_time(main())
+    return journal
+
+
+def test_a_resume_after_the_stop_of_a_run_that_is_held_commands_nothing() -> None:
+    journal = crashed()
+
+    async def main() -> None:
+        run, machine = run_of(journal)
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(2)
+        assert run.taking_up is not None
+        assert run.taking_up.is_final
+        run.under_way += 1  # a message under way delays the end
+        run.stop()
+        run.resume()
+        run._handled()
+        assert (await ending).state is State.STOPPED
+        assert machine.sent == []
 
     run_in_virtual_time(main())

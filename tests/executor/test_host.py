@@ -1,6 +1,7 @@
 """The hosts of a cell: alone, together, cut off, killed and started anew; their traces join to one of the net."""
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.driver import Answer as DriversAnswer
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.links.link import COORDINATOR
+from firable.executor.operating.host import Host
+from firable.executor.operating.hosting import _resume
 from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.messages import Decision, Vote, VoteRequest
@@ -266,3 +269,38 @@ def test_a_trace_says_who_was_lost_and_who_came_back(tmp_path: Path) -> None:
     # In the end the coordinator is lost once more, by whose end that of this host is known to be heard.
     assert told == [*4 * ["connected"], *4 * ["lost"], *4 * ["connected"], *told[12:]]
     assert set(told[12:]) <= {"lost"}
+
+
+@pytest.mark.parametrize("end", [Host.stop, lambda host: host.driver_fault("R", "failed")], ids=["stop", "fault"])
+def test_a_host_that_is_to_resume_by_itself_commands_nothing_after_a_stop(
+    end: Callable[[Host], None], tmp_path: Path
+) -> None:
+    class Slow(DryRunDriver):
+        sent = 0
+
+        def send(self, place: Place, entry: int) -> None:
+            super().send(place, entry)
+            self.sent += 1
+
+        async def ask(self, place: Place, entry: int) -> DriversAnswer:
+            await asyncio.sleep(0.3)
+            return DriversAnswer.NOT_RECEIVED if place.command is not None and entry else DriversAnswer.UNKNOWN
+
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(2.5)
+        await cell.kill(ROBOT)
+        cell.start(ROBOT)
+        host = cell.hosts[ROBOT]
+        driver = host.driver = Slow([cell.decomposition.subnet("robot")], 1.0)
+        resuming = asyncio.create_task(_resume(host))
+        await asyncio.sleep(0.1)
+        assert host.controllers["robot"].commands.questions
+        end(host)
+        await cell.tasks[ROBOT]
+        await asyncio.wait_for(resuming, 1)  # it does not try for ever
+        assert driver.sent == 0
+        assert not host.resume()
+        await cell.stop()
+
+    run_in_virtual_time(main())
