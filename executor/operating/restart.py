@@ -33,7 +33,7 @@ class TakingUp:
 
     said: Mapping[str, Answer]
     resume: bool
-    """Whether to resume as soon as nothing is uncertain."""
+    """Whether to resume as soon as nothing is uncertain, unless the run is paused by then."""
     answers: dict[str, Answer] = field(default_factory=dict)
     """For each place whose command was asked after."""
     is_final: bool = False
@@ -41,7 +41,10 @@ class TakingUp:
 
 
 async def take_up(run: Execution, found: TakingUp) -> None:
-    """Ask after each command; then resume, if that was said beforehand and nothing is uncertain."""
+    """Ask after each command; then resume, if that was said beforehand and nothing is uncertain.
+
+    A pause or a stop meanwhile takes back what was said beforehand: then only the operator's resume ends the hold.
+    """
     for name, controller in run.controllers.items():
         for place, entry in controller.commands.questions:
             answer = await run.driver.ask(run.net.place(place), entry)
@@ -52,7 +55,7 @@ async def take_up(run: Execution, found: TakingUp) -> None:
             run.answered(name, place, entry, answer)
     await run.quiet()
     found.is_final = True
-    if found.resume:
+    if found.resume and not run.paused:  # as it is after a stop or a fault, too
         release(run, found)
     run.moved()
 

@@ -149,3 +149,24 @@ def test_a_resume_after_the_stop_of_a_run_that_is_held_commands_nothing() -> Non
         assert machine.sent == []
 
     run_in_virtual_time(main())
+
+
+def test_a_pause_while_a_run_is_held_holds_until_the_operator_resumes() -> None:
+    journal = crashed()
+
+    async def main() -> None:
+        run, machine = run_of(journal, resume=True)
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(0.1)
+        run.pause()
+        await asyncio.sleep(2)
+        assert machine.sent == []
+        assert run.situation().state is State.HELD
+        run.resume()
+        await asyncio.sleep(1)
+        assert machine.sent == [("robot.working", 1)]
+        assert not run.paused
+        run.stop()
+        await ending
+
+    run_in_virtual_time(main())
