@@ -92,6 +92,11 @@ class BoundDriver:
         command = self._command(place.name)
         self.devices[command.device].send(command, place, entry)
 
+    def withdraw(self, place: Place) -> None:
+        """Give up the command of a place, as far as its device has not been written it."""
+        if (command := self.binding.document.commands.get(place.name)) is not None:
+            self.devices[command.device].channels[command.channel].withdraw(place.name)
+
     async def ask(self, place: Place, entry: int) -> Answer:
         """What became of a command that was sent before a restart; waits for its device as long as a start may take."""
         command = self._command(place.name)

@@ -75,6 +75,8 @@ class Channel:
         """What was sent, by its number, and has had no outcome."""
         self.is_taken = False
         """Whether the device has shown the number of the newest order."""
+        self.is_withdrawn = False
+        """Whether the newest order is not to be written again, should its connection fail before the device has it."""
         self.unanswered = 0
         """How many commands without a completion were sent."""
 
@@ -104,12 +106,28 @@ class Channel:
             while self.number(place, entry) in self.shown.values():  # a machine that has this number would ignore it
                 self.unanswered += 1
                 entry = self.unanswered
+        else:
+            self.withdraw(place)
         self.waiting.append(Order(place, entry, self.number(place, entry), text, writes))
+
+    def withdraw(self, place: str) -> None:
+        """Give up what was sent for a place, as far as the device cannot have it; it is not written again either.
+
+        Otherwise a machine would move when its link comes back, by a command whose token has long left the place.
+        """
+        self.waiting = deque(order for order in self.waiting if order.place != place)
+        if self.current is None or self.current.place != place:
+            return
+        if self.phase in {_Phase.HELD, _Phase.CLEARING}:
+            self.current, self.phase = None, _Phase.WRITTEN
+        else:
+            self.is_withdrawn = True
 
     def next_writes(self) -> Writes | None:
         """What is to be written now, if anything; `written` follows when the device has it."""
         if self._delivered() and self.waiting:
             self.current, self.phase, self.is_taken = self.waiting.popleft(), _Phase.HELD, False
+            self.is_withdrawn = False
         order = self.current
         if order is None or self.phase in {_Phase.WRITING, _Phase.WRITTEN}:
             return None
@@ -148,6 +166,8 @@ class Channel:
             return None
         if order.number in self.shown.values() and self.phase is not _Phase.CLEARING:
             self.phase = _Phase.WRITTEN
+        elif not self.is_taken and self.is_withdrawn:
+            self.current, self.phase = None, _Phase.WRITTEN
         elif not self.is_taken:
             self.phase = _Phase.HELD
         elif self.document.taken is not None:

@@ -28,7 +28,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from firable.executor.protocol.commands import Answer as Answer
-from firable.nets.net import Place
+from firable.nets.net import Net, Place
 
 
 class Quality(StrEnum):
@@ -106,6 +106,13 @@ class Driver(Protocol):
         """Send the command of a place; it waits for a link that is down."""
         ...
 
+    def withdraw(self, place: Place) -> None:
+        """Give up the command of a place that its token has left before it was over.
+
+        What waits for a link is dropped and never sent; what is being written, or is taken, stays.
+        """
+        ...
+
     async def ask(self, place: Place, entry: int) -> Answer:
         """What became of a command that was sent before a restart, as the machine tells it.
 
@@ -121,3 +128,13 @@ class Driver(Protocol):
     def close(self) -> None:
         """Let no new work into the cell, as far as the driver can."""
         ...
+
+
+def withdraw(driver: Driver, net: Net, transition: str) -> None:
+    """Give up the commands that a firing leaves behind: a machine must not move by them when its link comes back.
+
+    A command without completion is not given up: its token need not wait until the machine has done it.
+    """
+    for place in map(net.place, net.transition(transition).inputs):
+        if place.completion is not None:
+            driver.withdraw(place)

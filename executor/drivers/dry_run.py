@@ -54,6 +54,9 @@ class DryRunDriver:
         if self.listener is not None and not self.is_stopped:
             self.listener.signal(completion, value=True, entry=entry)
 
+    def withdraw(self, place: Place) -> None:
+        """Nothing: a command is taken when it is sent."""
+
     async def ask(self, place: Place, entry: int) -> Answer:
         """What became of a command: it is over, if there is one."""
         return Answer.DONE if place.command is not None and entry else Answer.UNKNOWN

@@ -102,6 +102,9 @@ class SimulatedDriver:
         self._input(self.clock.now_seconds(), "send", place.name, entry)
         self.awake.set()
 
+    def withdraw(self, place: Place) -> None:
+        """Nothing: a command is taken when it is sent."""
+
     async def ask(self, place: Place, entry: int) -> Answer:
         """What the plant knows of a command: nothing is ever lost on the way to it."""
         if (place.name, entry) in self.interrupted:

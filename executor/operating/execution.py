@@ -29,7 +29,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Final, assert_never
 
-from firable.executor.drivers.driver import Driver
+from firable.executor.drivers.driver import Driver, withdraw
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.operating import restart
 from firable.executor.operating.figures import Figures
@@ -436,6 +436,7 @@ class Execution:
             match effect:
                 case Firing(transition):
                     self._fired(transition)
+                    withdraw(self.driver, self.net, transition)
                 case Taken(signal, value):
                     self.recorder.signal(self.now_seconds(), signal, value)
                 case Sending(place, again=again):

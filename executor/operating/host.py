@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from itertools import takewhile
 from typing import Final, assert_never
 
-from firable.executor.drivers.driver import Driver
+from firable.executor.drivers.driver import Driver, withdraw
 from firable.executor.journal.journal import Journal
 from firable.executor.links.link import Link, called
 from firable.executor.operating.execution import FIRINGS_AT_ONCE_MAX, RunClock
@@ -353,6 +353,7 @@ class Host:
                     self.unsynced = True
                 case Firing(transition):
                     self.trace.fired(transition, rounds.get(transition) if machine in self.coordinators else None)
+                    withdraw(self.driver, self.net, transition)
                 case Taken(signal, value):
                     self.trace.signal(signal, value)
                 case Sending(place, _, again):

@@ -140,6 +140,19 @@ def test_write_that_failed_is_repeated_with_its_number_unless_the_device_has_it(
         assert one.next_writes() == (None if is_there else (("n", number),))
 
 
+def test_command_that_was_given_up_or_followed_by_another_of_its_place_is_not_sent_when_the_link_is_back() -> None:
+    one = channel("a", "b", answered="ab")
+    one.send("a", 1, "", ())
+    one.send("b", 1, "", ())
+    one.send("a", 2, "", ())
+    assert after(one, taken=0, done=0) == (("n", one.number("b", 1)),)
+    one.withdraw("a")
+    one.withdraw("b")
+    assert one.connected_again() is None  # the connection has failed before anybody knew whether it was written
+    assert one.next_writes() is None
+    assert not one.is_writing
+
+
 def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:
     one = channel("a", answered="a")
     number = one.number("a", 1)
