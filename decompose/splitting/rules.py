@@ -38,8 +38,8 @@ Rules = Table[str, Sequence[str]]
 def owned_by_rules(net: Net, rules: Rules) -> Net:
     """The net with the owners that the rules give, whatever owners it had before, and the controllers of the rules.
 
-    A rule is asked of the name in the file. Raises `InputError` with every reason: F2011 for a place or signal that no
-    rule gives an owner, F2023 for one that two rules do, F2002 for a pattern that matches nothing.
+    A rule is asked of the name in the file. Raises `InputError`: F2002 for a pattern that matches nothing, F2023 for a
+    place or signal to which two rules give an owner; F2011, with none of these, for one to which no rule does.
     """
     names = [*(place.name for place in net.places), *(signal.name for signal in net.signals)]
     problems: list[Diagnostic] = []
@@ -58,6 +58,8 @@ def owned_by_rules(net: Net, rules: Rules) -> Net:
         if len(owners) > 1:
             message = f"'{name}' is given to each of {', '.join(owners)}"
             problems.append(Diagnostic("F2023", message, "narrow one of the rules", _subject(places, name)))
+    if problems:  # what these rules leave without an owner is no news beside them
+        raise InputError(problems)
     _follow(net, by_rule)
     for name, owners in by_rule.items():
         if not owners:

@@ -157,3 +157,12 @@ def test_split_says_what_a_vote_without_promise_is_and_ends_no_line_in_spaces(
     assert main(["split", "catalogue:two_cells"]) == 0
     told = capsys.readouterr().out
     assert not [line for line in told.splitlines() if line != line.rstrip()]
+
+
+def test_a_pattern_that_matches_nothing_is_told_without_what_follows_from_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["split", "catalogue:one_robot", "--own", "a=zz*"]) == 2
+    said = capsys.readouterr().err
+    assert "F2002" in said
+    assert "F2011" not in said
