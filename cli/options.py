@@ -123,6 +123,18 @@ def catalogue_file(argument: str, kind: str) -> Path:
     return path.with_name(f"{name}.plant.yaml") if kind == "plant" else path
 
 
+def refuse_a_net(file: str, wanted: str, then: str = "") -> None:
+    """A net is no bundle: say what is wanted instead, and how a bundle is made of it, for the command `then`."""
+    from firable.nets.loading import PNML_SUFFIXES, TEXT_SUFFIXES
+
+    if file.startswith(CATALOGUE) or Path(file).suffix.lower() in PNML_SUFFIXES | TEXT_SUFFIXES:
+        bundle = f"{Path(file.removeprefix(CATALOGUE)).name.partition('.')[0] or 'net'}.bundle"
+        raise click.UsageError(
+            f"'{file}' is a net, and {wanted}: make a bundle by `firable bundle {file} -o {bundle}`"
+            + (f", then `{then} {bundle}`" if then else "")
+        )
+
+
 def _not_in_catalogue(name: str) -> str:
     from firable.nets.catalogue import FAMILIES, catalogue_names
 

@@ -17,6 +17,10 @@ def sign(bundle: str | None, key: str | None, make_key: str | None) -> int:
     """
     if (bundle is None) != (key is None) or (bundle is None and make_key is None):
         raise click.UsageError("say which BUNDLE to sign, and with --key which key; --make-key FILE makes one")
+    from firable.cli.options import refuse_a_net
+
+    if bundle is not None:
+        refuse_a_net(bundle, "what is signed is a bundle", f"firable sign --key {key}")
     from firable.nets import signing
     from firable.nets.bundle import read_bundle
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from firable.cli.options import analysis_options, budget
+from firable.cli.options import analysis_options, budget, refuse_a_net
 
 if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
@@ -40,6 +40,8 @@ def takeover(
     from firable.executor.protocol.messages import Keep
     from firable.nets.bundle import read_bundle
 
+    for bundle in (old, new):
+        refuse_a_net(bundle, "a cell is taken over from bundle to bundle")
     before, after = read_bundle(old), load(new)
     _refuse_missing(journal)
     _refuse_standing(into)

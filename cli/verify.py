@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
-from firable.cli.options import CATALOGUE, answer_all, format_option, load_net, write_folder
+from firable.cli.options import answer_all, format_option, load_net, refuse_a_net, write_folder
 from firable.cli.progress import stages
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
@@ -69,7 +69,7 @@ def verify(
     edited, is about another net, or does not show what it claims. What a bundle itself leaves undecided claims nothing.
     """
     for file in evidence:
-        _refuse_a_net(file)
+        refuse_a_net(file, "what is verified is evidence of one", "firable verify")
     milliseconds = max(1, round(timeout * 1000))
     net = None if of is None else load_net(of).net
     many = len(evidence) > 1
@@ -78,18 +78,6 @@ def verify(
         raise click.UsageError("--trust is for bundles: documents of evidence are not signed, and need not be")
     makers = [partial(_of_bundle if _is_bundle(file) else _report, file, asked) for file in evidence]
     return answer_all("verify", format_, makers, _show)
-
-
-def _refuse_a_net(file: str) -> None:
-    """A net is no evidence: say how a bundle is made of it."""
-    from firable.nets.loading import PNML_SUFFIXES, TEXT_SUFFIXES
-
-    if file.startswith(CATALOGUE) or Path(file).suffix.lower() in PNML_SUFFIXES | TEXT_SUFFIXES:
-        bundle = f"{Path(file.removeprefix(CATALOGUE)).name.partition('.')[0] or 'net'}.bundle"
-        raise click.UsageError(
-            f"'{file}' is a net, and what is verified is evidence of one: make a bundle by "
-            f"`firable bundle {file} -o {bundle}`, then `firable verify {bundle}`"
-        )
 
 
 @dataclass(frozen=True)

@@ -147,7 +147,9 @@ def read_document(path: str | Path) -> Document:
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
-        raise _damaged(file, "it is not UTF-8") from None
+        raise _neither(file) from None
+    if not text.lstrip().startswith("{"):
+        raise _neither(file)
     return document_from_text(text, file)
 
 
@@ -172,6 +174,12 @@ def document_from_text(text: str, file: str = "") -> Document:
     except (ValueError, RecursionError) as error:  # not JSON, or what is raised here
         raise _damaged(file, str(error)) from None
     return document
+
+
+def _neither(file: str) -> InputError:
+    message = "this is neither a bundle nor a document of evidence"
+    hint = "`firable bundle NET -o FILE` makes a bundle, and `firable check --evidence DIR` writes evidence"
+    return InputError([Diagnostic("F6001", message, hint, span=Span(printable(file), 1, 1))])
 
 
 def _damaged(file: str, reason: str) -> InputError:

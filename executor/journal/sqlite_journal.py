@@ -184,9 +184,10 @@ class SqliteJournal:
 
     def _damaged(self, what: str) -> NoReturn:
         message = f"{printable(str(self.path))}: the journal is damaged: {what}"
+        name = printable(self.path.name)
         hint = (
             "what the cell did last is not known from it: look at the machines and bring the cell to its initial "
-            "marking, then move this folder away and start anew"
+            f"marking, then move {name}, {name}.generation and {name}.cell away (those there are), and start anew"
         )
         raise InputError([Diagnostic("F5032", message, hint)])
 

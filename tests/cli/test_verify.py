@@ -165,3 +165,15 @@ def test_a_large_document_is_compressed_and_read_like_any_other(
     packed.write_bytes(gzip.compress(invariant.read_bytes())[:-9])
     assert main(["verify", str(packed)]) == 2
     assert "error[F6001]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("data", [b"garbage", b"\xff\xfe\x00garbage", b""])
+def test_what_is_neither_a_bundle_nor_evidence_is_told_so(
+    data: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "bad.bundle"
+    file.write_bytes(data)
+    assert main(["verify", str(file)]) == 2
+    said = capsys.readouterr().err
+    assert "this is neither a bundle nor a document of evidence" in said
+    assert "Expecting value" not in said
