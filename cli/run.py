@@ -12,7 +12,7 @@ from firable.cli import text
 from firable.cli.bound_run import run_bound_of, show_bound
 from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
 from firable.cli.operate import ServeOptions, serve_options
-from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option
+from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option, refuse_a_net
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
 from firable.cli.watched import machines_verdict
@@ -103,6 +103,7 @@ def run(
     linked to this one by --listen and --join, or by --serial. A host that holds another bundle is refused. The run ends
     by Ctrl-C; `firable replay` joins the traces of all hosts. Without machines, --dry-run tries all that.
     """
+    refuse_a_net(bundle, "what runs is a bundle", "firable run")
     options = HostOptions(**host)
     if not options.is_one_of_several:
         options.refuse_alone()
@@ -256,7 +257,7 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
             f"{workpieces} workpieces go through the cell",
             method,
             bound=f"{through} went through" if ended is Status.UNKNOWN else "",
-            hint=report.situation.message if ended is Status.VIOLATED else "",
+            hint=_why(report) if ended is Status.VIOLATED else "",
             subjects=tuple(map(str, report.situation.blocked)) if ended is Status.VIOLATED else (),
         ),
         Verdict(
@@ -268,6 +269,12 @@ def _verdicts(report: RunReport, workpieces: int, seed: int) -> tuple[Verdict, .
         ),
     ]
     return (*verdicts, *machines_verdict(report, method))
+
+
+def _why(report: RunReport) -> str:
+    """Why the workpieces did not go through; what the verdict on the machines tells is not told twice."""
+    found, message = report.divergence, report.situation.message
+    return message if found is None else message.replace(f": {found}", "; see machines-as-modelled")
 
 
 def _show(report: Report) -> None:
@@ -295,7 +302,7 @@ def _show(report: Report) -> None:
     if several:
         told = ", ".join(f"{count:,} by {name}" for name, count in done["decided"].items())
         click.echo(f"  decided: {told}")
-    if done["state"] == "stopped":
+    if done["state"] in {"stopped", "done"} and done["message"]:
         click.echo(f"  {done['message']}")
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
     if refuted:

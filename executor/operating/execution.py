@@ -67,6 +67,10 @@ FIRINGS_AT_ONCE_MAX: Final = 100_000
 """More firings at one instant of virtual time are a net that runs in circles without its cell."""
 
 
+_END: Final = "end"
+"""Under which the journal keeps, beside the trace, that all the work of the run was done."""
+
+
 @dataclass(frozen=True, slots=True)
 class RunClock:
     """The time of a run on the present event loop, `speed` times as fast as the loop's."""
@@ -133,6 +137,7 @@ class Execution:
         """What a restart has found out, as long as the controllers are held."""
         if any(controller.held for controller in self.controllers.values()):
             self.taking_up = restart.TakingUp(said or {}, resume=resume)
+        self.was_done = self.journal.kept(TRACE).get(_END) == State.DONE.value
         self.leaving: deque[Sending] = deque()
         """The commands that wait for the journal."""
         self.owner_of = {signal.name: subnet.name for subnet in decomposition.subnets for signal in subnet.signals}
@@ -566,6 +571,8 @@ class Execution:
         self.quiet_waiters.clear()
         ended = self._ended()
         if ended is not None:
+            if ended.state is State.DONE:
+                self.journal.write(TRACE, [Keep(_END, ended.state.value)])
             self._commit()
             self.outcome.set_result(ended)
 
@@ -578,7 +585,12 @@ class Execution:
         if self.stopping:
             return replace(self.situation(), state=State.STOPPED, message=self.ended_by)
         if self.taking_up is not None:
-            return self.situation() if self.taking_up.is_final and not self.operated else None
+            if not self.taking_up.is_final or self.operated:
+                return None
+            if self.was_done and self.is_complete():
+                message = "this run was done before, and nothing moved; to run the bundle again, name a new journal"
+                return replace(self.situation(), state=State.DONE, message=message)
+            return self.situation()
         # What a pause holds back still has to fire before the cycle, or the work, is at its end.
         if self.at_rest and self.draining and not self.paused:
             return replace(self.situation(), state=State.STOPPED, message="stopped at the end of the cycle")

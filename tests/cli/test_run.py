@@ -9,8 +9,13 @@ import time
 from pathlib import Path
 
 import pytest
+from support.cells import decomposition_of, plant_of
 
 from firable.cli.main import main
+from firable.cli.run import _verdicts
+from firable.executor import execute
+from firable.executor.cell.plant import NeverCompletes
+from firable.executor.operating.running import Watch
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.semantics.replaying import replay
 from firable.semantics.trace import Noted, read_trace
@@ -245,3 +250,50 @@ def test_a_word_on_no_command_is_refused(
 ) -> None:
     assert main(["run", bundle, *options]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_a_run_that_is_done_is_known_as_done_when_it_is_started_again(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    journal = tmp_path / "cell.journal"
+    arguments = ["run", bundle, "--plant", str(PLANT), "--workpieces", "2", "--journal", str(journal)]
+    assert main(arguments) == 0
+    capsys.readouterr()
+    for _ in range(2):
+        assert main(arguments) == 0
+        said = capsys.readouterr().out
+        assert "this run was done before" in said
+        assert "name a new journal" in said
+        assert "interrupted" not in said
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "catalogue:one_robot"],
+        ["run", "cell.pnml"],
+        ["sign", "catalogue:one_robot", "--key", "k"],
+        ["takeover", "catalogue:one_robot", "x.bundle", "--journal", "a", "--into", "b"],
+    ],
+)
+def test_a_net_in_the_place_of_a_bundle_is_refused_with_how_a_bundle_is_made(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert "is a net, and " in said
+    assert f"firable bundle {arguments[1]} -o " in said
+
+
+def test_a_run_that_is_stopped_at_a_divergence_tells_it_once() -> None:
+    report = execute(
+        decomposition_of("one_robot"),
+        plant_of("one_robot"),
+        workpieces=3,
+        disturbances=[NeverCompletes("R", "MOVE", 3)],
+        watch=Watch.STOP,
+    )
+    assert report.divergence is not None
+    through, _, machines = _verdicts(report, 3, 0)
+    assert through.hint == "the machines are not as they are modelled; see machines-as-modelled"
+    assert report.divergence.message in machines.hint
