@@ -39,7 +39,7 @@ def owned_by_rules(net: Net, rules: Rules) -> Net:
     """The net with the owners that the rules give, whatever owners it had before, and the controllers of the rules.
 
     A rule is asked of the name in the file. Raises `InputError`: F2002 for a pattern that matches nothing, F2023 for a
-    place or signal to which two rules give an owner; F2011, with none of these, for one to which no rule does.
+    place or signal to which two rules give an owner; F2011, with no F2002, for one to which no rule does.
     """
     names = [*(place.name for place in net.places), *(signal.name for signal in net.signals)]
     problems: list[Diagnostic] = []
@@ -58,7 +58,7 @@ def owned_by_rules(net: Net, rules: Rules) -> Net:
         if len(owners) > 1:
             message = f"'{name}' is given to each of {', '.join(owners)}"
             problems.append(Diagnostic("F2023", message, "narrow one of the rules", _subject(places, name)))
-    if problems:  # what these rules leave without an owner is no news beside them
+    if any(problem.code == "F2002" for problem in problems):  # what it leaves without an owner follows from it
         raise InputError(problems)
     _follow(net, by_rule)
     for name, owners in by_rule.items():

@@ -93,7 +93,8 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         tmp_path / ("x" * 300),
     ):
         for command in (["check"], ["prove"], ["bundle", "-o", str(tmp_path / "b")], ["run"], ["draw"]):
-            assert "error[F" in refused(capsys, *command, str(path))
+            said = refused(capsys, *command, str(path))  # by its name it may be a net, which does not run
+            assert "error[F" in said or (command == ["run"] and "is a net, and what runs is a bundle" in said)
         assert "error[F" in refused(capsys, "replay", str(path), "--net", "catalogue:one_robot")
         assert "error[F" in refused(capsys, "convert", str(path), "-o", str(tmp_path / "out.pnml"))
     assert not (tmp_path / "b").exists()
