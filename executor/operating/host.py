@@ -135,6 +135,8 @@ class Host:
         self.firing = dict.fromkeys(self.controllers, 0)
         """How often each has fired without anything from outside."""
         self.stopping = False
+        self.is_safe = False
+        """Whether the safe outputs are driven: then no command is sent, and those issued are asked after, later."""
         self.fault = ""
         self.messages = 0
         self.repeats = 0
@@ -175,7 +177,7 @@ class Host:
             self.stop()  # Ctrl-C, or a request to terminate: the host ends in order
             return await self.outcome
         finally:
-            self.driver.stop()
+            self._make_safe()
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -388,7 +390,8 @@ class Host:
         for effect in leaving:
             match effect:
                 case Sending(place, entry):
-                    self._send(place, entry)
+                    if not self.is_safe:
+                        self._send(place, entry)
                 case VoteRequest() | Decision() | Hello():
                     self.link.send(effect.coordinator, effect.controller, effect)
                 case Report() | Vote() | Acknowledgement():
@@ -398,6 +401,8 @@ class Host:
         self._watch(place)
         sender = self.net.place(place)
         self.driver.send(sender, entry)
+        if self.is_safe:  # it has failed at that
+            return
         owner = str(sender.owner)
         self._act(owner, self.controllers[owner].sent(place, entry))
         if sender.completion is None:  # its token waited for that
@@ -474,9 +479,14 @@ class Host:
         if not self.fault:
             self.fault = message
             self.stopping = True
-            self.driver.stop()
+            self._make_safe()
             self._told("fault", message)
             asyncio.get_running_loop().call_soon(self._end)
+
+    def _make_safe(self) -> None:
+        """Stop the driver: what it is handed from now on it drops, so nothing is, and no command counts as sent."""
+        self.driver.stop()
+        self.is_safe = True
 
     def _is_settled(self) -> bool:
         """Whether nothing is open: whatever was decided is applied, and no part is promised."""

@@ -1,24 +1,38 @@
 """The hosts of a cell: alone, together, cut off, killed and started anew; their traces join to one of the net."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
 from support.hosts import ALL_IN_ONE, ONE_EACH, TOGETHER, Cell
 
+from firable.decompose import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.driver import Answer as DriversAnswer
 from firable.executor.drivers.dry_run import DryRunDriver
-from firable.executor.links.link import COORDINATOR
+from firable.executor.journal.journal import MemoryJournal
+from firable.executor.links.in_process import Exchange, InProcessLink
+from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.operating.host import Host
+from firable.executor.operating.host_trace import TRACE, HostTrace
 from firable.executor.operating.hosting import _resume
 from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
-from firable.executor.protocol.messages import Decision, Vote, VoteRequest
+from firable.executor.protocol.messages import Decision, Stored, Vote, VoteRequest
 from firable.nets.net import Place
+from firable.nets.text import parse_net
 from firable.semantics.trace import Noted, read_trace
 
+LAMP = """\
+firable: 1
+cell: cell
+controllers:
+  a: {start: free, inputs: key, places: {free: , lamp: {send: {machine: A, command: OPEN}}}}
+  b: {start: idle, places: {idle: , has: }}
+transitions:
+  hand: {from: [a.free, b.idle], to: [a.lamp, b.has], if: a.key}
+"""
 CENTRE = (COORDINATOR,)
 ROBOT = ("robot",)
 
@@ -302,5 +316,38 @@ def test_a_host_that_is_to_resume_by_itself_commands_nothing_after_a_stop(
         assert driver.sent == 0
         assert not host.resume()
         await cell.stop()
+
+    run_in_virtual_time(main())
+
+
+def test_a_command_that_is_decided_when_the_driver_fails_is_asked_after_at_the_restart(tmp_path: Path) -> None:
+    class Kept(MemoryJournal):
+        durable: Mapping[str, Stored] = {}
+
+        def sync(self) -> None:
+            self.durable = dict(self.kept("a"))
+
+    class Noting(DryRunDriver):
+        sent = 0
+
+        def send(self, place: Place, entry: int) -> None:
+            super().send(place, entry)
+            self.sent += 1
+
+    async def main() -> None:
+        decomposition, journal = split(parse_net(LAMP)), Kept()
+        driver = Noting([decomposition.subnet("a")], 1.0)
+        link = InProcessLink(Exchange(), Greeting("d", ("a",)))
+        trace = HostTrace(decomposition.net, ("a",), tmp_path / "trace", journal.kept(TRACE))
+        host = Host(decomposition, ("a",), driver, link, trace, journal)
+        ending = asyncio.create_task(host.main())
+        await asyncio.sleep(0.05)
+        host.arrived("", "a", VoteRequest("a", 0, ("hand",), 0, -1))
+        await asyncio.sleep(0.05)
+        host.arrived("", "a", Decision("a", 0, "hand", 0, -1))
+        host.driver_fault("A", "failed")
+        assert (await ending).state is State.FAULT
+        assert driver.sent == 0
+        assert journal.durable["command/place/a.lamp"] == ("a.lamp", 1, "issued")
 
     run_in_virtual_time(main())
