@@ -38,6 +38,7 @@ from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import Situation, State, blocked
 from firable.executor.operating.taken_up import TRACE
+from firable.executor.operating.uncut import uncut
 from firable.executor.operating.watching import Watching
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
@@ -193,13 +194,14 @@ class Execution:
             return await asyncio.shield(self.outcome)
         except asyncio.CancelledError:
             self.stop()  # Ctrl-C is the operator's stop: the run ends in order, with its report and its trace
-            return await self.outcome
+            await uncut([self.outcome])
+            return self.outcome.result()
         finally:
             if self.taking_up is None or self.stopping:  # to look at a run that is held changes nothing
                 self.driver.stop()
             for task in tasks:
                 task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            await uncut(tasks)
             for alarm in (*self.overdue.values(), *self.ticks.values()):
                 alarm.cancel()
             if self.watching is not None:

@@ -36,6 +36,7 @@ from firable.executor.links.link import Link, called
 from firable.executor.operating.execution import FIRINGS_AT_ONCE_MAX, RunClock
 from firable.executor.operating.host_trace import TRACE, HostTrace
 from firable.executor.operating.situation import Blocked, Situation, State, blocked
+from firable.executor.operating.uncut import uncut
 from firable.executor.operating.waits import reached, waits
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
@@ -175,12 +176,13 @@ class Host:
             return await asyncio.shield(self.outcome)
         except asyncio.CancelledError:
             self.stop()  # Ctrl-C, or a request to terminate: the host ends in order
-            return await self.outcome
+            await uncut([self.outcome])
+            return self.outcome.result()
         finally:
             self._make_safe()
             for task in tasks:
                 task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            await uncut(tasks)
             for alarm in (*self.overdue.values(), *self.ticks.values()):
                 alarm.cancel()
 

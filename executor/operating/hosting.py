@@ -8,9 +8,7 @@ signed it; at connection the hosts compare what they hold.
 from __future__ import annotations
 
 import asyncio
-import signal
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from firable.executor.links.link import Greeting, Link
 from firable.executor.operating.host import Host, Told
 from firable.executor.operating.host_trace import TRACE, HostTrace
 from firable.executor.operating.situation import Situation
+from firable.executor.operating.uncut import ended_by_signals
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import TOP, controller_of, coordinator_at, coordinators
 from firable.nets.bundle import Bundle
@@ -154,13 +153,10 @@ def _journal(bundle: Bundle, machines: tuple[str, ...], path: Path | str | None)
 
 
 async def _terminable(host: Host, *, resume: bool) -> Situation:
-    task = asyncio.current_task()
-    if task is not None:
-        with suppress(NotImplementedError, RuntimeError, ValueError):
-            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
     resuming = asyncio.create_task(_resume(host)) if resume else None
     try:
-        return await host.main()
+        with ended_by_signals():
+            return await host.main()
     finally:
         if resuming is not None:
             resuming.cancel()

@@ -10,10 +10,8 @@ The simulated cell runs in virtual time unless a speed is given; then a run is a
 from __future__ import annotations
 
 import asyncio
-import signal
 from collections import Counter
 from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -29,6 +27,7 @@ from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.recorder import LineStream
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.taken_up import opened
+from firable.executor.operating.uncut import ended_by_signals
 from firable.executor.protocol.commands import Answer
 from firable.nets.bundle import Bundle, read_bundle
 from firable.nets.decomposition import Decomposition
@@ -315,13 +314,9 @@ def _decided(decomposition: Decomposition, firings: Mapping[str, int]) -> dict[s
 
 
 async def _terminable(execution: Execution) -> Situation:
-    """The execution, which a request to terminate ends in order, as Ctrl-C does: no machine is left on."""
-    task = asyncio.current_task()
-    if task is not None:
-        # Signals reach the main thread only, and event loops on some systems not at all.
-        with suppress(NotImplementedError, RuntimeError, ValueError):
-            asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
-    return await execution.main()
+    """The execution, which Ctrl-C or a request to terminate ends in order: no machine is left on."""
+    with ended_by_signals():
+        return await execution.main()
 
 
 async def _serving(

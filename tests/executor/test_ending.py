@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import io
+import signal
 from collections.abc import Callable
 
 import pytest
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
-from firable.executor.drivers.driver import Answer
+from firable.executor.drivers.driver import Answer, Clock, Listener
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.operating.execution import Execution
 from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.running import _terminable
 from firable.executor.operating.situation import State
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
@@ -170,3 +172,51 @@ def test_a_pause_while_a_run_is_held_holds_until_the_operator_resumes() -> None:
         await ending
 
     run_in_virtual_time(main())
+
+
+class Slow(Machine):
+    """A machine that takes a while to be stopped."""
+
+    is_off = False
+
+    async def run(self, clock: Clock, listener: Listener) -> None:
+        try:
+            await super().run(clock, listener)
+        finally:
+            await asyncio.sleep(1)
+            self.is_off = True
+
+
+def slow() -> tuple[Execution, Slow]:
+    run, machine = run_of(MemoryJournal())
+    run.driver = slowly = Slow([split(run.net).subnet("robot")], 1.0)
+    slowly.sent = machine.sent
+    return run, slowly
+
+
+def test_whoever_cancels_again_does_not_cut_off_the_safe_outputs() -> None:
+    async def main() -> None:
+        run, machine = slow()
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(1)
+        for _ in range(4):
+            ending.cancel()
+            await asyncio.sleep(0.1)
+        assert (await ending).state is State.STOPPED
+        assert machine.is_off
+
+    run_in_virtual_time(main())
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_second_signal_does_not_cut_off_the_safe_outputs(number: signal.Signals) -> None:
+    run, machine = slow()
+
+    async def ended() -> State:
+        loop = asyncio.get_running_loop()
+        for at in (1.0, 1.5, 1.7):
+            loop.call_later(at, signal.raise_signal, number)
+        return (await _terminable(run)).state
+
+    assert run_in_virtual_time(ended()) is State.STOPPED
+    assert machine.is_off
