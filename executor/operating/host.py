@@ -139,6 +139,7 @@ class Host:
         self.is_safe = False
         """Whether the safe outputs are driven: then no command is sent, and those issued are asked after, later."""
         self.fault = ""
+        self.ended_by = ""
         self.messages = 0
         self.repeats = 0
         self.overdue: dict[str, asyncio.TimerHandle] = {}
@@ -191,7 +192,7 @@ class Host:
         found: list[Blocked] = []
         for controller in self.controllers.values():
             found += blocked(controller.player, controller.word)
-        message = self.fault or "; ".join(self.waits())
+        message = self.fault or self.ended_by or "; ".join(self.waits())
         state = State.FAULT if self.fault else State.STOPPED if self.stopping else State.WAITING
         return Situation(state, self.marking, tuple(found), message)
 
@@ -215,6 +216,20 @@ class Host:
                 self._act(name, coordinator.permit(0))
             asyncio.get_running_loop().call_later(self.settle_seconds, self._end)
             self._wake()
+
+    def emergency_stop(self, reason: str) -> None:
+        """Drive the safe outputs at once, before anything is written or said; then the host ends as by `stop`.
+
+        What was decided is applied, so that no other host waits for it; the commands of it are not sent, and asked
+        after at the restart.
+        """
+        self._make_safe()
+        self.ended_by = f"emergency stop: {reason}"
+        try:
+            self.trace.note("emergency stop", reason=reason)
+            self.stop()
+        except Exception as error:  # whoever calls may swallow it
+            self._broken(error)
 
     def resume(self) -> bool:
         """End the hold of the controllers after a restart; those with a command that nobody knows of stay held.

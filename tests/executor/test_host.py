@@ -351,3 +351,28 @@ def test_a_command_that_is_decided_when_the_driver_fails_is_asked_after_at_the_r
         assert journal.durable["command/place/a.lamp"] == ("a.lamp", 1, "issued")
 
     run_in_virtual_time(main())
+
+
+def test_an_emergency_stop_of_a_host_is_safe_first_and_commands_nothing_more(tmp_path: Path) -> None:
+    class Strict(DryRunDriver):
+        def send(self, place: Place, entry: int) -> None:
+            assert not self.is_stopped
+            super().send(place, entry)
+
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        host = cell.hosts[ROBOT]
+        driver = host.driver = Strict([cell.decomposition.subnet("robot")], 1.0)
+        await asyncio.sleep(3.5)
+        host.emergency_stop("a person in the cell")
+        assert driver.is_stopped
+        assert host.outcome is not None
+        assert not host.outcome.done()
+        ended = await cell.tasks[ROBOT]
+        assert (ended.state, ended.message) == (State.STOPPED, "emergency stop: a person in the cell")
+        assert not host.resume()
+        await cell.stop()
+        notes = [event for event in read_trace(cell.path(ROBOT)).events if isinstance(event, Noted)]
+        assert any(event.note == "emergency stop" for event in notes)
+
+    run_in_virtual_time(main())
