@@ -18,7 +18,7 @@ from firable.executor.drivers.device import Point, Value, Writes, as_bit
 from firable.executor.drivers.driver import Answer, Clock, Listener, Quality, Reading
 from firable.executor.drivers.fitting import misfits
 from firable.executor.drivers.image import Change, Image
-from firable.executor.drivers.keeping import Kept, ended
+from firable.executor.drivers.keeping import Kept, ended, uninterrupted
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Net, Place, SignalKind
 
@@ -75,10 +75,18 @@ class BoundDriver:
                 task.result()
         finally:
             self.stop()
-            stopping = [asyncio.create_task(device.kept.stopped.wait()) for device in self.devices.values()]
-            longest = max((device.document.timeout_s for device in self.devices.values()), default=0.0)
-            await asyncio.wait(stopping, timeout=2 * longest)
-            await ended([*tasks, *stopping])
+            await uninterrupted(self._stopped(tasks))
+
+    async def _stopped(self, tasks: Sequence[asyncio.Task[None]]) -> None:
+        """Wait until each device is safe or has had its time, and tell of those that are not."""
+        stopping = [asyncio.create_task(device.kept.stopped.wait()) for device in self.devices.values()]
+        longest = max((device.document.timeout_s for device in self.devices.values()), default=0.0)
+        if stopping:
+            await asyncio.wait(stopping, timeout=3 * longest)
+        await ended([*tasks, *stopping])
+        for device in self.devices.values():
+            if not device.kept.is_safe:
+                device.note("has not confirmed its safe outputs: they are left to its watchdog")
 
     def send(self, place: Place, entry: int) -> None:
         """Send the command of a place, or keep it until its device is connected."""
@@ -205,7 +213,7 @@ class _Device:
     def stop(self) -> None:
         """Drive the safe outputs, and say so where that cannot be."""
         if not self.kept.is_connected and (self.document.safe or self.document.heartbeat is not None):
-            self.note("not connected: the safe outputs are left to its watchdog")
+            self.note("not connected: the stop is left to its watchdog until it is reached again")
         self.kept.stop()
 
     @property

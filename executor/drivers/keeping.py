@@ -6,8 +6,12 @@ the last thing. A connection that has failed in any way is closed and never aske
 pause that doubles up to a bound, and is read before it is written, because what the device shows then decides what is
 still to be sent.
 
-The safe outputs are not driven on a *later* connection. What the machines do while the line is down is for the device's
-own watchdog, which knows of it in time; a driver that is back after a second would stop a machine that did its work.
+A stop breaks off what is being written and makes new connections until the device has confirmed the safe outputs, or
+has had its time.
+
+While the cell runs, the safe outputs are not driven on a *later* connection. What the machines do while the line is
+down is for the device's own watchdog, which knows of it in time; a driver that is back after a second would stop a
+machine that did its work.
 """
 
 from __future__ import annotations
@@ -45,6 +49,20 @@ async def ended(tasks: Collection[asyncio.Task[Any]]) -> None:
     for task in tasks:
         if not task.cancelled():
             task.exception()
+    if cancelled is not None:
+        raise cancelled
+
+
+async def uninterrupted(work: Coroutine[Any, Any, None]) -> None:
+    """Do something to its end, however often this is cancelled meanwhile; then the cancellation holds."""
+    task = asyncio.create_task(work)
+    cancelled: asyncio.CancelledError | None = None
+    while not task.done():
+        try:
+            await asyncio.wait((task,))
+        except asyncio.CancelledError as error:
+            cancelled = error
+    task.result()
     if cancelled is not None:
         raise cancelled
 
@@ -91,7 +109,11 @@ class Kept:
         self.is_connected = False
         self.started = False
         """Whether the safe outputs of the start-up have been written."""
+        self.is_safe = not self.safe
+        """Whether the device has confirmed the safe outputs of the stop, where it has any."""
         self.stopping = False
+        self.halt = asyncio.Event()
+        """Set with the stop: a command that is being written is broken off."""
         self.stopped = asyncio.Event()
         """The safe outputs have been written for the last time, or cannot be."""
         self.beat = 0
@@ -99,7 +121,21 @@ class Kept:
         self.alive_value: Value | None = None
 
     async def run(self) -> None:
-        """Keep the device connected; ends when it is stopped."""
+        """Keep the device connected; ends when it is stopped, and safe as far as it can be reached in time."""
+        try:
+            await self._keep()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(2 * self.document.timeout_s):
+                    while not self.is_safe:
+                        try:
+                            await self._connected()
+                        except _FAILURES as error:
+                            self.served.lost(str(error) or "no answer in time")
+                            await asyncio.sleep(self.document.retry_s)
+        finally:
+            self.stopped.set()
+
+    async def _keep(self) -> None:
         pause_s = self.document.retry_s
         while not self.stopping:
             before = self.connections
@@ -112,14 +148,12 @@ class Kept:
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._asked_to_stop(), pause_s)
             pause_s = min(2 * pause_s, self.document.retry_max_s)
-        self.stopped.set()
 
     def stop(self) -> None:
         """Write the safe outputs and nothing afterwards."""
         self.stopping = True
+        self.halt.set()
         self.awake.set()
-        if not self.is_connected:
-            self.stopped.set()
 
     async def _asked_to_stop(self) -> None:
         while not self.stopping:
@@ -135,8 +169,6 @@ class Kept:
             await self._first_of(self._serve(connection), self._watch())
         finally:
             self.is_connected = False
-            if self.stopping:
-                self.stopped.set()
             await connection.close()
 
     async def _serve(self, connection: Connection) -> None:
@@ -182,11 +214,11 @@ class Kept:
             # They take turns where a device is so slow that there is always a heartbeat to be sent.
             if not (is_due and not beaten) and (some := self.served.next_writes()) is not None:
                 beaten = False
-                await connection.write(some)
+                await self._put(connection, some)
                 self.served.written()
             elif is_due and heartbeat is not None:
                 beaten, due = True, loop.time() + heartbeat.every_s
-                await connection.write(((heartbeat.write, self.beat),))
+                await self._put(connection, ((heartbeat.write, self.beat),))
                 self.beat = (self.beat + 1) % BEATS
             else:
                 timer = None if heartbeat is None else loop.call_later(due - loop.time(), self.awake.set)
@@ -194,6 +226,19 @@ class Kept:
                 if timer is not None:
                     timer.cancel()
         await connection.write(self.safe)
+        self.is_safe = True
+
+    async def _put(self, connection: Connection, some: Writes) -> None:
+        """Write, and break it off at a stop, so that no machine starts after it; the connection is of no use then."""
+        writing = asyncio.ensure_future(connection.write(some))
+        halting = asyncio.create_task(self.halt.wait())
+        try:
+            await asyncio.wait((writing, halting), return_when=asyncio.FIRST_COMPLETED)
+            if not writing.done():
+                raise LinkError("stopped while something was written")
+            writing.result()
+        finally:
+            await ended((writing, halting))
 
     async def _watch(self) -> None:
         """End the connection when the device has not changed its sign of life in time."""

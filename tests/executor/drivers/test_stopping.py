@@ -1,0 +1,48 @@
+"""A stop reaches the machines: after a link that was lost, over a write in flight, and however often it is said."""
+
+import asyncio
+from importlib.metadata import EntryPoint
+
+import pytest
+from support.third_party_driver import MemoryEnd
+
+from firable.executor.drivers import kinds
+from firable.executor.drivers.bench import Heard
+from firable.executor.drivers.binding import parse_binding
+from firable.executor.drivers.bound import BoundDriver
+
+BINDING = """{firable_bind: 1, cell: c, devices: {D: {driver: theirs, memory: stopping, timeout_s: 0.5, retry_s: 0.02,
+safe: {output: false}}}}"""
+
+
+@pytest.mark.parametrize("when", ["link lost", "write in flight", "cancelled twice"])
+def test_safe_outputs_are_driven_and_nothing_after_them(when: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    entry = EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP)
+    monkeypatch.setattr(kinds, "entry_points", lambda **_: [entry])
+    written: list[str] = []
+
+    async def main() -> None:
+        end, heard = MemoryEnd("stopping"), Heard()
+        await end.start(lambda point, _: written.append(point))
+        driver = BoundDriver(parse_binding(BINDING), (), frozenset())
+        task = asyncio.create_task(driver.run(heard, heard))
+        await asyncio.wait_for(driver.devices["D"].is_ready.wait(), 5)
+        await asyncio.sleep(0.02)
+        written.clear()
+        end.faults.delay_s = 0.05
+        if when == "link lost":
+            await end.cut()
+            await asyncio.sleep(0.05)
+        elif when == "write in flight":
+            driver.devices["D"].force("start", value=True)
+            await asyncio.sleep(0.02)
+        driver.stop()
+        task.cancel()
+        await asyncio.sleep(0.03)
+        await end.mend()
+        if when == "cancelled twice":
+            task.cancel()
+        await asyncio.wait((task,), timeout=5)
+
+    asyncio.run(main())
+    assert written == ["output"]
