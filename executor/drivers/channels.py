@@ -33,7 +33,7 @@ NUMBER_MAX: Final = 65_535
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """The command of a place, for one entry; a command without completion has no entry number of the controller's."""
+    """The command of a place, for one entry as the controller counts it."""
 
     place: str
     entry: int
@@ -77,8 +77,6 @@ class Channel:
         """Whether the device has shown the number of the newest order."""
         self.is_withdrawn = False
         """Whether the newest order is not to be written again, should its connection fail before the device has it."""
-        self.unanswered = 0
-        """How many commands without a completion were sent."""
 
     @property
     def is_writing(self) -> bool:
@@ -100,13 +98,7 @@ class Channel:
 
     def send(self, place: str, entry: int, text: str, writes: Writes) -> None:
         """Send a command as soon as that can be; `text` is the command as the net has it."""
-        if place not in self.answered:
-            self.unanswered += 1
-            entry = self.unanswered
-            while self.number(place, entry) in self.shown.values():  # a machine that has this number would ignore it
-                self.unanswered += 1
-                entry = self.unanswered
-        else:
+        if place in self.answered:  # without a completion, each is to be done
             self.withdraw(place)
         self.waiting.append(Order(place, entry, self.number(place, entry), text, writes))
 

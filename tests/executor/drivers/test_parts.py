@@ -153,6 +153,17 @@ def test_command_that_was_given_up_or_followed_by_another_of_its_place_is_not_se
     assert not one.is_writing
 
 
+def test_command_without_completion_is_asked_after_by_the_number_that_it_was_sent_with() -> None:
+    one = channel("a", "b")
+    one.send("b", 2, "", ())
+    assert after(one, taken=0, done=0) == (("n", one.number("b", 2)),)
+    again = channel("a", "b")
+    for key in ("taken", "done"):
+        again.shows(key, one.number("b", 2))
+    assert again.answer("b", 3, stopped=False) is Answer.UNKNOWN
+    assert again.answer("b", 2, stopped=False) is Answer.DONE
+
+
 def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:
     one = channel("a", answered="a")
     number = one.number("a", 1)
