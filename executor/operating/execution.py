@@ -242,10 +242,7 @@ class Execution:
         """Let nothing fire any more; machines end the command they are at."""
         if not self.paused:
             self.paused = True
-            with self._breaking():
-                self.recorder.note(self.now_seconds(), "paused")
-                self._permit(0)
-            self._settle()
+            self._halt("paused")
 
     def resume(self) -> None:
         """Let transitions fire again after a pause, or after a restart once nothing about it is uncertain."""
@@ -297,10 +294,7 @@ class Execution:
             self.moved()
             return
         self.stopping = self.paused = True
-        with self._breaking():
-            self.recorder.note(self.now_seconds(), "stopped by the operator")
-            self._permit(0)
-        self._settle()
+        self._halt("stopped by the operator")
 
     def emergency_stop(self, reason: str) -> None:
         """Drive the safe outputs at once, before anything is written or said; the run ends, and can be taken up."""
@@ -308,10 +302,7 @@ class Execution:
         self.is_safe = True
         self.stopping = self.paused = True
         self.ended_by = f"emergency stop: {reason}"
-        with self._breaking():
-            self.recorder.note(self.now_seconds(), "emergency stop", reason=reason)
-            self._permit(0)
-        self._settle()
+        self._halt("emergency stop", reason=reason)
 
     def commanded(self, command: str, by: str) -> None:
         """Who commanded what stands in the trace."""
@@ -523,10 +514,14 @@ class Execution:
         if not self.fault:
             self.fault = message
             self.stopping = self.paused = True  # first, so that nothing fires whatever happens to the trace
-            with self._breaking():
-                self.recorder.note(self.now_seconds(), "fault", message=message)
-                self._permit(0)
-            self._settle()
+            self._halt("fault", message=message)
+
+    def _halt(self, note: str, **data: str) -> None:
+        """Let no coordinator commit anything more, and have the trace say why."""
+        with self._breaking():
+            self.recorder.note(self.now_seconds(), note, **data)
+            self._permit(0)
+        self._settle()
 
     def _permit(self, firings: int | None) -> None:
         """Let each coordinator commit so many transitions from now on; None is without limit."""
@@ -553,12 +548,8 @@ class Execution:
     # Quiescence
 
     def _settle(self) -> None:
-        """At quiescence, let leave what waits for it, wake who waits for it, and end the run if nothing will happen.
-
-        An error on the way ends the run, whoever called: a timer, or who serves an operator, would swallow it and leave
-        the machines on.
-        """
-        with self._breaking():
+        """At quiescence, let leave what waits for it, wake who waits for it, and end the run if nothing will happen."""
+        with self._breaking():  # a timer, or who serves an operator, would swallow it and leave the machines on
             self._quiesce()
 
     def _quiesce(self) -> None:
