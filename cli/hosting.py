@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
 from firable.cli import text
 from firable.cli.report import Report
+from firable.nets.source import printable
 
 if TYPE_CHECKING:
     from firable.executor.drivers.driver import Driver
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from firable.nets.bundle import Bundle
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.verdict import Verdict
+
+_ADDRESS: Final = re.compile(r"(tcp|tls)/(\[[0-9A-Fa-f:.]+(%\w+)?\]|[^\s/:\[\]#?]+):(?P<port>[0-9]{1,5})")
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -60,6 +64,16 @@ class HostOptions:
             raise click.UsageError(f"{names[0]} is for a host among others: say with --controller what runs here")
 
 
+def _addresses(_context: click.Context, option: click.Parameter, addresses: tuple[str, ...]) -> tuple[str, ...]:
+    """Refuse what is no address of a host, before anything is opened."""
+    for address in addresses:
+        match = _ADDRESS.fullmatch(address)
+        if match is None or not 0 < int(match["port"]) < 2**16:
+            known = "write tcp/HOST:PORT or tls/HOST:PORT, such as tcp/127.0.0.1:7447"
+            raise click.UsageError(f"{option.opts[0]} {printable(address)}: this is no address; {known}")
+    return addresses
+
+
 def host_options(command: F) -> F:
     """The options of a host; they come as the keywords of `HostOptions`."""
     for option in reversed(
@@ -72,9 +86,19 @@ def host_options(command: F) -> F:
             ),
             click.option("--coordinator", is_flag=True, help="Run the coordinator here, of a net that names none."),
             click.option(
-                "--listen", metavar="ADDRESS", multiple=True, help="Let hosts join here, such as tcp/127.0.0.1:7447."
+                "--listen",
+                metavar="ADDRESS",
+                multiple=True,
+                callback=_addresses,
+                help="Let hosts join here, such as tcp/127.0.0.1:7447.",
             ),
-            click.option("--join", metavar="ADDRESS", multiple=True, help="Join the host that listens there."),
+            click.option(
+                "--join",
+                metavar="ADDRESS",
+                multiple=True,
+                callback=_addresses,
+                help="Join the host that listens there.",
+            ),
             click.option(
                 "--tls",
                 nargs=3,

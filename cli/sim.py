@@ -104,6 +104,8 @@ async def _bound(
     if not protocols:
         binding = read_binding(str(bind))
         return binding, ends_of(binding)
+    path = bind or f"{net.name}.bind.yaml"
+    _refuse_what_is_not_ours(path)
     ends: dict[str, FarEnd] = {}
     ports = {name: PORTS[name] for name in protocols}
     if "serial" in protocols:
@@ -112,12 +114,26 @@ async def _bound(
         line = ends["serial"] = SerialEnd()
         line.line.open()
         ports["serial"] = line.line.near
-    path = bind or f"{net.name}.bind.yaml"
     text = binding_text(net, ports, model.sensors)
     binding = parse_binding(text, path)
     write_text(path, text)
     click.echo(f"{path}: {', '.join(f'{name} at {port}' for name, port in ports.items())}")
     return binding, ends | ends_of(binding.without(set(ends)))
+
+
+def _refuse_what_is_not_ours(path: str) -> None:
+    """Refuse (F1017) to write over a file that was not made here: it may be the binding of a site."""
+    from firable.executor.drivers.binding import SIZE_BYTES_MAX
+    from firable.executor.drivers.far_side.ends import DESCRIPTION
+    from firable.nets.diagnostics import Diagnostic, InputError
+    from firable.nets.source import printable, read_bytes
+
+    if path == "-" or not Path(path).is_file():  # what else may stand there is refused where it is written
+        return
+    if DESCRIPTION.encode() not in read_bytes(path, SIZE_BYTES_MAX).splitlines():
+        message = f"{printable(path)}: a file stands there that is not of firable sim, and may be the binding of a site"
+        hint = "name another file, or give --bind without protocols to serve what the file leads to"
+        raise InputError([Diagnostic("F1017", message, hint)])
 
 
 async def _serve(

@@ -11,6 +11,7 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from firable.executor.drivers.driver import Driver
 from firable.executor.journal.journal import Journal, MemoryJournal
@@ -26,6 +27,9 @@ from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
 from firable.nets.layers import Layers
 from firable.nets.net import Net
+from firable.nets.source import read_bytes
+
+CERTIFICATE_BYTES_MAX: Final = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +77,7 @@ def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLi
     """The link of a host; raises `ModuleNotFoundError` where the extra `zenoh` or `serial` is not installed.
 
     On a serial line controllers speak to the master alone: `InputError` F5021 where only some coordinators are there.
+    F1001 or F1003 where a certificate cannot be read: Zenoh would ask for them at a connection, and only try again.
     """
     greeting = Greeting(bundle.digest, machines)
     if isinstance(way, SerialLine):
@@ -88,6 +93,8 @@ def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLi
         return SerialLink(greeting, way.port, addresses, own, baud=way.baud, lease_seconds=way.lease_seconds)
     from firable.executor.links.zenoh_link import Certificates, ZenohLink
 
+    for file in way.certificates or ():
+        read_bytes(file, CERTIFICATE_BYTES_MAX)
     certificates = None if way.certificates is None else Certificates(*way.certificates)
     return ZenohLink(
         greeting, listen=way.listen, join=way.join, certificates=certificates, lease_seconds=way.lease_seconds

@@ -28,6 +28,14 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "both": (["--controller", "robot", "--join", "tcp/[::1]:1", "--dry-run", "1", "--bind", "x"], "one of them"),
     "an unknown controller": (["--controller", "robt", "--dry-run", "1", "--join", "tcp/[::1]:1"], "'robot'"),
     "no such line": (["--controller", "robot", "--dry-run", "1", "--serial", "/dev/no-line"], "F5021"),
+    "no address": (["--controller", "robot", "--dry-run", "1", "--join", "foo"], "--join foo: this is no address"),
+    "no port": (["--controller", "robot", "--dry-run", "1", "--listen", "tcp/127.0.0.1"], "write tcp/HOST:PORT"),
+    "a port too high": (["--controller", "robot", "--dry-run", "1", "--join", "tls/[::1]:65536"], "no address"),
+    "another protocol": (["--controller", "robot", "--dry-run", "1", "--join", "udp/[::1]:1"], "no address"),
+    "no certificates": (
+        ["--controller", "robot", "--dry-run", "1", "--join", "tls/[::1]:1", "--tls", "{bundle}", "no-cert", "no-key"],
+        "no-cert:1:1: error[F1001]",
+    ),
     "one file for two": (["--controller", "mc", "--trace", "{bundle}", "--journal", "x"], "overwrite"),
 }
 

@@ -134,3 +134,18 @@ def test_device_that_cannot_be_served_here_is_refused(tmp_path: Path, capsys: py
         bind.write_text(binding_text(NET, {"modbus": str(taken.getsockname()[1])}, SENSORS))
         assert main(["sim", "catalogue:one_robot", "--bind", str(bind)]) == 2
     assert "error[F5104]: the cell cannot be served: " in capsys.readouterr().err
+
+
+def test_a_binding_that_is_not_of_the_simulation_is_not_written_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bind = tmp_path / "site.bind.yaml"
+    command = ["sim", "catalogue:one_robot", "--serial", "--bind", str(bind), "--for", "0"]
+    bind.write_text("firable_bind: 1\ndescription: the real cell\n")
+    assert main(command) == 2
+    assert "error[F1017]" in capsys.readouterr().err
+    assert "the real cell" in bind.read_text()
+    bind.unlink()
+    assert main(command) == 0
+    assert main(command) == 0  # what it wrote itself it may write again
+    capsys.readouterr()

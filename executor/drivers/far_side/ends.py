@@ -21,6 +21,9 @@ PORTS: Final = {"modbus": "15020", "opcua": "14840", "mqtt": "11883", "serial": 
 
 HEARTBEAT_S: Final = 0.2
 
+DESCRIPTION: Final = "description: a simulated cell behind real servers, by firable sim"
+"""The line by which a binding that was made here is told from one of a site."""
+
 
 @dataclass(frozen=True)
 class _Layout:
@@ -79,7 +82,7 @@ def binding_text(net: Net, ports: Mapping[str, str], sensed: Collection[str]) ->
     lines = [
         "firable_bind: 1",
         f"cell: {net.name}",
-        "description: a simulated cell behind real servers, by firable sim",
+        DESCRIPTION,
     ]
     lines += ["", "devices:"]
     for layout in layouts:
