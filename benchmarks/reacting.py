@@ -108,6 +108,9 @@ class PingPong:
         """What was sent last is done."""
         return Answer.DONE if (place.name, entry) == self.last else Answer.UNKNOWN
 
+    def withdraw(self, place: Place) -> None:
+        """Nothing waits here."""
+
     def stop(self) -> None:
         """Nothing to stop."""
 
