@@ -202,9 +202,9 @@ class DriverConformance:
                 await b.far.end.mend()
                 await until(lambda: b.quality("held") == (False, Quality.GOOD), "the return")
                 await until(lambda: b.heard_of("one")[-1] == (False, None), "the value")
-                assert b.driver.devices["D"].kept.connections >= 2
+                await until(lambda: b.driver.devices["D"].kept.connections >= 2, "the new connection")
                 assert any("not connected" in note for note in b.heard.notes)
-                assert "D: connected again" in b.heard.notes
+                await until(lambda: "D: connected again" in b.heard.notes, "the note of it")
             assert b.heard.faults == []
 
         self.bench(test)

@@ -172,12 +172,15 @@ class Simulation:
                     self.events.append(CommandSent(at, place))
                     if completion := self.net.place(place).completion:
                         self.completing.append((completion, entry))
-                    owner = str(self.net.place(place).owner)
-                    self.controllers[owner].sent(place, entry)  # of which only a restart would know
+                    self._sent(place, entry)
                 case VoteRequest() | Decision() | Hello() | Report() | Vote() | Acknowledgement():
                     self.in_flight.append(effect)
                 case Keep():
                     pass  # nobody crashes here
+
+    def _sent(self, place: str, entry: int) -> None:
+        """The driver has the command; what the controller keeps of that is for a restart, of which there is none."""
+        self.controllers[str(self.net.place(place).owner)].sent(place, entry)
 
     def _quieten(self, *, fire: bool) -> None:
         """Deliver everything in order and repeat what is unanswered until nothing is; with `fire`, until one fires."""

@@ -153,6 +153,13 @@ class Crashing(Simulation):
         for effect in effects:
             if isinstance(effect, Sending) and effect.again and not cut:
                 self._completes(effect.place, effect.entry)
+        for effect in effects:
+            if isinstance(effect, Sending) and not cut:
+                taken = self.controllers[self.acting].sent(effect.place, effect.entry)
+                store(storage, (e for e in taken if isinstance(e, Keep) and not self._is_forgotten(e)))
+
+    def _sent(self, place: str, entry: int) -> None:
+        """It is done where the command is known to have left."""
 
     def _is_forgotten(self, write: Keep) -> bool:
         whose, prefix = self.forgets

@@ -99,6 +99,7 @@ class Hosts:
                     self._write(name, CommandSent(0, place))
                     if completion := self.net.place(place).completion:
                         self.completing.append((completion, entry))
+                    self.controllers[name].sent(place, entry)
                 case Vote():
                     data = {"controller": name, "round": effect.round, "promised": sorted(effect.promised)}
                     self._write(name, Noted(0, VOTED, data))
