@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import signal
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -61,6 +59,7 @@ def sim(
 
     from firable.executor.cell.plant import Plant
     from firable.executor.drivers.fitting import misfits as binding_misfits
+    from firable.executor.operating.uncut import ended_by_signals
     from firable.nets.diagnostics import InputError
     from firable.nets.machines.plant_file import misfits, read_plant
 
@@ -75,15 +74,12 @@ def sim(
         raise click.UsageError("name protocols, such as --modbus --opcua, or a binding to serve, with --bind")
 
     async def served() -> str:
-        task = asyncio.current_task()
-        if task is not None:
-            with suppress(NotImplementedError, RuntimeError, ValueError):  # not the main thread, or not this system
-                asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
-        binding, ends = await _bound(loaded, protocols, bind, model)
-        if problems := binding_misfits(binding, loaded):
-            raise InputError(problems)
-        cell = Plant(model, workpieces=workpieces, seed=seed, disturbances=disturbances)
-        return await _serve(binding, loaded, cell, ends, speed, seconds)
+        with ended_by_signals():
+            binding, ends = await _bound(loaded, protocols, bind, model)
+            if problems := binding_misfits(binding, loaded):
+                raise InputError(problems)
+            cell = Plant(model, workpieces=workpieces, seed=seed, disturbances=disturbances)
+            return await _serve(binding, loaded, cell, ends, speed, seconds)
 
     try:
         fault = asyncio.run(served())

@@ -49,7 +49,7 @@ class TraceFile:
     def __init__(self, path: Path | str, size_bytes: int = 0) -> None:
         self.path = path
         with self._failures():
-            self.stream = Path(path).open("r+" if size_bytes else "w", encoding="utf-8")  # noqa: SIM115 - kept open
+            self.stream = Path(path).open("r+" if size_bytes else "w", encoding="utf-8")  # noqa: SIM115 - as long as this object
             if size_bytes:
                 self._cut(size_bytes)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
+import threading
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -31,10 +32,10 @@ def ended_by_signals() -> Iterator[None]:
         while tasks:
             tasks.pop().cancel()
 
-    # Signals reach the main thread only, and event loops on some systems not at all.
-    with suppress(NotImplementedError, RuntimeError, ValueError):
-        for number in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(number, end)
+    if threading.current_thread() is threading.main_thread():  # no other is reached by signals
+        with suppress(NotImplementedError):  # an event loop of Windows, where Ctrl-C ends the run as Python does it
+            for number in (signal.SIGINT, signal.SIGTERM):
+                asyncio.get_running_loop().add_signal_handler(number, end)
     try:
         yield
     finally:
