@@ -2,7 +2,8 @@
 
 Pydantic reports every error with its path; here each becomes a diagnostic with a code, the place in the text and a
 hint. Wrong indentation is the mistake that makes the most noise: `places:` one level too far left is a controller named
-"places" with unknown keys. So errors below a name that is really a key are joined into one that says so.
+"places" with unknown keys. So errors below a name that is really a key are joined into one that says so, and so are
+those of all entries that stand in a wrong table, since the line that begins theirs is missing.
 """
 
 from __future__ import annotations
@@ -67,7 +68,13 @@ NET: Final = Shape(
             (("properties", "*", "leads_to"), doc.LeadsToDocument),
         )
     },
-    {"controllers": "controller", "places": "place", "transitions": "transition", "properties": "property"},
+    {
+        "controllers": "controller",
+        "places": "place",
+        "transitions": "transition",
+        "arbiters": "arbiter",
+        "properties": "property",
+    },
 )
 
 
@@ -119,7 +126,7 @@ def _first_misplaced(problems: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
 def _problem(
     source: Source, tree: Node, shape: Shape, path: Path, kind: str, message: str, context: dict[str, Any]
 ) -> Diagnostic:
-    if misplaced := _misplaced(source, tree, shape, path, kind):
+    if misplaced := _misplaced(source, tree, shape, path, kind) or _of_another_table(source, tree, shape, path):
         return misplaced
     found = list(nodes_along(tree, path))
     key, node = found[-1]
@@ -174,6 +181,29 @@ def _misplaced(source: Source, tree: Node, shape: Shape, path: Path, kind: str) 
                 f"'{name}' stands where the name of a {noun} is expected",
                 f"'{name}' is a key of the format: check the indentation of this line and of those below it",
                 subject=tuple(map(str, path[: length - 1])),
+                span=node_span(source, key),
+            )
+    return None
+
+
+def _of_another_table(source: Source, tree: Node, shape: Shape, path: Path) -> Diagnostic | None:
+    """The one diagnostic for entries that stand in the wrong table: transitions among the controllers, say."""
+    if len(path) < 3 or path[0] not in shape.nouns:
+        return None
+    key, entry = list(nodes_along(tree, path[:2]))[-1]
+    if key is None or not isinstance(entry, MappingNode) or not entry.entries:
+        return None
+    given = set(entry.entries)
+    if given <= set(shape.keys_at(path[:2])):
+        return None
+    for table, noun in shape.nouns.items():
+        if table != path[0] and given <= set(shape.keys_at((table, "*"))):
+            article = "an" if noun[0] in "aeiou" else "a"
+            return Diagnostic(
+                "F1008",
+                f"{quoted(str(path[1]))} has the keys of {article} {noun} but stands among the {path[0]}",
+                f"write `{table}:` in a line of its own above the first {noun}; check the indentation too",
+                subject=(str(path[0]), table),
                 span=node_span(source, key),
             )
     return None

@@ -87,6 +87,10 @@ TABLE = (
         "F1008 5:3", "'transitions' is a key of the format: check the indentation"),
     net("key of a transition beside it", T + "  t:\n  from: p\n  to: q\n", "F1008 5:3",
         "'from' is a key of the format: check the indentation"),
+    net("transitions without their line", "controllers:\n  r: {places: {p: , q: }}\n  t: {from: r.p, to: r.q}\n"
+        "  u: {description: back, from: r.q, to: r.p}\n", "F1008 5:3", "write `transitions:` in a line of its own"),
+    net("properties among the arbiters", "arbiters:\n  safe: {never: p}\n  served: {reachable: p}\n", "F1008 4:3",
+        "write `properties:` in a line of its own"),
     net("send without a command", "places: {p: {send: {machine: R}}}\n", "F1009 3:14", "add `command:`"),
     net("send without structure", "places: {p: {send: MOVE}}\n", "F1010 3:20", "a mapping, lines of `name: value`"),
     net("parameter that is a list", "places: {p: {send: {machine: R, command: M, to: [a]}}}\n", "F1010 3:49",
