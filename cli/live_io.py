@@ -120,6 +120,9 @@ class _Heard:
     def driver_note(self, machine: str, message: str) -> None:
         self._told(f"{machine}: {message}")
 
+    def emergency_stop(self, reason: str) -> None:
+        self._told(f"{click.style('emergency stop', fg='red')}: {reason}")
+
     def _told(self, line: str) -> None:
         self.lines = 0
         click.echo(line, err=True)

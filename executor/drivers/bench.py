@@ -90,6 +90,7 @@ class Heard:
     signals: list[tuple[str, bool, int | None]] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    emergencies: list[str] = field(default_factory=list)
 
     def signal(self, name: str, value: bool, entry: int | None) -> None:
         """Remember a value."""
@@ -102,6 +103,10 @@ class Heard:
     def driver_note(self, machine: str, message: str) -> None:
         """Remember a note."""
         self.notes.append(f"{machine}: {message}")
+
+    def emergency_stop(self, reason: str) -> None:
+        """Remember an emergency stop."""
+        self.emergencies.append(reason)
 
     def moved(self) -> None:
         """Nothing to remember."""

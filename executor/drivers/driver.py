@@ -69,6 +69,10 @@ class Listener(Protocol):
         """Something about a machine or its link that is no fault, for the trace: lost, found again, refused."""
         ...
 
+    def emergency_stop(self, reason: str) -> None:
+        """Somebody, or a device, asks for the emergency stop: every driver here is stopped before this returns."""
+        ...
+
     def moved(self) -> None:
         """Something happened in the cell, whether or not a signal shows it."""
         ...

@@ -33,6 +33,9 @@ class _Nobody:
     def driver_note(self, machine: str, message: str) -> None:
         """It was told in its time."""
 
+    def emergency_stop(self, reason: str) -> None:
+        """It was told in its time."""
+
     def moved(self) -> None:
         """It was told in its time."""
 
