@@ -17,7 +17,8 @@ CAMPAIGN ?= tests
 RUNS ?= 20000
 FROM ?= 0
 JOBS ?= $(shell nproc 2>/dev/null || echo 1)
-REHEARSED := one_robot two_robots_shared two_robots_separate one_robot_mc_late
+REHEARSED := $(addprefix catalogue:,one_robot two_robots_shared two_robots_separate one_robot_mc_late one_robot_timed \
+	two_cells) drawn drawn-timed drawn-layered
 
 # Public nets to test against, where they stand beside the checkout; tests that miss them say so.
 ifneq ($(wildcard ../shared/nets),)
@@ -84,7 +85,7 @@ campaign: $(MADE)/develop ## every property of the tests on FACTOR times as many
 		-m "hypothesis or seeds" --hypothesis-seed=$(SEED) $(CAMPAIGN)
 
 simulate: $(MADE)/develop ## the executor through faults, RUNS seeds on each cell and on drawn nets; FROM is the first seed
-	@set -e; for net in $(REHEARSED:%=catalogue:%) drawn; do \
+	@set -e; for net in $(REHEARSED); do \
 		$(BIN)/firable rehearse $$net --seeds $(RUNS) --from $(FROM) --jobs $(JOBS); done
 
 mutants: $(MADE)/mutants ## which wrong edits of FILE the tests in TESTS do not notice

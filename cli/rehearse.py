@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from firable.executor.simulation.judge import Subject
     from firable.nets.verdict import Verdict
 
-DRAWN = "drawn"
 _CHUNK = 50
 _SEEDS_PER_NET = 10
 _FAILURES_MAX = 5
@@ -56,10 +55,11 @@ def rehearse(
     must be a trace of NET with every command sent once, and must go on when everything is mended in the end. A run
     that fails is made shorter and printed as the command that brings it back.
 
-    NET may also be 'drawn': then seeds draw nets as well, small ones with every kind of gate.
+    NET may also be 'drawn': then seeds draw nets as well, small ones with every kind of gate; 'drawn-timed' are those
+    with time limits, 'drawn-layered' those with coordinators under coordinators.
 
     Kinds of faults: loss, duplication, delay, reordering, partition, crash, torn, unsynced, disk, drift, jump, slow,
-    late, stuck, flapping, stale, forgetful, pause, step, stop.
+    standstill, late, stuck, flapping, stale, forgetful, pause, step, stop.
     """
     from firable.executor.simulation.campaign import Run
 
@@ -82,6 +82,7 @@ def _kinds(faults: str | None) -> tuple[str, ...] | None:
 
 def _report(argument: str, runs: Sequence[Run], jobs: int, is_text: bool) -> Report:
     from firable.executor.simulation.campaign import shrunk
+    from firable.executor.simulation.drawn import DRAWN
 
     subject = _subjects(argument)  # an input that cannot be split is refused here
     started = time.monotonic()
@@ -104,7 +105,7 @@ def _report(argument: str, runs: Sequence[Run], jobs: int, is_text: bool) -> Rep
         run={
             "runs": done.runs,
             "counts": dict(sorted(done.counts.items())),
-            "never_fired": [] if argument == DRAWN else [t.name for t in net.transitions if t.name not in done.fired],
+            "never_fired": [] if argument in DRAWN else [t.name for t in net.transitions if t.name not in done.fired],
             "failed": [
                 {"command": f.command(argument), "kind": f.kind, "message": f.message, "log": list(f.log)}
                 for f in done.failed[:_FAILURES_MAX]
@@ -117,11 +118,11 @@ def _report(argument: str, runs: Sequence[Run], jobs: int, is_text: bool) -> Rep
 def _subjects(argument: str) -> Callable[[int], Subject]:
     """What a seed is tried on: the net of the argument, or one that is drawn."""
     from firable.decompose.splitting.cut import split
-    from firable.executor.simulation.drawn import owned_net
+    from firable.executor.simulation.drawn import DRAWN
     from firable.executor.simulation.judge import Subject
 
-    if argument == DRAWN:
-        drawn = cache(lambda number: Subject(split(owned_net(number))))
+    if argument in DRAWN:
+        drawn = cache(lambda number: Subject(split(DRAWN[argument](number))))
         return lambda seed: drawn(seed // _SEEDS_PER_NET)
     loaded = load_net(argument)
     with loaded.placing():

@@ -19,11 +19,13 @@ from firable.executor.simulation.faults import KINDS, Faults
 from firable.executor.simulation.judge import Subject
 from firable.executor.simulation.machinery import MachineError
 from firable.executor.simulation.recovery import ProgressLostError, recover
+from firable.executor.simulation.timekeeper import TimeLimitError
 from firable.executor.simulation.world import REAL, Machines, RunFailedError, World
 from firable.nets.diagnostics import InputError
 
 STEPS: Final = (50, 800)
-"""The fewest and the most steps of a run that is not told how many."""
+"""The fewest and the most steps of a run that is not told how many; one in ten is longer."""
+_LONGER: Final = 5
 _SHRINKING_RUNS_MAX: Final = 600
 
 _MEANINGS: Final = (
@@ -31,6 +33,7 @@ _MEANINGS: Final = (
     (MachineError, "a machine was given what no machine may be given"),
     (ProgressLostError, "progress is lost"),
     (ProtocolError, "a machine of the protocol was told what the protocol excludes"),
+    (TimeLimitError, "a time limit is not kept"),
     (RunFailedError, "something moved that must not"),
 )
 
@@ -46,7 +49,11 @@ class Run:
     @property
     def length(self) -> int:
         """How many steps it has before everything is mended."""
-        return random.Random(f"{self.seed} steps").randint(*STEPS) if self.steps is None else self.steps
+        if self.steps is not None:
+            return self.steps
+        draw = random.Random(f"{self.seed} steps")
+        steps = draw.randint(*STEPS)
+        return steps * _LONGER if draw.random() < 0.1 else steps
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,7 @@ KINDS: Final[Mapping[str, str]] = MappingProxyType(
         "disk": "a write to the disk fails, which ends the process",
         "drift": "the clocks of the hosts run at different speeds",
         "jump": "a clock jumps ahead",
+        "standstill": "a clock stands still for a while, and goes on from there",
         "slow": "a process lets its inputs wait, and fires late",
         "late": "a machine takes long",
         "stuck": "a machine does not end its command until it is mended",

@@ -128,8 +128,14 @@ def _partition(world: World) -> None:
 
 def _jump(world: World) -> None:
     process = world.any_process()
-    process.jumped_seconds += world.draw.expovariate(1.0)
+    process.clock.jump(world.draw.expovariate(1.0) * world.limit_seconds)
     world.note("its clock jumps", process.name)
+
+
+def _standstill(world: World) -> None:
+    process = world.any_process()
+    process.clock.stands_still = not process.clock.stands_still
+    world.note("its clock stands still" if process.clock.stands_still else "its clock goes on", process.name)
 
 
 def _flapping(world: World) -> None:
@@ -153,6 +159,7 @@ _HAPPENINGS: Final[Mapping[str, Callable[[World], None]]] = MappingProxyType(
         "partition": _partition,
         "crash": _crash,
         "jump": _jump,
+        "standstill": _standstill,
         "flapping": _flapping,
         "stale": _stale,
         "pause": _pause,

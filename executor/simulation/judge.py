@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.executor.simulation.machinery import apart_of
+from firable.executor.simulation.timekeeper import limited
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Marking, Net, SignalKind
 from firable.semantics.player import FiringSet, Player
@@ -65,4 +66,6 @@ class Subject:
         self.controllers = tuple(subnet.name for subnet in decomposition.subnets)
         self.owner_of = {signal.name: subnet.name for subnet in decomposition.subnets for signal in subnet.signals}
         self.sender_of = {place.name: str(place.owner) for place in self.net.places if place.command}
+        self.limited = {subnet.name: limited(subnet) for subnet in decomposition.subnets}
+        """The places with a time limit, of each controller."""
         self.sensors = tuple(signal.name for signal in self.net.signals if signal.kind is SignalKind.SENSOR)

@@ -106,7 +106,7 @@ def apart_of(net: Net) -> dict[str, frozenset[str]]:
 
     Empty where the net has more markings than are looked at: then nothing is claimed. Cost: one search over them.
     """
-    markings = _markings(net)
+    markings = reached(net)
     if markings is None:
         return {}
     bit = {place.name: 1 << i for i, place in enumerate(net.places)}
@@ -134,7 +134,8 @@ def apart_of(net: Net) -> dict[str, frozenset[str]]:
     }
 
 
-def _markings(net: Net) -> set[int] | None:
+def reached(net: Net) -> set[int] | None:
+    """The markings that a net reaches with its external gates free; None where they are more than are looked at."""
     player = TokenPlayer.of(net)
     markings = {net.initial_marking}
     todo = [net.initial_marking]

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from firable.executor.protocol.messages import Effect, Firing, Keep, Stored, Taken
+from firable.executor.simulation.clock import Clock
 from firable.executor.simulation.disk import Disk
 
 Machine = TypeVar("Machine")
@@ -36,10 +37,8 @@ class Process(Generic[Machine]):
     disk: Disk = field(init=False)
     machine: Machine | None = None
     outbox: list[Act] = field(default_factory=list)
-    rate: float = 1.0
-    """Seconds of its clock for a second of the simulation."""
-    started_seconds: float = 0.0
-    jumped_seconds: float = 0.0
+    clock: Clock = field(default_factory=Clock)
+    """It began anew with the process."""
     is_held: bool = False
     """Whether it has restarted, and no operator has resumed it yet."""
     cut_off: bool = False
@@ -84,7 +83,3 @@ class Process(Generic[Machine]):
         self.outbox.clear()
         self.machine = None
         return happened
-
-    def now_seconds(self, at_seconds: float) -> float:
-        """What its clock shows, which began anew with the process."""
-        return (at_seconds - self.started_seconds) * self.rate + self.jumped_seconds

@@ -4,6 +4,7 @@ After the random part of a run the network delivers, disks write, machines end w
 restarted and whatever is held is resumed. Then, with nothing allowed to fire, it must fall quiet:
 
 - every round closes, and no promise is left;
+- where machines stay at work while time passes, the timer of every time limit is set;
 - every sensor is in the image of its controller as it shows, and so is every completion of a command that is done;
 - the controllers hold the marking that the central net is in.
 
@@ -34,6 +35,8 @@ class ProgressLostError(AssertionError):
 def recover(world: World) -> None:
     """Mend everything and check that the run goes on; raises `ProgressLostError`, or what the run itself raises."""
     mend(world)
+    if world.timekeepers and world.draw.random() < 0.5:
+        check_timers(world)
     for _ in range(_FIRINGS):
         pause(world)
         quieten(world)
@@ -63,19 +66,39 @@ def mend(world: World) -> None:
     for job in world.cell.jobs.values():
         job.stuck = False
     for process in world.processes:
-        process.cut_off, process.disk.failing, process.rate = False, 0.0, 1.0
+        process.cut_off, process.disk.failing = False, 0.0
+        process.clock.rate, process.clock.stands_still = 1.0, False
         world.sync(process)
         tend(process, world)
     for process in world.processes:
         tend(process, world)
 
 
-def quieten(world: World) -> None:
-    """Let everything arrive that is under way, and repeat what is unanswered, until all is quiet."""
+def check_timers(world: World) -> None:
+    """Let all machines be late: each time limit that runs is over then, and must be known to be."""
+    pause(world)
+    quieten(world, at_work=True)
+    for _ in range(3):  # one time begins when its controller is told the time, and another is over then
+        world.let_pass(2 * world.limit_seconds)
+        for process in world.controllers.values():
+            machine, now = process.machine, process.clock.shown_seconds
+            if machine is not None and (due := machine.deadline()) is not None and due <= now:
+                world.tick(process)
+    for name, timekeeper in world.timekeepers.items():
+        if unset := timekeeper.unset():
+            raise ProgressLostError(f"the time of {name} is over, and '{unset[0]}' is not set")
+    resume(world)
+
+
+def quieten(world: World, *, at_work: bool = False) -> None:
+    """Let everything arrive that is under way, and repeat what is unanswered, until all is quiet.
+
+    Machines end what they are at, unless they are to stay `at_work`.
+    """
     before = None
     for _ in range(_ROUNDS_MAX):
         # Reports are repeated until the coordinator has something to say: the same ones again are no news.
-        arrived = _round(world)
+        arrived = _round(world, at_work=at_work)
         if _is_quiet(world) and arrived == before and all(isinstance(each, Report) for each in arrived):
             return
         before = arrived
@@ -106,7 +129,7 @@ def check_at_rest(world: World) -> None:
         raise ProgressLostError(f"the controllers are in {_marking(world)}, the central net in {central}")
 
 
-def _round(world: World) -> list[Message | str]:
+def _round(world: World, *, at_work: bool = False) -> list[Message | str]:
     """Give everybody a turn, and let everything arrive in order; returns what did."""
     for process in world.controllers.values():
         world.turn(process)
@@ -118,7 +141,7 @@ def _round(world: World) -> list[Message | str]:
     arrived: list[Message | str] = [*world.in_flight, *(signal for signal, _, _ in world.telling)]
     for _ in range(len(world.in_flight)):
         world.deliver(world.in_flight.pop(0))
-    while (job := world.cell.complete(mended=True)) is not None:
+    while not at_work and (job := world.cell.complete(mended=True)) is not None:
         arrived.append(job.place)
         world.completed(job)
     for _ in range(len(world.telling)):

@@ -6,13 +6,15 @@ and a seed is a run. How much goes wrong is drawn as well (`faults`). Checked wh
 
 - the joint trace is a trace of the central net, gates and commands included (`judge`);
 - no machine gets a command twice, or one while it is certainly at another (`machinery`);
-- nothing fires while the operator has paused, and nothing moves after a restart before the operator has resumed.
+- nothing fires while the operator has paused, and nothing moves after a restart before the operator has resumed;
+- time limits are kept by the clock of their controller (`timekeeper`), however the clocks run.
 
 In the end everything is mended and the operator resumes; what must hold then is in `recovery`.
 
 The machines are passed in as classes, so that a test can plant a fault in one and see that this finds it. Time passes
-with the steps; nothing here waits, so rejected: an event queue ordered by time, in which two things that are a minute
-apart never come in the other order.
+with the steps, a hundredth of a second each or, where there are time limits, the tenth to four-hundredth part of the
+longest of them, so that some are over in some runs. Nothing here waits, so rejected: an event queue ordered by time, in
+which two things that are a minute apart never come in the other order.
 """
 
 from __future__ import annotations
@@ -40,19 +42,22 @@ from firable.executor.protocol.messages import (
     Vote,
     VoteRequest,
 )
+from firable.executor.simulation.clock import Clock
 from firable.executor.simulation.disk import DiskFailedError
 from firable.executor.simulation.faults import Faults
 from firable.executor.simulation.happenings import happen
 from firable.executor.simulation.judge import Subject
 from firable.executor.simulation.machinery import Job, Machinery
 from firable.executor.simulation.process import Process
+from firable.executor.simulation.timekeeper import Timekeeper
 from firable.nets.net import Marking
 from firable.semantics.replaying import Replayer
 from firable.semantics.trace import CommandSent, End, Event, Fired, Header, SignalChanged, Trace
 
 COORDINATOR = "coordinator"
 THE = f"the {COORDINATOR}"
-SECONDS_PER_STEP = 0.01
+SECONDS_PER_STEP: Final = 0.01
+STEPS_PER_LIMIT: Final = (10, 400)
 _LOGGED_STEPS = 60
 
 
@@ -86,6 +91,12 @@ class World:
         self.coordinators = {name: machines.process(name or COORDINATOR, self.draw) for name in names}
         self.controllers = {name: machines.process(name, self.draw) for name in subject.controllers}
         self.processes = (*self.coordinators.values(), *self.controllers.values())
+        limits = {name: Timekeeper(its) for name, its in subject.limited.items() if its}
+        self.timekeepers = limits
+        self.limit_seconds = max((each.seconds for its in subject.limited.values() for each in its), default=1.0)
+        """The longest time limit of the net."""
+        steps = random.Random(f"{seed} pace").uniform(*STEPS_PER_LIMIT)
+        self.step_seconds = self.limit_seconds / steps if limits else SECONDS_PER_STEP
         self.cell = Machinery(self.net, subject.apart, self.draw)
         self.values = dict.fromkeys(subject.sensors, False)
         self.in_flight: list[Message] = []
@@ -128,7 +139,13 @@ class World:
         """Let so many steps happen."""
         for _ in range(steps):
             self.step += 1
+            self.let_pass(self.step_seconds)
             self._something()
+
+    def let_pass(self, seconds: float) -> None:
+        """Let so much time pass, as each clock shows it."""
+        for process in self.processes:
+            process.clock.advance(seconds)
 
     def told(self) -> Iterator[str]:
         """The last steps in words."""
@@ -148,6 +165,8 @@ class World:
         """Let a process do what its machine wants done: behind a sync now, or one that it shares with later acts."""
         if not effects:
             return
+        if (timekeeper := self.timekeepers.get(process.name)) is not None and process.machine is not None:
+            timekeeper.acted(process.machine, process.clock.shown_seconds)
         if self.paused:
             self._check_pause(effects)
         if process.act(effects):
@@ -237,9 +256,8 @@ class World:
 
     def _start(self, process: Process[Any]) -> None:
         kept = process.disk.kept()
-        process.started_seconds = self.step * SECONDS_PER_STEP
-        process.jumped_seconds = 0.0
-        process.rate = 1.0 + self.faults["drift"] * self.draw.uniform(-0.5, 1.0) if self.faults["drift"] else 1.0
+        drift = self.faults["drift"]
+        process.clock = Clock(1.0 + drift * self.draw.uniform(-0.5, 1.0) if drift else 1.0)
         decomposition = self.subject.decomposition
         if (name := self.coordinating(process)) is not None:
             coordinator = self.machines.coordinator.restored(decomposition, kept, name)
@@ -311,12 +329,25 @@ class World:
 
     def turn(self, process: Process[Any]) -> None:
         """Let a controller fire if it may and can, and report what that changed."""
-        if process.machine is not None and process.machine.timers.places:
-            self.act(process, process.machine.tick(process.now_seconds(self.step * SECONDS_PER_STEP)))
+        self.tick(process)
         if process.machine is not None and not self.paused and not self._is_slow():
             self.act(process, process.machine.fire())
         if process.machine is not None:
             self.act(process, process.machine.report())
+
+    def tick(self, process: Process[LocalController]) -> None:
+        """Tell a controller the time if it wants to know; sometimes also if it does not, as its host does."""
+        timekeeper = self.timekeepers.get(process.name)
+        if timekeeper is None or process.machine is None:
+            return
+        now, due = process.clock.shown_seconds, process.machine.deadline()
+        if (due is not None and due <= now) or self.draw.random() < 0.5:
+            effects = process.machine.tick(now)
+            self.note("is told the time", (process.name, round(now, 3)))
+            timekeeper.acted(process.machine, now)
+            timekeeper.ticked(process.machine, now)
+            self.counts["timers set"] += sum(isinstance(effect, Taken) for effect in effects)
+            self.act(process, effects)
 
     def _is_slow(self) -> bool:
         slow = self.faults["slow"]

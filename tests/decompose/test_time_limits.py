@@ -4,7 +4,6 @@ import random
 from dataclasses import replace
 
 import pytest
-from support.timed_nets import drawn_timed_net
 
 from firable.analysis.check import check
 from firable.decompose.bundling import make_bundle
@@ -24,6 +23,7 @@ from firable.decompose.verification.obligations import compared
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS
+from firable.executor.simulation.drawn import drawn_timed_net
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net
 from firable.nets.contention import contentions
@@ -77,7 +77,7 @@ def test_a_timeout_takes_back_no_yes_that_rests_on_the_completion() -> None:
 
 @pytest.mark.parametrize("seed", range(25))
 def test_the_split_of_a_net_with_time_limits_is_proved_and_stated_anew(seed: int) -> None:
-    decomposition = split(drawn_timed_net(random.Random(seed)))
+    decomposition = split(drawn_timed_net(random.Random(seed), "timed"))
     proof = prove(decomposition)
     assert proof.holds, [v.name for v in proof.verdicts if not v.holds]
     examination = Examination(Bundle(decomposition, proof.verdicts, proof.files))

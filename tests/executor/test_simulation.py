@@ -6,11 +6,14 @@ from functools import cache
 import pytest
 from support.examples import seeds
 from support.gated_nets import GATE_MOVED_BY_A_LOCAL, GATE_READ_AGAIN
-from support.owned_nets import owned_net
 from support.planted import PLANTED, PROVOKED_BY, DecidesEarly, IgnoresPause, KeepsNoPromise
+from support.planted_times import PLANTED_TIMES, PROVOKED_TIMES
+from support.timed_nets import TWO_TIMES
 
 from firable.decompose.splitting.cut import split
 from firable.executor.simulation.campaign import Campaign, Failed, Passed, Run, campaign, rehearse, shrunk
+from firable.executor.simulation.clock import Clock
+from firable.executor.simulation.drawn import DRAWN
 from firable.executor.simulation.faults import KINDS, Faults
 from firable.executor.simulation.judge import Subject
 from firable.executor.simulation.recovery import recover
@@ -29,8 +32,8 @@ def cell(name: str) -> Subject:
 
 
 @cache
-def drawn(number: int) -> Subject:
-    return Subject(split(owned_net(number)))
+def drawn(number: int, family: str = "drawn") -> Subject:
+    return Subject(split(DRAWN[family](number)))
 
 
 def nets() -> Iterator[Subject]:
@@ -49,7 +52,7 @@ def shown(done: Campaign) -> str:
 @pytest.mark.seeds
 @pytest.mark.parametrize("name", CELLS)
 def test_runs_of_a_cell_through_faults_are_traces_of_it_and_go_on(name: str) -> None:
-    done = campaign(lambda _: cell(name), map(Run, seeds(400)))
+    done = campaign(lambda _: cell(name), map(Run, seeds(250)))
     assert not done.failed, shown(done)
 
 
@@ -60,6 +63,39 @@ def test_runs_of_drawn_nets_through_faults_are_traces_of_them_and_go_on() -> Non
     # Everything that can go wrong did, in one run or the other.
     happened = ("kills", "restarts", "partitions", "stops", "steps", "doubled", "lost", "questions", "sent again")
     assert not [what for what in (*KINDS, *happened) if not done.counts[what]]
+
+
+@pytest.mark.seeds
+def test_runs_with_time_limits_through_faults_are_traces_of_the_net_and_keep_the_limits() -> None:
+    timed = (Subject(split(TWO_TIMES)), cell("one_robot_timed"))
+    done = campaign(lambda seed: (*timed, drawn(seed // 20, "drawn-timed"))[seed % 3], map(Run, seeds(600)))
+    assert not done.failed, shown(done)
+    assert done.counts["timers set"] > 50
+    assert {"go_timeout", "spin_timeout", "again", "robot.to_cv1_timeout"} <= {t.removeprefix("a.") for t in done.fired}
+
+
+@pytest.mark.parametrize("name", PLANTED_TIMES)
+def test_planted_fault_of_a_timer_is_found(name: str) -> None:
+    timed = (Subject(split(TWO_TIMES)), cell("one_robot_timed"))
+    for seed in range(FOUND_WITHIN):
+        subject = (*timed, drawn(seed // 3, "drawn-timed"))[seed % 3]
+        if isinstance(rehearse(subject, Run(seed, PROVOKED_TIMES.get(name)), PLANTED_TIMES[name]), Failed):
+            return
+    pytest.fail(f"{name} was not found")
+
+
+def test_a_clock_runs_at_its_rate_stands_still_and_jumps_and_never_goes_back() -> None:
+    clock, shown = Clock(rate=1.5), list[float]()
+    for _ in range(3):
+        clock.advance(2.0)
+        shown.append(clock.shown_seconds)
+        clock.stands_still = not clock.stands_still
+    clock.jump(0.5)
+    assert (*shown, clock.shown_seconds) == (3.0, 3.0, 6.0, 6.5)
+
+
+def test_every_timed_drawn_net_reaches_a_place_with_a_limit() -> None:
+    assert all(any(drawn(number, "drawn-timed").limited.values()) for number in range(30))
 
 
 @pytest.mark.parametrize("name", PLANTED)

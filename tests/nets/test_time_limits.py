@@ -4,8 +4,9 @@ import random
 from dataclasses import replace
 
 import pytest
-from support.timed_nets import drawn_timed_net, with_limits
+from support.timed_nets import with_limits
 
+from firable.executor.simulation.drawn import drawn_timed_net
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
 from firable.nets.interchange import net_from_json, net_to_json
@@ -164,7 +165,7 @@ def test_a_timer_is_owned_with_its_place() -> None:
 
 @pytest.mark.parametrize("seed", range(40))
 def test_a_fault_transition_is_never_open_beside_another_taker_of_its_place(seed: int) -> None:
-    net = drawn_timed_net(random.Random(seed))
+    net = drawn_timed_net(random.Random(seed), "timed")
     for p, fault in net.fault_transitions.items():
         assert net.competitors[p] == tuple(t for t in net.consumers[p] if t != fault)
         assert not any(jointly_openable(net, (fault, t)) for t in net.competitors[p])

@@ -1,35 +1,12 @@
-"""Time limits put on the places of a net, with the names that `within` gives; and drawn nets that have some."""
-
-import random
-from collections.abc import Iterable
-from dataclasses import replace
+"""Drawn nets with time limits, and time limits put on the places of a net: those of the simulation."""
 
 from hypothesis import strategies as st
 
-from firable.executor.simulation.drawn import drawn_net
-from firable.nets.net import Net, Place, Signal, SignalKind, TimeLimit, Transition
-from firable.nets.time_limits import fault_place, fault_transition, fault_transition_name, timer_name
+from firable.executor.simulation.drawn import drawn_timed_net, with_limits
+from firable.nets.net import Net
+from firable.nets.text import parse_net
 
-
-def with_limits(net: Net, names: Iterable[str], milliseconds: int = 5000) -> Net:
-    """The net in which the completions of these places have a time limit each, as `within` makes it."""
-    limited = {name: TimeLimit(milliseconds, timer_name(name)) for name in names}
-    places: list[Place] = []
-    timers: list[Signal] = []
-    faults: list[Transition] = []
-    for place in net.places:
-        places.append(replace(place, within=limited.get(place.name)))
-        if place.name in limited:
-            to = fault_place(places[-1])
-            timers.append(Signal(timer_name(place.name), place.owner, SignalKind.TIMER))
-            faults.append(fault_transition(places[-1], to.name, fault_transition_name(place.name)))
-            places.append(to)
-    return replace(
-        net,
-        places=tuple(places),
-        signals=(*net.signals, *timers),
-        transitions=(*net.transitions, *faults),
-    )
+__all__ = ["TWO_TIMES", "timed_nets", "waiting", "with_limits"]
 
 
 def waiting(net: Net) -> list[str]:
@@ -38,21 +15,35 @@ def waiting(net: Net) -> list[str]:
 
 
 def timed_nets() -> st.SearchStrategy[Net]:
-    """Owned nets in which each place that waits for a completion has a time limit, and a way back from its fault place.
+    """The nets of `drawn_timed_net`, with every choice left to hypothesis.
 
-    Those without such a place are among them.
+    Those without a place that waits for a completion are among them.
     """
-    return st.randoms(use_true_random=False).map(drawn_timed_net)
+    return st.randoms(use_true_random=False).map(lambda draw: drawn_timed_net(draw, "timed"))
 
 
-def drawn_timed_net(draw: random.Random) -> Net:
-    """An owned net with time limits, each fault place with a way back or to another place of its controller."""
-    net = drawn_net(draw, "timed")
-    names = waiting(net)
-    timed = with_limits(net, names)
-    back = []
-    for name in names:
-        if draw.random() < 0.8:
-            own = [place.name for place in net.places if place.owner == net.place(name).owner]
-            back.append(Transition(f"back-{name}", (f"{name}_fault",), (draw.choice([name, name, *own]),)))
-    return replace(timed, transitions=(*timed.transitions, *back))
+TWO_TIMES = parse_net("""\
+firable: 1
+cell: two-times
+controllers:
+  a:
+    start: [free, rest]
+    inputs: key
+    places:
+      free:
+      go:   {send: {machine: A, command: GO}, until: there, within: 1s}
+      rest:
+      spin: {send: {machine: S, command: SPIN}, until: spun, within: 1500ms}
+  b: {start: idle, places: {idle: , has: , lamp: }}
+transitions:
+  start: {from: a.free, to: a.go}
+  hand:  {from: [a.go, b.idle], to: [a.free, b.has]}
+  again: {from: a.go_fault, to: a.go, if: a.key}
+  begin: {from: a.rest, to: a.spin}
+  end:   {from: a.spin, to: a.rest}
+  anew:  {from: a.spin_fault, to: a.rest}
+  use:   {from: b.has, to: b.idle}
+  lit:   {from: b.idle, to: b.lamp, unless: a.go_overdue}
+  out:   {from: b.lamp, to: b.idle}
+""")
+"""Two machines of one controller that may be late at once, and a lamp elsewhere that reads the timer of one."""
