@@ -17,8 +17,12 @@ Nothing listens unless an address is given, and multicast is off. Beyond one mac
 on both sides (`Certificates`) keep strangers out; plain `tcp/` beyond loopback lets anybody on the network speak.
 Whoever has a certificate of the site may be any of its machines.
 
-Zenoh calls back on threads of its own; all that happens there is a hand-over to the event loop. `put` does not wait: a
-message that finds the queue of a dead line full is dropped.
+Zenoh calls back on threads of its own; all that happens there is a hand-over to the event loop, which is woken once for
+all that comes before it looks: to wake it costs more than to act upon a message. `put` does not wait: a message that
+finds the queue of a dead line full is dropped.
+
+Rejected: to act on Zenoh's thread, which would save the hand-over. Drivers and timers live on the loop, and a lock
+around them all would let a slow disk hold up the connection itself.
 """
 
 from __future__ import annotations
@@ -26,6 +30,7 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import json
+from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -86,6 +91,9 @@ class ZenohLink:
         self.publishers: dict[tuple[str, str, str], zenoh.Publisher] = {}
         """For each sender here, receiver and session of the receiver."""
         self.damaged = 0
+        self.samples: deque[tuple[_Act, str, bytes, bool]] = deque()
+        """What has come and was not looked at yet."""
+        self.is_woken = False
 
     async def run(self, listener: LinkListener) -> None:
         """Serve until cancelled; raises `InputError` F5021 where an address cannot be listened at."""
@@ -112,6 +120,7 @@ class ZenohLink:
             self.session = self.listener = None
             self.claims.clear()
             self.publishers.clear()
+            self.samples.clear()
             await asyncio.to_thread(session.close)
 
     def send(self, sender: str, receiver: str, message: Message) -> None:
@@ -170,13 +179,19 @@ class ZenohLink:
         """Hand a sample over to the event loop, from a thread of Zenoh; after the loop's end nobody hears it."""
         gone = sample.kind == zenoh.SampleKind.DELETE
         key, payload = str(sample.key_expr), sample.payload.to_bytes()
-        with suppress(RuntimeError):  # the loop has been closed
-            loop.call_soon_threadsafe(self._guarded, act, key, payload, gone)
+        self.samples.append((act, key, payload, gone))
+        if not self.is_woken:
+            self.is_woken = True
+            with suppress(RuntimeError):  # the loop has been closed
+                loop.call_soon_threadsafe(self._look)
 
-    def _guarded(self, act: _Act, key: str, payload: bytes, gone: bool) -> None:
-        """A callback of the loop has no caller: what fails in it ends `run`."""
+    def _look(self) -> None:
+        """Take all that has come; a callback of the loop has no caller: what fails in it ends `run`."""
+        self.is_woken = False  # first: what comes from now on wakes the loop again
         try:
-            act(key, payload, gone)
+            for _ in range(len(self.samples)):
+                act, key, payload, gone = self.samples.popleft()
+                act(key, payload, gone)
         except Exception as error:
             if self.broken is not None and not self.broken.done():
                 self.broken.set_exception(error)
