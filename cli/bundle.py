@@ -12,7 +12,7 @@ from firable.cli.options import (
     analysis_options,
     answer,
     budget,
-    format_option,
+    formats_option,
     load_net,
     net_argument,
     page_option,
@@ -29,7 +29,7 @@ from firable.cli.report import Report
 @click.option("--protocol", is_flag=True, help="Hold the proof on the voting protocol of this very net, too.")
 @analysis_options
 @page_option
-@format_option
+@formats_option
 def bundle(
     net: str,
     output: str,
@@ -69,7 +69,10 @@ def _report(argument: str, output: str, limits: dict[str, Any], more: dict[str, 
     with loaded.placing():
         found = check(net, budget=allowed)
     if overall(found.verdicts) is not Status.PROVED:
-        return Report("bundle", argument, net, found.verdicts, figures=found.figures.to_json(), notes=loaded.notes)
+        figures = found.figures.to_json()
+        return Report(
+            "bundle", argument, net, found.verdicts, figures=figures, notes=loaded.notes, positions=loaded.positions
+        )
     seconds = SECONDS if allowed.seconds is None else allowed.seconds
     with loaded.placing():
         made = make_bundle(found, Limits(Deadline.after(seconds), allowed.memory_bytes), **more)
@@ -84,6 +87,7 @@ def _report(argument: str, output: str, limits: dict[str, Any], more: dict[str, 
         table=made.decomposition.table,
         decomposition=made.decomposition,
         files=(output,),
+        positions=loaded.positions,
     )
 
 

@@ -17,7 +17,7 @@ from firable.cli.options import (
     analysis_options,
     answer_all,
     budget,
-    format_option,
+    formats_option,
     load_net,
     page_option,
     with_page,
@@ -109,7 +109,7 @@ _NAME_MAX = 100  # of a net, in the name of a file
     "--progress/--no-progress", default=None, help="Tell how far exploring is.  [default: where there is a terminal]"
 )
 @click.option("-v", "--verbose", is_flag=True, help="Tell methods, costs and the sequences of warnings too.")
-@format_option
+@formats_option
 def check(
     nets: tuple[str, ...],
     discipline: str,
@@ -201,6 +201,7 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: boo
         notes=loaded.notes,
         files=files,
         again=again,
+        positions=loaded.positions,
     )
 
 

@@ -80,6 +80,7 @@ def loop_report(argument: str, machines: str, allowed: Budget, loop_file: str | 
         notes=loaded.notes,
         files=files,
         loop_net=report.loop.net,
+        positions=loaded.positions,
         loop={
             "machines": machines,
             "markings": figures.markings,

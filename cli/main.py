@@ -40,7 +40,9 @@ from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
 EXTRAS = {
-    **dict.fromkeys(("z3", "networkx", "numpy", "platformdirs"), ("prove", "all that checking and proving need")),
+    **dict.fromkeys(
+        ("z3", "networkx", "numpy", "platformdirs", "junitparser"), ("prove", "all that checking and proving need")
+    ),
     "mtkahypar": ("split", "what looks for owners of large nets"),
     **dict.fromkeys(("aiohttp", "prometheus_client"), ("serve", "what lets an operator act from elsewhere")),
     "zenoh": ("zenoh", "the link between hosts over a network"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from firable.cli.report import Report, document, exit_code_of, worst
+from firable.cli.report import Outcome, Report, document, exit_code_of, worst
 
 if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
@@ -30,6 +30,39 @@ format_option = click.option(
     show_default=True,
     help="How to print the report; `firable schema report` prints the schema of the JSON.",
 )
+
+
+_WRITTEN = "firable.written"  # where the context of a command keeps what --write names
+
+
+def _remember(context: click.Context, _: click.Parameter, value: tuple[tuple[str, str], ...]) -> None:
+    context.meta[_WRITTEN] = value
+
+
+def formats_option(command: F) -> F:
+    """The options of a command that other programs read: how its report is printed, and written to files beside it."""
+    for option in (
+        click.option(
+            "--write",
+            type=(click.Choice(["json", "sarif", "junit"]), str),
+            multiple=True,
+            metavar="FORMAT FILE",
+            expose_value=False,
+            callback=_remember,
+            help="Also write the report to a file: json, sarif or junit; repeatable.",
+        ),
+        click.option(
+            "--format",
+            "format_",
+            type=click.Choice(["text", "json", "sarif", "junit", "github"]),
+            default="text",
+            show_default=True,
+            help="How to print the report: as text, JSON (`firable schema report`), SARIF 2.1.0, JUnit, or text with "
+            "the annotations of a GitHub workflow.",
+        ),
+    ):
+        command = option(command)
+    return command
 
 
 page_option = click.option(
@@ -180,26 +213,54 @@ def answer_all(
     makers: Sequence[Callable[[], Report]],
     show: Callable[[Report], None],
 ) -> int:
-    """Make several reports, printing each as text as soon as it is there, or all as one JSON document."""
-    import json
-
+    """Make several reports, printing each as text as soon as it is there, or all as one document of another format."""
     from firable.cli.text import show_errors
     from firable.nets.diagnostics import InputError
 
+    written: Sequence[tuple[str, str]] = click.get_current_context().meta.get(_WRITTEN, ())
+    for _, file in written:
+        if file == "-":
+            raise click.UsageError("--write is for files: what goes to standard output is named by --format")
     reports: list[Report] = []
     errors: list[Diagnostic] = []
+    as_text = format_ in {"text", "github"}
     for make in makers:
         try:
             report = make()
         except InputError as error:
             errors += error.diagnostics
-            if format_ == "text":
+            if as_text:
                 show_errors(error.diagnostics)
             continue
         reports.append(report)
-        if format_ == "text":
+        if as_text:
             show(report)
     code = worst([*(report.exit_code for report in reports), *map(exit_code_of, errors)])
-    if format_ == "json":
-        click.echo(json.dumps(document(command, reports, errors, code), indent=2, ensure_ascii=False))
+    outcome = Outcome(command, reports, errors, code)
+    for kind, file in written:
+        write_text(file, _rendered(kind, outcome))
+    if format_ != "text":
+        click.echo(_rendered(format_, outcome), nl=False)
     return code
+
+
+def _rendered(format_: str, outcome: Outcome) -> str:
+    """The outcome of a command in a format that programs read."""
+    match format_:
+        case "sarif":
+            from firable.cli.formats.sarif import sarif
+
+            return sarif(outcome)
+        case "junit":
+            from firable.cli.formats.junit import junit
+
+            return junit(outcome)
+        case "github":
+            from firable.cli.formats.github import github
+
+            return github(outcome)
+        case _:
+            import json
+
+            data = document(outcome.command, outcome.reports, outcome.errors, outcome.exit_code)
+            return json.dumps(data, indent=2, ensure_ascii=False) + "\n"

@@ -9,7 +9,7 @@ import click
 
 from firable.cli import text
 from firable.cli.loop import machines_option, read_machines
-from firable.cli.options import answer, format_option, load_net, net_argument, page_option, with_page, write_folder
+from firable.cli.options import answer, formats_option, load_net, net_argument, page_option, with_page, write_folder
 from firable.cli.progress import stages
 from firable.cli.protocol import Answered, Asked, ask, protocol_options
 from firable.cli.protocol import show as show_protocol
@@ -38,7 +38,7 @@ SIGNS: Final = {"violated": ("✗", "red"), "unknown": ("?", "yellow"), "proved"
 @machines_option
 @protocol_options
 @page_option
-@format_option
+@formats_option
 def prove(
     net: str,
     smt_dir: str | None,
@@ -125,6 +125,7 @@ def _report(
         standing=tuple(standing(decomposition, verdicts)),
         decomposition=decomposition,
         loop_net=None if loop is None else loop.net,
+        positions=loaded.positions,
         protocols=told.protocols,
         outages=told.outages,
         refutations=told.refutations,

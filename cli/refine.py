@@ -12,7 +12,7 @@ from firable.cli.options import (
     analysis_options,
     answer,
     budget,
-    format_option,
+    formats_option,
     load_net,
     net_argument,
     page_option,
@@ -64,7 +64,7 @@ _METHODS = ("exploration of the task, closed", "the arcs and gates of the concep
 )
 @analysis_options
 @page_option
-@format_option
+@formats_option
 def refine(
     net: str,
     files: tuple[str, ...],

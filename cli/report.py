@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from firable.nets.decomposition import Coordinated, Decomposition
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
+    from firable.nets.text_positions import Positions
     from firable.nets.verdict import Verdict
 
 VERSION = 1
@@ -42,7 +43,8 @@ class Report:
 
     `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`), and `protocols` are others, by
     the names of the verdicts on them; `outages` and `refutations` are told beside those. `page` is the report as a page
-    for a person, where one was written. `again` says that the same was decided before, which a program need not know.
+    for a person, where one was written. `again` says that the same was decided before, which a program need not know;
+    `positions` say where the parts of the net stand in its file.
     """
 
     command: str
@@ -68,6 +70,7 @@ class Report:
     split: Mapping[str, Any] = field(default_factory=dict)
     page: str = ""
     again: bool = False
+    positions: Positions | None = None
 
     def net_of(self, verdict: Verdict) -> Net:
         """The net that the runs of a verdict are of."""
@@ -163,6 +166,16 @@ def worst(codes: Iterable[ExitCode]) -> ExitCode:
     order = (ExitCode.INPUT_ERROR, ExitCode.VIOLATED, ExitCode.UNKNOWN)
     found = set(codes)
     return next((code for code in order if code in found), ExitCode.ALL_HOLD)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a command found: one report for each net that was read, and why the others were refused."""
+
+    command: str
+    reports: Sequence[Report]
+    errors: Sequence[Diagnostic]
+    exit_code: ExitCode
 
 
 def document(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from firable.cli import text
-from firable.cli.options import answer, format_option, load_net, net_argument, page_option, with_page, write_folder
+from firable.cli.options import answer, formats_option, load_net, net_argument, page_option, with_page, write_folder
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ _CONTROLLERS_MAX = 30  # told of in text; the JSON has them all
     help="Give up so late which votes are persistent.",
 )
 @page_option
-@format_option
+@formats_option
 def split(
     net: str,
     own: tuple[str, ...],

@@ -105,7 +105,7 @@ def show_verdicts(
             click.echo(f"\n{click.style(title, bold=True)}")
         for verdict in some:
             click.echo(verdict_line(verdict, width, words))
-            for line in _reasons(net, verdict, told, verbose):
+            for line in reasons(net, verdict, told, verbose=verbose):
                 click.echo(f"      {line}")
 
 
@@ -131,7 +131,16 @@ def mark(verdict: Verdict, words: Mapping[str, str] = WORDS) -> tuple[str, str, 
             return "·", "no", None
 
 
-def _reasons(net: Net, verdict: Verdict, told: dict[tuple[object, ...], str], verbose: bool) -> Iterator[str]:
+def reasons(
+    net: Net, verdict: Verdict, told: dict[tuple[object, ...], str] | None = None, *, verbose: bool = False
+) -> Iterator[str]:
+    """What is told below the line of a verdict: how far was looked, about what, the witness, the hint with its code.
+
+    `told` holds the sequences that were told before, by the verdict that told them.
+    """
+    from firable.nets.rules import rule_of
+
+    told = {} if told is None else told
     status = verdict.status.value
     if verbose:
         yield f"by {verdict.method}{_cost(verdict.cost)}"
@@ -143,8 +152,7 @@ def _reasons(net: Net, verdict: Verdict, told: dict[tuple[object, ...], str], ve
     if verdict.witness is not None and (verbose or (status == "violated" and verdict.weight.value == "required")):
         yield from _witness(net, verdict.name, verdict.witness, told)
     if status != "proved" and verdict.hint:
-        code = f"[{verdict.code}] " if verdict.code else ""
-        yield f"hint: {code}{verdict.hint}"
+        yield f"hint: [{rule_of(verdict)}] {verdict.hint}"
 
 
 def _cost(cost: Cost) -> str:

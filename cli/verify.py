@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
-from firable.cli.options import answer_all, format_option, load_net, refuse_a_net, write_folder
+from firable.cli.options import answer_all, formats_option, load_net, refuse_a_net, write_folder
 from firable.cli.progress import stages
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
@@ -48,7 +48,7 @@ _CLAIM_MAX = 100  # characters told of one claim
     help="Give up an obligation after so much time.",
 )
 @trust_option
-@format_option
+@formats_option
 def verify(
     evidence: tuple[str, ...],
     of: str | None,

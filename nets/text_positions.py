@@ -74,6 +74,21 @@ class Positions:
             case _:
                 return node_span(self.source, found)
 
+    def of(self, *path: str) -> Span | None:
+        """The span of a subject that stands in the file, such as `("transitions", "G1")`; None where it does not."""
+        match self._table[0].get(path):
+            case None:
+                return None
+            case _Within(scalar, at, length):
+                return self._inside(scalar, at, length)
+            case node:
+                return node_span(self.source, node)
+
+    @cached_property
+    def whole(self) -> Span:
+        """The span for what concerns the net as a whole: its name, or the first line."""
+        return node_span(self.source, _value(self.tree, "cell") or self.tree)
+
     def in_formula(self, subject: Subject, column: int) -> Span:
         """The span of a character (from 0) of the formula whose text is the value at this path."""
         path: tuple[str | int, ...] = subject

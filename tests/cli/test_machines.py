@@ -106,7 +106,7 @@ def test_prove_shows_the_run_in_which_a_machine_closes_a_gate_after_the_vote(
     told = capsys.readouterr().out
     assert "mc.part_present/drops            the sensor of mc.part_present drops, though the workpiece is there" in told
     assert "'t2-82' had voted yes, and the last firing makes 'mc.part_present' 0" in told
-    assert "hint: put the interlock into the machine's own controller" in told
+    assert "hint: [F4002] put the interlock into the machine's own controller" in told
     assert main(["prove", CELL, "--machines", str(path), "--format", "json"]) == 1
     data = json.loads(capsys.readouterr().out)
     jsonschema.Draft202012Validator(SCHEMA).validate(data)
