@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,7 +18,12 @@ from firable.cli.options import (
     page_option,
     with_page,
 )
+from firable.cli.refine import read_catalogue, tasks_option
 from firable.cli.report import Report
+
+if TYPE_CHECKING:
+    from firable.analysis.spaces.reachability import Budget
+    from firable.decompose.refinement.sealing import Origin
 
 
 @click.command(short_help="Check and prove a net, and seal it in a bundle that may run.")
@@ -27,6 +32,12 @@ from firable.cli.report import Report
 @machines_option
 @click.option("--faults", is_flag=True, help="The same under lost and doubled messages, crashes and restarts.")
 @click.option("--protocol", is_flag=True, help="Hold the proof on the voting protocol of this very net, too.")
+@click.option(
+    "--conceptual",
+    metavar="NET",
+    help="Hold the conceptual net that NET was made of by `firable refine`, and that it does what that one does.",
+)
+@tasks_option
 @analysis_options
 @page_option
 @formats_option
@@ -39,6 +50,8 @@ def bundle(
     machines: str | None,
     protocol: bool,
     faults: bool,
+    conceptual: str | None,
+    files: tuple[str, ...],
     **limits: Any,
 ) -> int:
     """Check NET, split it, prove the split, and write subnets, table, verdicts and evidence as one sealed file.
@@ -47,16 +60,34 @@ def bundle(
     refuses a bundle of which any byte was changed. Each bundle holds the proof on the protocol for nets of any size;
     with --protocol and --faults it also holds one on the protocol of NET itself, step by step.
     With --machines it holds the plant, and the proof that its machines keep what votes rely on (O4).
+    With --conceptual it holds the tasks, too, and the proof that opening them makes NET, and keeps what can be done.
     """
     if output == "-":
         raise click.UsageError("a bundle cannot go to standard output, where the report goes: name a file")
     more: dict[str, Any] = {"protocol": protocol, "faults": faults}
     if machines is not None:
         more["plant"] = plant_text(machines)
-    return answer("bundle", format_, with_page(lambda: _report(net, output, limits, more), page), _show)
+    if files and conceptual is None:
+        raise click.UsageError("--tasks goes with --conceptual, whose places name tasks")
+    made_of = None if conceptual is None else (conceptual, files)
+    return answer("bundle", format_, with_page(lambda: _report(net, output, limits, more, made_of), page), _show)
 
 
-def _report(argument: str, output: str, limits: dict[str, Any], more: dict[str, Any]) -> Report:
+def _origin(conceptual: str, files: tuple[str, ...], allowed: Budget) -> Origin:
+    from firable.decompose.refinement.sealing import Origin
+
+    loaded = load_net(conceptual)
+    with loaded.placing():
+        return Origin.of(loaded.net, read_catalogue(files), allowed)
+
+
+def _report(
+    argument: str,
+    output: str,
+    limits: dict[str, Any],
+    more: dict[str, Any],
+    made_of: tuple[str, tuple[str, ...]] | None,
+) -> Report:
     from firable.analysis.check import check
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
@@ -66,6 +97,8 @@ def _report(argument: str, output: str, limits: dict[str, Any], more: dict[str, 
 
     loaded = load_net(argument)
     net, allowed = loaded.net, budget(**limits)
+    if made_of is not None:
+        more["origin"] = _origin(*made_of, allowed)
     with loaded.placing():
         found = check(net, budget=allowed)
     if overall(found.verdicts) is not Status.PROVED:

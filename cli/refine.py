@@ -39,15 +39,18 @@ _METHODS = ("exploration of the task, closed", "the arcs and gates of the concep
 """What conditions are decided by."""
 
 
-@click.command(short_help="Open the tasks of a conceptual net to a detailed net, and carry over its verdicts.")
-@net_argument
-@click.option(
+tasks_option = click.option(
     "--tasks",
     "files",
     metavar="FILE",
     multiple=True,
     help="A file of registered tasks (*.tasks.yaml); may be given again. They come before those of the catalogue.",
 )
+
+
+@click.command(short_help="Open the tasks of a conceptual net to a detailed net, and carry over its verdicts.")
+@net_argument
+@tasks_option
 @click.option("-o", "--output", metavar="FILE", help="Write the detailed net there, as a net file (*.firable.yaml).")
 @click.option("--cell", metavar="NAME", default="", help="The name of the detailed net; by default that of NET.")
 @click.option(
@@ -82,7 +85,8 @@ def refine(
 
     Each task is checked alone, with nothing around it: that it always can end, leaves nothing behind and has no
     contact. What is proved of NET then holds of the detailed net too, which is not explored for it. A task that
-    violates a condition is refused, with a firing sequence in its own names.
+    violates a condition is refused, with a firing sequence in its own names. `firable bundle DETAILED --conceptual NET`
+    puts all this into the bundle, for `firable verify` to show again.
     """
     if output == "-":
         raise click.UsageError("the net cannot go to standard output, where the report goes: name a file")
@@ -108,7 +112,7 @@ def _report(
     from firable.nets.printing import format_net
 
     loaded = load_net(argument)
-    catalogue = _catalogue(files)
+    catalogue = read_catalogue(files)
     with loaded.placing():
         blocks = proved_tasks(loaded.net, catalogue)
         unsound = next((block for block in blocks if not block.sound), None)
@@ -151,7 +155,8 @@ def _limits(most: Budget) -> Limits:
     return Limits(Deadline.after(30.0 if most.seconds is None else most.seconds), most.memory_bytes)
 
 
-def _catalogue(files: tuple[str, ...]) -> Catalogue:
+def read_catalogue(files: tuple[str, ...]) -> Catalogue:
+    """The tasks of these files and of the catalogue."""
     from firable.nets.catalogue import catalogue_tasks
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.tasks.text import read_tasks

@@ -248,6 +248,7 @@ def _show_bundle(report: Report) -> None:
     from firable.decompose.verification.explored import TITLES
     from firable.decompose.verification.machines import TITLE as MACHINES
     from firable.decompose.verification.protocol import TITLE
+    from firable.decompose.verification.refinement import TITLE as REFINEMENT
     from firable.decompose.verification.restating import HEADS
 
     click.echo(f"  the bundle {report.bundle['digest'][:16]}…: split anew, and stated anew what it must prove")
@@ -258,6 +259,7 @@ def _show_bundle(report: Report) -> None:
         "protocol": TITLE,
         **TITLES,
         "o4": MACHINES,
+        "refinement": REFINEMENT,
         "persistent": "of each vote it is shown whether it is persistent",
     }
     families: dict[str, list[Verdict]] = {family: [] for family in titles}

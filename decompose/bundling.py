@@ -21,6 +21,7 @@ from firable.analysis.report import CheckReport
 from firable.decompose.proofs.held_gates import held_gates
 from firable.decompose.proofs.proving import TIMEOUT_MS, prove
 from firable.decompose.protocol.shown import proved_without_exploring
+from firable.decompose.refinement.sealing import Origin, sealed
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import persistence
 from firable.nets.bundle import Bundle
@@ -44,17 +45,19 @@ def make_bundle(
     protocol: bool = False,
     faults: bool = False,
     plant: str = "",
+    origin: Origin | None = None,
 ) -> Bundle:
     """Split the net of a report, prove the decomposition and bundle both with all verdicts and their evidence.
 
     `limits` are for the evidence on the verdicts of the report: what it cannot show in that time is only claimed.
     `firable verify` will say so of a warning; a verdict that is required is no reason to run without evidence. With
     `protocol` and `faults` the bundle holds the verdicts on the protocol of this very net, too, proved by an
-    invariant. With the text of a `plant` file, the bundle holds it and that its machines keep what votes rely on (O4).
+    invariant. With the text of a `plant` file, the bundle holds it and that its machines keep what votes rely on (O4);
+    with an `origin`, the conceptual net and the tasks of which the net is made, and that it does what that one does.
 
     Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the report is not that of exploring
     this net by interleaving, which is how it will be executed, and for everything that must be proved and is not, or
-    is not shown.
+    is not shown, and where the net is not made of its origin.
     """
     if report.net != report.space.net:
         message = f"the verdicts are on another net than '{report.net.name}'"
@@ -73,8 +76,9 @@ def make_bundle(
     held, machines = tuple[Verdict, ...](), dict[str, str]()
     if plant:
         held, machines = held_gates(decomposition, parse_plant(plant)).sealed(plant, limits)
-    verdicts = (*on_the_net, *proof.verdicts, *run, *held, *voted)
-    files = {EVIDENCE: document.to_text(), **proof.files, **obligations, **machines, **shown}
+    refined, opened = sealed(report.net, origin, limits, timeout_ms) if origin else ((), {})
+    verdicts = (*on_the_net, *proof.verdicts, *run, *held, *voted, *refined)
+    files = {EVIDENCE: document.to_text(), **proof.files, **obligations, **machines, **shown, **opened}
     bundle = Bundle(decomposition, verdicts, files)
     if problems := unproved(bundle):
         lacking = {record.name: record.lacking for record in document.records if record.proved and record.lacking}

@@ -70,7 +70,7 @@ def refinement_evidence(
         return file
 
     for block in blocks:
-        file = add(f"{block.task.name}.task", _document(block, limits))
+        file = add(f"{block.task.name}.task", condition_document(block, limits))
         of_task |= {verdict.name: file for verdict in block.verdicts}
     conceptual = add(report.net.name, evidence_of_report(report, (), limits))
     over = [verdict for verdict in verdicts if verdict.method == METHOD and verdict.status is not Status.UNKNOWN]
@@ -87,7 +87,7 @@ def refinement_evidence(
     return tuple(replace(verdict, evidence=files(verdict)) for verdict in verdicts), documents
 
 
-def _document(block: BlockProof, limits: Limits | None) -> Document:
+def condition_document(block: BlockProof, limits: Limits | None) -> Document:
     """The conditions of a task, as verdicts on its closed net."""
     report = check(replace(block.net, properties=tuple(conditions(block.task, block.net))))
     conditions_of = {verdict.name.partition(".")[2]: verdict for verdict in block.verdicts}

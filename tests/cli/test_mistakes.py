@@ -118,6 +118,7 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         (["prove", "a", "b"], "unexpected extra argument"),
         (["bundle", "catalogue:one_robot"], "Missing option"),
         (["bundle", "catalogue:one_robot", "-o", "-"], "cannot go to standard output"),
+        (["bundle", "x", "-o", "y", "--tasks", "z"], "--tasks goes with --conceptual"),
         (["run", "x", "--workpieces", "-1"], "Invalid value"),
         (["run", "x", "--speed", "100"], "is not one of"),
         (["replay", "x"], "Missing option"),

@@ -132,3 +132,22 @@ def test_evidence_is_written_and_verified(tmp_path: Path, capsys: pytest.Capture
 def test_the_schema_of_files_of_tasks_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", "tasks"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "firable file of tasks"
+
+
+def test_what_was_refined_is_bundled_with_where_it_comes_from_and_verified(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell, bundle = str(tmp_path / "cell.firable.yaml"), str(tmp_path / "cell.bundle")
+    own = tmp_path / "own.tasks.yaml"
+    own.write_text(
+        OWN.replace(", stuck: ", "").replace(
+            "      b: {from: machine.run, to: machine.stuck, description: the tool breaks}\n", ""
+        )
+    )
+    arguments = ["catalogue:conceptual_one_robot", "--tasks", str(own)]
+    assert refined(capsys, *arguments, "-o", cell)[0] == 0
+    assert main(["bundle", cell, "--conceptual", *arguments, "-o", bundle]) == 0
+    assert main(["verify", bundle]) == 0
+    assert "refinement       the net is what registered tasks make" in capsys.readouterr().out
+    assert main(["bundle", cell, "--conceptual", arguments[0], "-o", bundle]) == 2
+    assert "error[F4003]: the net is not what its tasks make of 'conceptual-one-robot'" in capsys.readouterr().err
