@@ -111,6 +111,9 @@ class _Heard:
     def signal(self, name: str, value: bool, entry: int | None) -> None:
         pass  # the table is made of the image
 
+    def taken(self, place: str, entry: int) -> None:
+        self._told(f"{place}: taken, as command {entry}")
+
     def moved(self) -> None:
         pass
 

@@ -88,6 +88,7 @@ class Heard:
     """A listener that remembers, and a clock beside it."""
 
     signals: list[tuple[str, bool, int | None]] = field(default_factory=list)
+    takings: list[tuple[str, int]] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     emergencies: list[str] = field(default_factory=list)
@@ -95,6 +96,10 @@ class Heard:
     def signal(self, name: str, value: bool, entry: int | None) -> None:
         """Remember a value."""
         self.signals.append((name, value, entry))
+
+    def taken(self, place: str, entry: int) -> None:
+        """Remember that a machine has a command."""
+        self.takings.append((place, entry))
 
     def driver_fault(self, machine: str, message: str) -> None:
         """Remember a fault."""

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 
 from firable.executor.drivers.binding import Binding, CommandDocument, SignalDocument, writes
-from firable.executor.drivers.channels import Channel
+from firable.executor.drivers.channels import Channel, Outcome, Said
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.device import Point, Value, Writes, as_bit
 from firable.executor.drivers.driver import Answer, Clock, Listener, Quality, Reading
@@ -271,7 +271,8 @@ class _Device:
         if self.writing is None:
             self.forced.popleft()
         else:
-            self.writing.written()
+            for outcome in self.writing.written():
+                self._said(outcome)
 
     # What follows from it
 
@@ -311,17 +312,23 @@ class _Device:
             self._fault(f"'{several}' cannot be read: {self.image.readings[faults[0]].why}")
 
     def _replied(self, channel: Channel, key: str, point: Point, value: Value) -> None:
-        outcome = channel.shows(key, value)
+        for outcome in channel.shows(key, value):
+            self._said(outcome)
         if channel.shown[key] is None and value != self.garbage.get(point):
             self.garbage[point] = value
             self.note(f"'{point}' shows {value!r}, which is no number of a command")
-        if outcome is None:
-            return
+
+    def _said(self, outcome: Outcome) -> None:
         order = outcome.order
-        if not outcome.done:
-            self._fault(f"has failed at the command of '{order.place}'{f', {order.text}' if order.text else ''}")
-        elif (completion := self.driver.completing.get(order.place)) is not None:
-            self.driver.formed(completion, self.driver.completions.acknowledged(completion, order.entry))
+        match outcome.said:
+            case Said.TAKEN:
+                if self.driver.listener is not None:
+                    self.driver.listener.taken(order.place, order.entry)
+            case Said.FAILED:
+                self._fault(f"has failed at the command of '{order.place}'{f', {order.text}' if order.text else ''}")
+            case Said.DONE:
+                if (completion := self.driver.completing.get(order.place)) is not None:
+                    self.driver.formed(completion, self.driver.completions.acknowledged(completion, order.entry))
 
     def _watchdog(self, value: Value) -> None:
         tripped = as_bit(value)

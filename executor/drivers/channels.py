@@ -11,6 +11,9 @@ number 0 first, "no command", and the number goes out when it is shown no more. 
 with their four edges for each command. They know no order, and say nothing after a restart; a device that has nothing
 else needs a few lines of its own program, as its watchdog does.
 
+The device *has* a command when it shows its number. Of a channel that shows nothing of what it has taken, the
+confirmation of the write must do; behind a broker that is the broker's word alone.
+
 A channel is for one machine, which does one thing at a time. A command that overtakes another, such as a stop, has no
 completion. Pure: a machine of calls and answers, without clock and connection.
 """
@@ -42,12 +45,20 @@ class Order:
     writes: Writes = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Said(Enum):
     """What a machine says of an order."""
 
+    TAKEN = auto()
+    DONE = auto()
+    FAILED = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a machine says, and of which order."""
+
     order: Order
-    done: bool
+    said: Said
 
 
 class _Phase(Enum):
@@ -72,7 +83,9 @@ class Channel:
         self.current: Order | None = None
         self.phase = _Phase.WRITTEN
         self.outstanding: dict[int, Order] = {}
-        """What was sent, by its number, and has had no outcome."""
+        """What was sent, by its number, and is neither done nor failed."""
+        self.untaken: dict[int, Order] = {}
+        """What was sent, by its number, and the device is not known to have."""
         self.is_taken = False
         """Whether the device has shown the number of the newest order."""
         self.is_withdrawn = False
@@ -130,23 +143,28 @@ class Channel:
             return self._numbered(0, "")
         self.phase = _Phase.WRITING
         self.outstanding = {number: one for number, one in self.outstanding.items() if one.place != order.place}
-        self.outstanding[order.number] = order
+        self.outstanding[order.number] = self.untaken[order.number] = order
         return (*order.writes, *self._numbered(order.number, order.text))
 
-    def written(self) -> None:
-        """The device has confirmed what was to be written."""
+    def written(self) -> tuple[Outcome, ...]:
+        """The device has confirmed what was to be written; returns what that tells, where it does not tell more."""
         if self.phase is _Phase.WRITING:
             self.phase = _Phase.WRITTEN
+            if self.current is not None and self.document.taken is None:
+                return self._has(self.current.number)
+        return ()
 
-    def shows(self, key: str, value: Value) -> Outcome | None:
-        """The device shows a number; returns the outcome that it tells of."""
+    def shows(self, key: str, value: Value) -> tuple[Outcome, ...]:
+        """The device shows a number; returns what that tells."""
         number = self.shown[key] = as_number(value)
         if self.current is not None and number == self.current.number:
             self.is_taken |= self.phase in {_Phase.WRITING, _Phase.WRITTEN}
-        if key == "taken" or number is None:
-            return None
-        order = self.outstanding.pop(number, None)
-        return None if order is None else Outcome(order, done=key == "done")
+        if number is None:
+            return ()
+        has = self._has(number)
+        if key == "taken" or (order := self.outstanding.pop(number, None)) is None:
+            return has
+        return (*has, Outcome(order, Said.DONE if key == "done" else Said.FAILED))
 
     def connected_again(self) -> Order | None:
         """A new connection shows its numbers; returns an order that the device had, and knows nothing of any more.
@@ -169,7 +187,9 @@ class Channel:
     def expect(self, place: str, entry: int) -> None:
         """Take up a command that was sent before a restart, so that its outcome is told if it comes."""
         number = self.number(place, entry)
-        self.outstanding[number] = Order(place, entry, number, "")
+        self.outstanding[number] = order = Order(place, entry, number, "")
+        if number not in self.shown.values():
+            self.untaken[number] = order
 
     def answer(self, place: str, entry: int, *, stopped: bool) -> Answer:
         """What became of a command that was sent before a restart; `stopped` where the safe outputs came in between.
@@ -186,12 +206,16 @@ class Channel:
         taken = self.shown.get("taken")
         if taken is None or not self._came_before(taken):
             return Answer.UNKNOWN
-        del self.outstanding[number]
+        del self.outstanding[number], self.untaken[number]
         return Answer.NOT_RECEIVED
 
     def _came_before(self, taken: int) -> bool:
         """Whether the number shown is none, or of a command that was over when a later one was sent."""
         return taken == 0 or self.places[(taken - 1) % len(self.places)] in self.answered
+
+    def _has(self, number: int) -> tuple[Outcome, ...]:
+        order = self.untaken.pop(number, None)
+        return () if order is None else (Outcome(order, Said.TAKEN),)
 
     def _delivered(self) -> bool:
         """Whether the next order may go out: the device has the newest, as far as it tells."""

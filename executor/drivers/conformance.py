@@ -156,6 +156,68 @@ class DriverConformance:
 
         self.bench(test)
 
+    def test_a_command_is_taken_when_the_machine_has_it_and_told_so_once(self) -> None:
+        """A token without completion goes on by that; what stands in a queue or a register has moved nothing."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                await b.far.end.cut()
+                b.driver.send(b.place("halt"), 1)
+                await until(lambda: not b.driver.devices["D"].is_ready.is_set(), "the loss")
+                assert b.heard.takings == []
+                b.machine.takes = False
+                await b.far.end.mend()
+                await until(lambda: b.machine.events[-1:] in (["number"], ["command"]), "the number is written")
+                b.machine.show("sensor", value=True)
+                await until(lambda: b.heard_of("held")[-1:] == [(True, None)], "what comes later is read")
+                assert b.heard.takings == []
+                b.machine.takes = True
+                await until(lambda: b.heard.takings, "it is taken")
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: len(b.heard.takings) == 2, "the other is taken")
+                b.machine.finish()
+                await until(lambda: b.heard_of("moved"), "the completion")
+            assert b.heard.takings == [("M.halt", 1), ("M.move", 1)]
+            assert len(b.machine.orders) == 2
+
+        self.bench(test)
+
+    def test_a_command_that_a_stop_overtakes_is_never_told_as_taken(self) -> None:
+        """After the restart it is asked after: the machine has not moved by it."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                await b.far.end.cut()
+                b.driver.send(b.place("halt"), 1)
+                await until(lambda: not b.driver.devices["D"].is_ready.is_set(), "the loss")
+                b.driver.stop()
+                b.driver.send(b.place("halt"), 2)
+                await b.far.end.mend()
+            assert b.machine.orders == []
+            assert b.heard.takings == []
+
+        self.bench(test)
+
+    def test_a_command_that_is_given_up_before_the_machine_has_it_never_comes(self) -> None:
+        """Its token has left: a machine that moved by it when the line is back would move by nothing."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                await b.far.end.cut()
+                b.driver.send(b.place("move"), 1)
+                b.driver.send(b.place("halt"), 1)
+                await until(lambda: not b.driver.devices["D"].is_ready.is_set(), "the loss")
+                b.driver.withdraw(b.place("move"))
+                b.driver.withdraw(b.place("halt"))
+                await b.far.end.mend()
+                await until(b.driver.devices["D"].is_ready.is_set, "the return")
+                b.driver.send(b.place("grip"), 1)
+                await until(lambda: b.heard.takings, "the next command is taken")
+            assert b.heard.takings == [("M.grip", 1)]
+            assert len(b.machine.orders) == 1
+
+        self.bench(test)
+
     def test_a_failed_command_is_a_fault(self) -> None:
         """A failure is told at once, and not when the command is overdue."""
 

@@ -13,6 +13,8 @@ to a listener without waiting, and is told of each command that a place sends. W
 - A connection that failed or timed out is never used again: the answer that comes too late would be taken for that to
   the next question. There is a new one, after a pause that grows.
 - Edges that come faster than they are read are counted as *coalesced* in the image, never silently lost.
+- A command is *taken* when the machine has it, and not when the driver has put it in a queue. A token without
+  completion goes on by that alone: over a dead line, or at a stop, it would leave a machine that has never moved.
 - After a restart `ask` says what became of a command that was sent before.
 
 The alternative, polling a process image at a fixed period, adds half a period to every reaction; drivers of devices
@@ -22,13 +24,16 @@ that can only be polled do so inside, behind this protocol. Real machines are re
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, MutableSequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from firable.executor.protocol.commands import Answer as Answer
+from firable.executor.protocol.messages import Effect, Sending
 from firable.nets.net import Net, Place
+
+Leaving = TypeVar("Leaving", bound=Effect)
 
 
 class Quality(StrEnum):
@@ -59,6 +64,10 @@ class Listener(Protocol):
 
     def signal(self, name: str, value: bool, entry: int | None) -> None:
         """A signal has a new value; for a completion, `entry` is the number of the command completed."""
+        ...
+
+    def taken(self, place: str, entry: int) -> None:
+        """A machine has the command of a place: it will do it, whatever becomes of the line and of this process."""
         ...
 
     def driver_fault(self, machine: str, message: str) -> None:
@@ -107,7 +116,7 @@ class Driver(Protocol):
         ...
 
     def send(self, place: Place, entry: int) -> None:
-        """Send the command of a place; it waits for a link that is down."""
+        """Send the command of a place; it waits for a link that is down, and is `taken` when the machine has it."""
         ...
 
     def withdraw(self, place: Place) -> None:
@@ -134,11 +143,18 @@ class Driver(Protocol):
         ...
 
 
-def withdraw(driver: Driver, net: Net, transition: str) -> None:
-    """Give up the commands that a firing leaves behind: a machine must not move by them when its link comes back.
+def withdraw(driver: Driver, net: Net, transition: str, leaving: MutableSequence[Leaving]) -> list[str]:
+    """Give up the commands that a firing leaves behind: a machine must not move by them later, by no token.
 
-    A command without completion is not given up: its token need not wait until the machine has done it.
+    They are with the driver, or still among what is `leaving` the process behind the journal, and are taken out there.
+    One that its machine has is not given up. Returns the places of those that never reached the driver.
     """
+    never: list[str] = []
     for place in map(net.place, net.transition(transition).inputs):
-        if place.completion is not None:
+        if place.command is not None:
+            waiting = [one for one in leaving if isinstance(one, Sending) and one.place == place.name]
+            for one in waiting:
+                leaving.remove(one)
+                never.append(place.name)
             driver.withdraw(place)
+    return never

@@ -46,7 +46,10 @@ class DryRunDriver:
 
     def send(self, place: Place, entry: int) -> None:
         """Take the command of a place, and complete it in time."""
-        if place.completion is not None and self.clock is not None and not self.is_stopped:
+        if self.clock is None or self.listener is None or self.is_stopped:
+            return
+        self.listener.taken(place.name, entry)
+        if place.completion is not None:
             delay = self.clock.loop_delay_seconds(self.clock.now_seconds() + self.seconds)
             asyncio.get_running_loop().call_later(delay, self._done, place.completion, entry)
 

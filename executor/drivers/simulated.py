@@ -27,6 +27,9 @@ class _Nobody:
     def signal(self, name: str, value: bool, entry: int | None) -> None:
         """It was told in its time."""
 
+    def taken(self, place: str, entry: int) -> None:
+        """It was told in its time."""
+
     def driver_fault(self, machine: str, message: str) -> None:
         """It was told in its time."""
 
@@ -102,6 +105,8 @@ class SimulatedDriver:
         """Give the machine its command, under a new ticket."""
         if place.command is None or self.clock is None:
             raise RuntimeError(f"'{place.name}' sends no command, or the driver does not run yet")
+        if self.stopped:
+            return
         self._input(self.clock.now_seconds(), "send", place.name, entry)
         self.awake.set()
 
@@ -157,6 +162,7 @@ class SimulatedDriver:
         ticket = self.next_ticket
         self.next_ticket += 1
         self.received[place.name] = entry
+        self.listener.taken(place.name, entry)
         self.interrupted.discard((place.name, entry))
         if place.completion is not None:
             self.tickets[ticket] = (place, entry)

@@ -33,7 +33,7 @@ from firable.executor.drivers.driver import Driver, withdraw
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.operating import restart
 from firable.executor.operating.figures import Figures
-from firable.executor.operating.mailbox import Continue, Mailbox, SignalRead
+from firable.executor.operating.mailbox import CommandTaken, Continue, Mailbox, SignalRead
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import Situation, State, blocked
@@ -154,7 +154,9 @@ class Execution:
         self.fault = ""
         self.operated = operator is not None
         self.overdue: dict[str, asyncio.TimerHandle] = {}
-        """For each completion signal, the alarm of the command that it completes, if its place has no time limit."""
+        """The alarm of each command without a time limit: by its completion signal or, if it has none, its place."""
+        self.untaken: set[str] = set()
+        """The places whose command has no completion, and is with the driver."""
         self.ticks: dict[str, asyncio.TimerHandle] = {}
         """For each controller with a time that runs, when it is told the time next."""
         self.turn = 0
@@ -224,17 +226,17 @@ class Execution:
         player, word = self.recorder.player, self.recorder.word
         shown = player.net.names(self.recorder.marking)
         if self.fault:
-            return Situation(State.FAULT, shown, tuple(blocked(player, word)), self.fault)
+            return Situation(State.FAULT, shown, tuple(blocked(player, word, self.untaken)), self.fault)
         if self.under_way and not self.paused:
             return Situation(State.RUNNING, shown)
         if self.taking_up is not None:
             return Situation(State.HELD, shown, (), restart.told(self, self.taking_up))
         if self.recorder.is_deadlock:
             message = "no transition can fire any more, whatever the signals do"
-            return Situation(State.DEADLOCK, shown, tuple(blocked(player, word)), message)
+            return Situation(State.DEADLOCK, shown, tuple(blocked(player, word, self.untaken)), message)
         if self.paused:
-            return Situation(State.PAUSED, shown, tuple(blocked(player, word)))
-        return Situation(State.WAITING, shown, tuple(blocked(player, word)))
+            return Situation(State.PAUSED, shown, tuple(blocked(player, word, self.untaken)))
+        return Situation(State.WAITING, shown, tuple(blocked(player, word, self.untaken)))
 
     # The operator's controls
 
@@ -340,6 +342,15 @@ class Execution:
             alarm.cancel()
         self._post(self.owner_of[name], SignalRead(name, value, entry))
 
+    def taken(self, place: str, entry: int) -> None:
+        """A machine has the command of a place; a token without completion has waited for that."""
+        sender = self.net.place(place)
+        if sender.completion is None:
+            self.untaken.discard(place)
+            if (alarm := self.overdue.pop(place, None)) is not None:
+                alarm.cancel()
+            self._post(str(sender.owner), CommandTaken(place, entry))
+
     def driver_fault(self, machine: str, message: str) -> None:
         """A machine has failed: nothing fires any more."""
         self._fail(f"{machine}: {message}" if machine else message)
@@ -376,6 +387,8 @@ class Execution:
                     self._act(name, controller.receive(message))
                 case SignalRead(signal, value, entry):
                     self._act(name, controller.read(signal, value, entry))
+                case CommandTaken(place, entry):
+                    self._act(name, controller.sent(place, entry))
                 case Continue():
                     pass  # to fire is what every message leads to
                 case unknown:
@@ -434,7 +447,8 @@ class Execution:
             match effect:
                 case Firing(transition):
                     self._fired(transition)
-                    withdraw(self.driver, self.net, transition)
+                    for place in withdraw(self.driver, self.net, transition, self.leaving):
+                        self.recorder.note(self.now_seconds(), "withdrawn", place=place)
                 case Taken(signal, value):
                     self.recorder.signal(self.now_seconds(), signal, value)
                 case Sending(place, again=again):
@@ -481,20 +495,26 @@ class Execution:
 
     def _send(self, sending: Sending) -> None:
         sender = self.net.place(sending.place)
-        self.watch(sending.place)
+        if sender.completion is not None:
+            self.watch(sending.place)
+            self.driver.send(sender, sending.entry)
+            return
+        self.untaken.add(sending.place)
         self.driver.send(sender, sending.entry)
-        owner = str(sender.owner)
-        self._act(owner, self.controllers[owner].sent(sending.place, sending.entry))
-        if sender.completion is None:  # its token waited for that
-            self._post(owner, Continue())
+        if sending.place in self.untaken:  # it waits for a line
+            self.watch(sending.place)
 
     def watch(self, place: str) -> None:
-        """Give the alarm where the command of a place without a time limit is not completed in time, from now on."""
-        completion = self.net.place(place).completion
-        if completion is not None and self.net.place(place).within is None:
-            if (earlier := self.overdue.pop(completion, None)) is not None:
+        """Give the alarm where the command of a place without a time limit is not completed in time, from now on.
+
+        A command without completion has to be taken in time.
+        """
+        sender = self.net.place(place)
+        if sender.within is None:
+            awaited = sender.completion or place
+            if (earlier := self.overdue.pop(awaited, None)) is not None:
                 earlier.cancel()
-            self.overdue[completion] = asyncio.get_running_loop().call_later(
+            self.overdue[awaited] = asyncio.get_running_loop().call_later(
                 self.overdue_seconds / self.speed, self._alarm, place, self.now_seconds()
             )
 
@@ -504,10 +524,11 @@ class Execution:
 
     def _overdue(self, place: str, sent_at: float) -> None:
         sender = self.net.place(place)
-        self.overdue.pop(str(sender.completion), None)
+        self.overdue.pop(sender.completion or place, None)
+        awaited = f"'{sender.completion}' has not come" if sender.completion else "its machine has not taken it"
         self._fail(
             f"'{sender.command}' of '{place}', sent at {sent_at:.1f} s, is overdue: "
-            f"'{sender.completion}' has not come within {self.overdue_seconds:g} s"
+            f"{awaited} within {self.overdue_seconds:g} s"
         )
 
     def _fail(self, message: str) -> None:
@@ -535,7 +556,7 @@ class Execution:
         if self.stop_at_divergence:
             self._fail(f"the machines are not as they are modelled: {found}")
 
-    def _post(self, mailbox: str, item: Message | SignalRead | Continue) -> None:
+    def _post(self, mailbox: str, item: Message | SignalRead | CommandTaken | Continue) -> None:
         self.under_way += 1
         self.mailboxes[mailbox].post(item)
 

@@ -35,6 +35,7 @@ from firable.executor.journal.journal import Journal
 from firable.executor.links.link import Link, called
 from firable.executor.operating.execution import FIRINGS_AT_ONCE_MAX, RunClock
 from firable.executor.operating.host_trace import TRACE, HostTrace
+from firable.executor.operating.mailbox import CommandTaken
 from firable.executor.operating.situation import Blocked, Situation, State, blocked
 from firable.executor.operating.uncut import uncut
 from firable.executor.operating.waits import reached, waits
@@ -127,7 +128,7 @@ class Host:
         self.peers = {*self.deciding, *(subnet.name for subnet in decomposition.subnets)} - set(machines)
         """The machines of other hosts."""
         self.connected_to: set[str] = set()
-        self.posted: deque[tuple[str, Message | SignalRead | None]] = deque()
+        self.posted: deque[tuple[str, Message | SignalRead | CommandTaken | None]] = deque()
         """What the machines here are given next; None is their turn to fire."""
         self.leaving: list[Effect] = []
         """What leaves the host when this group is durable."""
@@ -143,7 +144,9 @@ class Host:
         self.messages = 0
         self.repeats = 0
         self.overdue: dict[str, asyncio.TimerHandle] = {}
-        """For each completion signal, the alarm of the command that it completes, if its place has no time limit."""
+        """The alarm of each command without a time limit: by its completion signal or, if it has none, its place."""
+        self.untaken: set[str] = set()
+        """The places whose command has no completion, and is with the driver."""
         self.clock: RunClock | None = None
         self.ticks: dict[str, asyncio.TimerHandle] = {}
         """For each controller with a time that runs, when it is told the time next."""
@@ -191,7 +194,7 @@ class Host:
         """What the host is doing, and what waits for what, as far as its machines know."""
         found: list[Blocked] = []
         for controller in self.controllers.values():
-            found += blocked(controller.player, controller.word)
+            found += blocked(controller.player, controller.word, self.untaken)
         message = self.fault or self.ended_by or "; ".join(self.waits())
         state = State.FAULT if self.fault else State.STOPPED if self.stopping else State.WAITING
         return Situation(state, self.marking, tuple(found), message)
@@ -257,6 +260,15 @@ class Host:
             alarm.cancel()
         self._post(self.owner_of[name], SignalRead(name, value, entry))
 
+    def taken(self, place: str, entry: int) -> None:
+        """A machine has the command of a place; a token without completion has waited for that."""
+        sender = self.net.place(place)
+        if sender.completion is None:
+            self.untaken.discard(place)
+            if (alarm := self.overdue.pop(place, None)) is not None:
+                alarm.cancel()
+            self._post(str(sender.owner), CommandTaken(place, entry))
+
     def driver_fault(self, machine: str, message: str) -> None:
         """A machine has failed."""
         self._fail(f"{machine}: {message}" if machine else message)
@@ -299,7 +311,7 @@ class Host:
 
     # Acts
 
-    def _post(self, machine: str, item: Message | SignalRead | None) -> None:
+    def _post(self, machine: str, item: Message | SignalRead | CommandTaken | None) -> None:
         self.posted.append((machine, item))
         self._wake()
 
@@ -325,7 +337,7 @@ class Host:
         elif self.stopping and self._is_settled() and self._is_heard():
             self._end()
 
-    def _give(self, machine: str, item: Message | SignalRead | None) -> None:
+    def _give(self, machine: str, item: Message | SignalRead | CommandTaken | None) -> None:
         """One act of one machine, and its turn to fire and to report."""
         if isinstance(item, ToCoordinator):
             if machine not in self.coordinators:
@@ -341,6 +353,7 @@ class Host:
                 effects = controller.receive(item)
                 if promised:
                     self.trace.applied(machine, item.round)
+                    self._withdraw(str(item.committed))
                 self._act(machine, effects)
             case VoteRequest() | Hello():
                 known = item.round in controller.promises if isinstance(item, VoteRequest) else True
@@ -350,6 +363,8 @@ class Host:
                 self._act(machine, effects)
             case SignalRead(signal, value, entry):
                 self._act(machine, controller.read(signal, value, entry))
+            case CommandTaken(place, entry):
+                self._act(machine, controller.sent(place, entry))
         self.firing[machine] = self.firing[machine] + 1 if item is None else 0
         if self.firing[machine] > FIRINGS_AT_ONCE_MAX:
             self._fail(f"'{machine}' fires without end, and no gate ever holds it")
@@ -372,7 +387,7 @@ class Host:
                     self.unsynced = True
                 case Firing(transition):
                     self.trace.fired(transition, rounds.get(transition) if machine in self.coordinators else None)
-                    withdraw(self.driver, self.net, transition)
+                    self._withdraw(transition)
                 case Taken(signal, value):
                     self.trace.signal(signal, value)
                 case Sending(place, _, again):
@@ -388,6 +403,10 @@ class Host:
                 case _:
                     assert_never(effect)
         self._wake()
+
+    def _withdraw(self, transition: str) -> None:
+        for place in withdraw(self.driver, self.net, transition, self.leaving):
+            self.trace.note("withdrawn", place=place)
 
     def _say(self, receiver: str, message: Message) -> None:
         self.messages += 1
@@ -415,25 +434,27 @@ class Host:
                     self.link.send(effect.controller, effect.coordinator, effect)
 
     def _send(self, place: str, entry: int) -> None:
-        self._watch(place)
         sender = self.net.place(place)
-        self.driver.send(sender, entry)
-        if self.is_safe:  # it has failed at that
+        if sender.completion is not None:
+            self._watch(place)
+            self.driver.send(sender, entry)
             return
-        owner = str(sender.owner)
-        self._act(owner, self.controllers[owner].sent(place, entry))
-        if sender.completion is None:  # its token waited for that
-            self._post(owner, None)
+        self.untaken.add(place)
+        self.driver.send(sender, entry)
+        if place in self.untaken:  # it waits for a line
+            self._watch(place)
 
     def _watch(self, place: str) -> None:
-        """Have an alarm, should a command not be completed in time; a place with a time of its own needs none."""
+        """Have an alarm, should a command not be completed in time; a place with a time of its own needs none.
+
+        A command without completion has to be taken in time.
+        """
         sender = self.net.place(place)
-        if sender.completion is not None and sender.within is None:
-            if (earlier := self.overdue.pop(sender.completion, None)) is not None:
+        if sender.within is None:
+            awaited = sender.completion or place
+            if (earlier := self.overdue.pop(awaited, None)) is not None:
                 earlier.cancel()
-            self.overdue[sender.completion] = asyncio.get_running_loop().call_later(
-                self.overdue_seconds, self._overdue, place
-            )
+            self.overdue[awaited] = asyncio.get_running_loop().call_later(self.overdue_seconds, self._overdue, place)
 
     # Time
 
@@ -481,12 +502,10 @@ class Host:
 
     def _overdue(self, place: str) -> None:
         sender = self.net.place(place)
-        self.overdue.pop(str(sender.completion), None)
+        self.overdue.pop(sender.completion or place, None)
+        awaited = f"'{sender.completion}' has not come" if sender.completion else "its machine has not taken it"
         try:
-            self._fail(
-                f"'{sender.command}' of '{place}' is overdue: "
-                f"'{sender.completion}' has not come within {self.overdue_seconds:g} s"
-            )
+            self._fail(f"'{sender.command}' of '{place}' is overdue: {awaited} within {self.overdue_seconds:g} s")
         except Exception as error:  # a timer has no caller
             self._broken(error)
 

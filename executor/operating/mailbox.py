@@ -20,6 +20,14 @@ class SignalRead:
     entry: int | None
 
 
+@dataclass(frozen=True, slots=True)
+class CommandTaken:
+    """A driver's message to a controller: the machine has the command of one of its places."""
+
+    place: str
+    entry: int
+
+
 class Continue:
     """A controller's message to itself: it may have more to fire."""
 

@@ -13,7 +13,7 @@ Asked at quiescence, when no message is under way, the joint marking and the pro
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -42,11 +42,14 @@ class Blocked:
     full: tuple[str, ...]
     gates: tuple[tuple[str, bool], ...]
     """Signals with the value that is wanted."""
+    untaken: tuple[str, ...] = ()
+    """Places whose command no machine is known to have, and which has no completion to wait for."""
 
     def __str__(self) -> str:
         reasons = [f"a token on {place}" for place in self.empty]
         reasons += [f"{place} to become empty" for place in self.full]
         reasons += [f"{signal}" if wanted else f"not {signal}" for signal, wanted in self.gates]
+        reasons += [f"the machine to take the command of {place}" for place in self.untaken]
         return f"{self.transition} waits for {', '.join(reasons)}" if reasons else f"{self.transition} is enabled"
 
 
@@ -72,8 +75,11 @@ def is_deadlock(player: TokenPlayer, word: Word) -> bool:
     return not any(c.openable and c.firable(word, player.places) for c in player.transitions.values())
 
 
-def blocked(player: TokenPlayer, word: Word) -> Iterator[Blocked]:
-    """What waits: the firable transitions with closed gates; in a deadlock, those that have some token to take."""
+def blocked(player: TokenPlayer, word: Word, untaken: Collection[str] = ()) -> Iterator[Blocked]:
+    """What waits: the firable transitions with closed gates; in a deadlock, those that have some token to take.
+
+    `untaken` are the places whose command is held back with its driver.
+    """
     net = player.net
     faults = {net.transitions[t].name for t in net.fault_transitions.values()}  # nobody waits for a timeout
     firable = [c for c in player.transitions.values() if c.name not in faults and c.firable(word, player.places)]
@@ -88,4 +94,5 @@ def blocked(player: TokenPlayer, word: Word) -> Iterator[Blocked]:
                 for gate in net.transition(compiled.name).external
                 if bool(word & player.signal_bit(gate.signal)) != gate.wanted
             ),
+            tuple(place for place in net.transition(compiled.name).inputs if place in untaken),
         )

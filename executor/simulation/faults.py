@@ -34,6 +34,7 @@ KINDS: Final[Mapping[str, str]] = MappingProxyType(
         "slow": "a process lets its inputs wait, and fires late",
         "late": "a machine takes long",
         "stuck": "a machine does not end its command until it is mended",
+        "queued": "the line to a machine is down, and its driver keeps the command",
         "flapping": "a sensor changes again and again",
         "stale": "a machine completes once more, or completes an earlier command",
         "forgetful": "a machine cannot say what has become of a command",

@@ -2,18 +2,20 @@
 
 It is the host of the machine, and does what every host has to: the writes of an act become durable before anything of
 the act leaves. What an act wants to let out stands in the outbox, in order, until the sync behind which it may leave.
-Killed, the process loses the machine, the outbox and what its disk had not synced. Of the acts whose writes survive,
+A command is then with the driver, which may have to
+wait for a line; what has not reached its machine is given up when its token leaves. Killed, the process loses the
+machine, the outbox, what its driver kept and what its disk had not synced. Of the acts whose writes survive,
 firings and changes of signals have happened, although nobody was told: a restart finds them done.
 """
 
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from firable.executor.protocol.messages import Effect, Firing, Keep, Stored, Taken
+from firable.executor.protocol.messages import Effect, Firing, Keep, Sending, Stored, Taken
 from firable.executor.simulation.clock import Clock
 from firable.executor.simulation.disk import Disk
 
@@ -39,6 +41,10 @@ class Process(Generic[Machine]):
     outbox: list[Act] = field(default_factory=list)
     clock: Clock = field(default_factory=Clock)
     """It began anew with the process."""
+    queue: list[Sending] = field(default_factory=list)
+    """The commands that its driver keeps."""
+    void: set[tuple[str, int]] = field(default_factory=set)
+    """The commands in the outbox whose token has left, by place and entry."""
     is_held: bool = False
     """Whether it has restarted, and no operator has resumed it yet."""
     cut_off: bool = False
@@ -71,6 +77,19 @@ class Process(Generic[Machine]):
         self.outbox.clear()
         return leaving
 
+    def hand(self, sending: Sending) -> bool:
+        """Let the driver keep a command for later; returns whether that counts as sent."""
+        self.queue.append(sending)
+        return False
+
+    def give_up(self, places: Collection[str]) -> list[Sending]:
+        """The tokens of these places have left: returns what the driver kept of theirs, and keeps no more."""
+        waiting = [effect for act in self.outbox for effect in act.leaving if isinstance(effect, Sending)]
+        self.void |= {(each.place, each.entry) for each in waiting if each.place in places}
+        given_up = [each for each in self.queue if each.place in places]
+        self.queue = [each for each in self.queue if each.place not in places]
+        return given_up
+
     def kill(self) -> list[Effect]:
         """End at once; returns what had happened, though nothing of it was told to anybody."""
         kept = self.disk.crash()
@@ -81,5 +100,7 @@ class Process(Generic[Machine]):
             kept -= act.writes
             happened += [effect for effect in act.leaving if isinstance(effect, Firing | Taken)]
         self.outbox.clear()
+        self.queue.clear()
+        self.void.clear()
         self.machine = None
         return happened

@@ -132,6 +132,7 @@ def check_at_rest(world: World) -> None:
 def _round(world: World, *, at_work: bool = False) -> list[Message | str]:
     """Give everybody a turn, and let everything arrive in order; returns what did."""
     for process in world.controllers.values():
+        world.reach(process)
         world.turn(process)
         if process.machine is not None:
             world.act(process, process.machine.resend())

@@ -5,7 +5,8 @@ sensor changes, a disk syncs, a process is killed, the operator pauses. Which st
 and a seed is a run. How much goes wrong is drawn as well (`faults`). Checked while it goes on, at each event:
 
 - the joint trace is a trace of the central net, gates and commands included (`judge`);
-- no machine gets a command twice, or one while it is certainly at another (`machinery`);
+- no machine gets a command twice, or one while it is certainly at another (`machinery`), or one whose token has left;
+- no token without completion leaves its place before the machine has its command;
 - nothing fires while the operator has paused, and nothing moves after a restart before the operator has resumed;
 - time limits are kept by the clock of their controller (`timekeeper`), however the clocks run.
 
@@ -169,6 +170,10 @@ class World:
             timekeeper.acted(process.machine, process.clock.shown_seconds)
         if self.paused:
             self._check_pause(effects)
+        if process.name in self.controllers:
+            for effect in effects:
+                if isinstance(effect, Firing):
+                    self._left(process, effect.transition)
         if process.act(effects):
             lazy = self.faults["unsynced"]
             if at_once or not lazy or self.draw.random() >= lazy:
@@ -202,15 +207,46 @@ class World:
                 self.counts["sent again"] += again
                 if process.is_held:
                     raise RunFailedError(f"{process.name} commands '{place}' before the operator has resumed it")
-                stuck = self.draw.random() < 0.3 * self.faults["stuck"]
-                self.cell.send(place, entry, stuck=stuck)
                 # One that was given before a stop, and is to be given again, is in the trace already.
                 if not again or place in self.judge.owed:
                     self._event(CommandSent(float(len(self.events)), place))
-                if process.machine is not None:
-                    self.act(process, process.machine.sent(place, entry))
+                if (place, entry) in process.void:
+                    process.void.remove((place, entry))
+                    self.note("given up", (process.name, place, entry))
+                elif self.faults["queued"] and self.draw.random() < 0.7 * self.faults["queued"]:
+                    self.counts["queued"] += 1
+                    self.note("waits for its line", (process.name, place, entry))
+                    if process.hand(effect):
+                        self._sent(process, effect)
+                else:
+                    self._given(process, effect)
             case VoteRequest() | Decision() | Report() | Vote() | Acknowledgement() | Hello():
                 self._send(effect)
+
+    def reach(self, process: Process[Any]) -> None:
+        """Let the lines of a process be up: its machines are given what its driver has kept."""
+        while process.queue:
+            self._given(process, process.queue.pop(0))
+
+    def _given(self, process: Process[Any], sending: Sending) -> None:
+        machine = process.machine
+        if machine is not None and sending.place not in machine.subnet.names(machine.marking):
+            raise RunFailedError(f"a machine is given the command of '{sending.place}', which its token has left")
+        self.note("is given", (sending.place, sending.entry))
+        stuck = self.draw.random() < 0.3 * self.faults["stuck"]
+        self.cell.send(sending.place, sending.entry, stuck=stuck)
+        self._sent(process, sending)
+
+    def _sent(self, process: Process[Any], sending: Sending) -> None:
+        if process.machine is not None:
+            self.act(process, process.machine.sent(sending.place, sending.entry))
+
+    def _left(self, process: Process[Any], transition: str) -> None:
+        """Let a process give up the commands that a firing leaves behind."""
+        for sending in process.give_up(self.net.transition(transition).inputs):
+            self.note("given up", (process.name, sending.place, sending.entry))
+            if self.net.place(sending.place).completion is None:
+                raise RunFailedError(f"'{transition}' fires before a machine has the command of '{sending.place}'")
 
     def _happened(self, effects: Iterable[Effect]) -> None:
         """Tell the judge what is durable, though the process that did it was killed before it could say so."""
@@ -323,6 +359,9 @@ class World:
             return
         self.note("arrives", message)
         self.counts["arrived"] += 1
+        match message:
+            case Decision(committed=str(name)) if message.round in receiver.machine.promises:
+                self._left(receiver, name)
         self.act(receiver, receiver.machine.receive(message))
         if to_controller and not self._is_slow():
             self.turn(controller)
@@ -424,6 +463,10 @@ class World:
             self.act(process, process.machine.resend())
 
     def _machines(self) -> None:
+        waiting = [process for process in self.controllers.values() if process.queue]
+        if waiting and self.draw.random() < 0.3:
+            self.reach(waiting[int(self.draw.random() * len(waiting))])
+            return
         draw = self.draw.random()
         if draw < 0.4 and self.telling:
             self.tell(*self.telling.pop(0))

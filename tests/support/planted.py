@@ -388,6 +388,14 @@ class GoesOnAfterFailedDisk(Process[Any]):
             self.disk.failing = failing
 
 
+class CountsQueuedCommandsAsSent(Process[Any]):
+    """What the driver keeps for a line that is down is taken for sent."""
+
+    def hand(self, sending: Sending) -> bool:
+        super().hand(sending)
+        return True
+
+
 CONTROLLERS: tuple[type[LocalController], ...] = (
     KeepsNoPromise,
     KeepsNoMarking,
@@ -431,6 +439,7 @@ PROCESSES: tuple[type[Process[Any]], ...] = (
     AcknowledgesBeforeKeeping,
     CommandsBeforeKeeping,
     GoesOnAfterFailedDisk,
+    CountsQueuedCommandsAsSent,
 )
 
 PLANTED: dict[str, Machines] = {
@@ -455,5 +464,6 @@ PROVOKED_BY: dict[str, tuple[str, ...]] = {
     "AcknowledgesBeforeKeeping": ("crash",),
     "CommandsBeforeKeeping": ("crash", "torn"),
     "GoesOnAfterFailedDisk": ("disk", "crash"),
+    "CountsQueuedCommandsAsSent": ("queued",),
 }
 """The kinds of faults that bring some of them out soonest; the others, and these too, are found with kinds drawn."""

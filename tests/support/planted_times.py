@@ -3,13 +3,14 @@
 The central net excludes some of them, in whose markings a timer may be set; the others only who looks at the clock.
 """
 
-from collections.abc import Iterator, Mapping
-from typing import ClassVar
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any, ClassVar
 
 from firable.executor.protocol.controller import LocalController
-from firable.executor.protocol.messages import Decision, Effect, Stored, ToController
+from firable.executor.protocol.messages import Decision, Effect, Sending, Stored, ToController
 from firable.executor.protocol.timers import Timers
 from firable.executor.protocol.token_player import Compiled, Word
+from firable.executor.simulation.process import Process
 from firable.executor.simulation.world import Machines
 from firable.nets.decomposition import Decomposition
 
@@ -154,6 +155,14 @@ class DropsTimersAtPromises(LocalController):
         return super().receive(message)
 
 
+class GivesNothingUp(Process[Any]):
+    """What the driver keeps is sent when the line is up, whatever has become of its token."""
+
+    def give_up(self, places: Collection[str]) -> list[Sending]:
+        del places
+        return []
+
+
 TIMES: tuple[type[LocalController], ...] = (
     GoesOnCounting,
     LooksAtNoCompletion,
@@ -166,13 +175,17 @@ TIMES: tuple[type[LocalController], ...] = (
     TakesTimersBlindly,
     DropsTimersAtPromises,
 )
-PLANTED_TIMES: dict[str, Machines] = {each.__name__: Machines(controller=each) for each in TIMES}
+PLANTED_TIMES: dict[str, Machines] = {
+    **{each.__name__: Machines(controller=each) for each in TIMES},
+    GivesNothingUp.__name__: Machines(process=GivesNothingUp),
+}
 PROVOKED_TIMES: dict[str, tuple[str, ...]] = {
     "TimesNothingAnew": ("crash",),
     "TimesTheOutage": ("crash", "stuck"),
     "GoesOnCounting": ("stuck",),
     "LeavesTimersSet": ("stuck",),
     "ForgetsOthers": ("stuck", "standstill"),
+    "GivesNothingUp": ("queued",),
     "TakesTimersBlindly": ("slow", "delay", "late"),
 }
 """The kinds of faults that bring some of them out soonest."""

@@ -42,6 +42,9 @@ class Machine:
         self.number = 0
         self.code: Value = 0
         self.beats = 0
+        self.taking = True
+        self.waiting: tuple[int, Value] | None = None
+        """The command that stands there while it takes none."""
         self.finishes_at_once = False
         self.watchdog_s = 0.0
         self.watching: asyncio.TimerHandle | None = None
@@ -59,6 +62,19 @@ class Machine:
         if self.watching is not None:
             self.watching.cancel()
         await self.end.stop()
+
+    @property
+    def takes(self) -> bool:
+        """Whether its program runs, which takes what it is given; one that is written stands there until then."""
+        return self.taking
+
+    @takes.setter
+    def takes(self, value: bool) -> None:
+        self.taking = value
+        if value and self.waiting is not None:
+            number, code = self.waiting
+            self.waiting = None
+            self._ordered(number, code)
 
     def show(self, role: str, value: Value) -> None:
         """Show a value at the point of a role."""
@@ -97,6 +113,8 @@ class Machine:
             self.number = 0
             for role in ("taken", "done", "failed"):
                 self.show(role, 0)
+        elif number is not None and number != self.number and not self.taking:
+            self.waiting = (number, code)
         elif number is not None and number != self.number:
             self.number = number
             self.orders.append(Order(number, code))

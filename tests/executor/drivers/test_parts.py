@@ -13,7 +13,7 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import Heard
 from firable.executor.drivers.binding import ChannelDocument, SignalDocument, parse_binding
 from firable.executor.drivers.bound import BoundDriver
-from firable.executor.drivers.channels import NUMBER_MAX, Channel
+from firable.executor.drivers.channels import NUMBER_MAX, Channel, Order, Outcome, Said
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.device import Value, Writes
 from firable.executor.drivers.driver import Answer, Quality
@@ -124,9 +124,7 @@ def test_number_that_the_device_shows_already_is_cleared_before_it_is_sent() -> 
     one.written()
     assert after(one, taken=0, done=number) is None
     assert after(one, taken=0, done=0) == (("n", number),)
-    outcome = one.shows("done", number)
-    assert outcome is not None
-    assert outcome.order.entry == 1
+    assert [(told.said, told.order.entry) for told in one.shows("done", number)] == [(Said.TAKEN, 1), (Said.DONE, 1)]
 
 
 def test_write_that_failed_is_repeated_with_its_number_unless_the_device_has_it() -> None:
@@ -162,6 +160,34 @@ def test_command_without_completion_is_asked_after_by_the_number_that_it_was_sen
         again.shows(key, one.number("b", 2))
     assert again.answer("b", 3, stopped=False) is Answer.UNKNOWN
     assert again.answer("b", 2, stopped=False) is Answer.DONE
+
+
+@pytest.mark.parametrize("shows", ["taken", "done", "failed"])
+def test_command_is_taken_when_the_device_shows_its_number_and_told_so_once(shows: str) -> None:
+    one = channel("a")
+    number = one.number("a", 1)
+    one.send("a", 1, "", ())
+    after(one, taken=0, done=0)
+    assert one.written() == ()  # it stands in a register, and no program has read it
+    assert one.shows("taken", 0) == ()
+    told = [each.said for _ in range(2) for each in one.shows(shows, number)]
+    assert told[0] is Said.TAKEN
+    assert told.count(Said.TAKEN) == 1
+
+
+def test_without_a_number_of_what_was_taken_the_confirmed_write_must_do() -> None:
+    one = channel("a", taken=False)
+    one.send("a", 1, "", ())
+    after(one, done=0)
+    assert [told.said for told in one.written()] == [Said.TAKEN]
+    assert [told.said for told in one.shows("done", one.number("a", 1))] == [Said.DONE]
+
+
+def test_command_that_a_device_has_had_since_before_a_restart_is_not_told_as_taken_by_its_number_alone() -> None:
+    one = channel("a", taken=True)
+    one.shows("failed", one.number("a", 3))
+    assert one.answer("a", 3, stopped=False) is Answer.UNKNOWN  # a person is asked, and no poll may answer instead
+    assert one.shows("failed", one.number("a", 3)) == (Outcome(Order("a", 3, one.number("a", 3), ""), Said.FAILED),)
 
 
 def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:

@@ -1,0 +1,220 @@
+"""A command is sent when its machine has it: what waits with the driver holds its token, and is given up with it."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import pytest
+from support.third_party_driver import MemoryEnd
+
+from firable.decompose.splitting.cut import split
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers import kinds
+from firable.executor.drivers.bench import Bench, Far
+from firable.executor.drivers.bound import BoundDriver
+from firable.executor.drivers.conformance import DriverConformance
+from firable.executor.drivers.driver import Answer, withdraw
+from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.drivers.far_side.machine import ROLES
+from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.links.in_process import Exchange, InProcessLink
+from firable.executor.links.link import Greeting
+from firable.executor.operating.execution import Execution
+from firable.executor.operating.host import Host
+from firable.executor.operating.host_trace import HostTrace
+from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.situation import State
+from firable.executor.protocol.messages import Effect, Firing, Sending
+from firable.nets.interchange import net_digest
+from firable.nets.net import Place
+from firable.nets.text import parse_net
+
+NET = parse_net("""\
+firable: 1
+cell: cell
+controllers:
+  a: {start: free, places: {free: , lamp: {send: {machine: A, command: OPEN}}, gone: }}
+transitions:
+  begin: {from: a.free, to: a.lamp}
+  end: {from: a.lamp, to: a.gone}
+""")
+SPLIT = split(NET)
+
+
+class Queue(DryRunDriver):
+    """A driver whose line is down: it takes what it is sent, and its machine has it when the line is up."""
+
+    def __init__(self) -> None:
+        super().__init__(SPLIT.subnets, 1.0)
+        self.waiting: list[tuple[Place, int]] = []
+        self.has: list[tuple[str, int]] = []
+
+    def send(self, place: Place, entry: int) -> None:
+        self.waiting.append((place, entry))
+
+    def withdraw(self, place: Place) -> None:
+        self.waiting = [one for one in self.waiting if one[0] != place]
+
+    async def ask(self, place: Place, entry: int) -> Answer:
+        return Answer.DONE if (place.name, entry) in self.has else Answer.NOT_RECEIVED
+
+    def mend(self) -> None:
+        """Let the line be up."""
+        for place, entry in self.waiting:
+            self.has.append((place.name, entry))
+            assert self.listener is not None
+            self.listener.taken(place.name, entry)
+        self.waiting.clear()
+
+
+async def present(_: Execution) -> None:
+    await asyncio.sleep(3600)
+
+
+def execution(driver: Queue, journal: Journal, _: Path, *, resume: bool = False) -> Execution:
+    recorder = Recorder(NET, net_digest(NET), io.StringIO())
+    return Execution(SPLIT, driver, recorder, journal=journal, operator=present, overdue_seconds=30, resume=resume)
+
+
+def host(driver: Queue, journal: Journal, folder: Path, *, resume: bool = False) -> Host:
+    link, trace = InProcessLink(Exchange(), Greeting("d", ("a",))), HostTrace(NET, ("a",), folder / "trace", {})
+    made = Host(SPLIT, ("a",), driver, link, trace, journal, overdue_seconds=30)
+    if resume:
+        asyncio.get_running_loop().call_later(0.5, made.resume)
+    return made
+
+
+Make = Callable[..., "Execution | Host"]
+RUNS = pytest.mark.parametrize("make", [execution, host], ids=["one process", "host"])
+
+
+def marking(run: Execution | Host) -> tuple[str, ...]:
+    return tuple(name for each in run.controllers.values() for name in each.subnet.names(each.marking))
+
+
+@RUNS
+def test_token_without_completion_waits_until_the_machine_has_its_command(make: Make, tmp_path: Path) -> None:
+    async def main() -> None:
+        driver = Queue()
+        run = make(driver, MemoryJournal(), tmp_path)
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(20)
+        assert driver.waiting == [(NET.place("a.lamp"), 1)]
+        assert marking(run) == ("a.lamp",)
+        waits = "end waits for the machine to take the command of a.lamp"
+        assert [str(each) for each in run.situation().blocked] == [waits]
+        driver.mend()
+        await asyncio.sleep(20)
+        assert marking(run) == ("a.gone",)
+        assert not run.fault
+        run.stop()
+        await ending
+
+    run_in_virtual_time(main())
+
+
+@RUNS
+def test_command_that_no_machine_takes_is_overdue(make: Make, tmp_path: Path) -> None:
+    async def main() -> None:
+        ended = await make(Queue(), MemoryJournal(), tmp_path).main()
+        assert ended.state is State.FAULT
+        assert "'A OPEN' of 'a.lamp'" in ended.message
+        assert "its machine has not taken it within 30 s" in ended.message
+
+    run_in_virtual_time(main())
+
+
+@RUNS
+@pytest.mark.parametrize("ends", ["stop", "emergency stop", "fault"])
+def test_command_that_was_in_the_queue_when_the_run_ended_is_asked_after_and_sent_again(
+    make: Make, ends: str, tmp_path: Path
+) -> None:
+    async def main() -> None:
+        journal = MemoryJournal()
+        run = make(Queue(), journal, tmp_path)
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(1)
+        if ends == "stop":
+            run.stop()
+        elif ends == "fault":
+            run.driver_fault("A", "failed")
+        else:
+            run.emergency_stop("a person")
+        await ending
+        driver = Queue()
+        again = make(driver, journal, tmp_path, resume=True)
+        ending = asyncio.create_task(again.main())
+        await asyncio.sleep(1)
+        assert driver.waiting == [(NET.place("a.lamp"), 1)]
+        assert marking(again) == ("a.lamp",)
+        driver.mend()
+        await asyncio.sleep(1)
+        assert driver.has == [("a.lamp", 1)]
+        assert marking(again) == ("a.gone",)
+        again.stop()
+        await ending
+
+    run_in_virtual_time(main())
+
+
+def test_what_a_firing_leaves_behind_is_given_up_also_where_it_has_not_left_the_process() -> None:
+    driver = Queue()
+    driver.send(NET.place("a.lamp"), 1)
+    leaving = deque([Sending("a.lamp", 2), Sending("b.lamp", 1)])
+    assert withdraw(driver, NET, "begin", leaving) == []
+    assert withdraw(driver, NET, "end", leaving) == ["a.lamp"]
+    assert (driver.waiting, list(leaving)) == ([], [Sending("b.lamp", 1)])
+    others: list[Effect] = [Firing("t"), Sending("a.lamp", 1)]
+    assert withdraw(driver, NET, "end", others) == ["a.lamp"]
+    assert others == [Firing("t")]
+
+
+class Boasting(BoundDriver):
+    """A driver that takes what it has queued for what its machine has."""
+
+    def send(self, place: Place, entry: int) -> None:
+        super().send(place, entry)
+        if self.listener is not None:
+            self.listener.taken(place.name, entry)
+
+
+class Held(DriverConformance):
+    """What every driver has to show, of a driver that boasts."""
+
+    @asynccontextmanager
+    async def far_end(self) -> AsyncIterator[Far]:
+        points = {role: f"the {role}" for role in (*ROLES, "number", "code")}
+        yield Far(MemoryEnd("m"), "driver: theirs, memory: m", points)
+
+
+@pytest.mark.parametrize("boasts", [False, True])
+@pytest.mark.parametrize(
+    "test",
+    [
+        DriverConformance.test_a_command_is_taken_when_the_machine_has_it_and_told_so_once,
+        DriverConformance.test_a_command_that_a_stop_overtakes_is_never_told_as_taken,
+    ],
+)
+def test_driver_that_tells_of_a_queued_command_that_it_is_taken_does_not_pass(
+    test: Callable[[DriverConformance], None], boasts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    theirs = EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP)
+    monkeypatch.setattr(kinds, "entry_points", lambda **_: [theirs])
+    if not boasts:
+        test(Held())
+        return
+    begin = Bench.begin
+
+    def boasting(bench: Bench) -> None:
+        begin(bench)
+        bench.driver.__class__ = Boasting
+
+    monkeypatch.setattr(Bench, "begin", boasting)
+    with pytest.raises(AssertionError):
+        test(Held())
