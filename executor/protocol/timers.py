@@ -36,7 +36,7 @@ class Timers:
         }
         """The places with a time limit, by their timers."""
         self._waits = {name: self._bits(player, place) for name, place in self.places.items()}
-        self._running: dict[str, float] = {}
+        self.running: dict[str, float] = {}
         """When the time of each place will be over; minus infinity where it has not begun."""
 
     @staticmethod
@@ -47,11 +47,11 @@ class Timers:
     def enter(self, place: str) -> None:
         """A token has entered a place, and its command is sent: its time begins with the next tick."""
         if place in self.places:
-            self._running[place] = -inf
+            self.running[place] = -inf
 
     def begin_anew(self, word: Word) -> None:
         """Begin the time of every place that waits for its completion: after a restart."""
-        self._running = {name: -inf for name in self.places if self.waits(name, word)}
+        self.running = {name: -inf for name in self.places if self.waits(name, word)}
 
     def waits(self, place: str, word: Word) -> bool:
         """Whether the token is there, and its completion has not come."""
@@ -60,16 +60,16 @@ class Timers:
 
     def deadline(self, word: Word) -> float | None:
         """When the next time is over, by the clock of the ticks; minus infinity for at once, None for never."""
-        return min((due for name, due in self._running.items() if self.waits(name, word)), default=None)
+        return min((due for name, due in self.running.items() if self.waits(name, word)), default=None)
 
     def over(self, now_seconds: float, word: Word) -> Iterator[str]:
         """The places whose time is over, each once; times that have not begun begin now."""
-        for name, due in list(self._running.items()):
+        for name, due in list(self.running.items()):
             limit = self.places[name].within
             if limit is None or not self.waits(name, word):
-                del self._running[name]
+                del self.running[name]
             elif due == -inf:
-                self._running[name] = now_seconds + limit.milliseconds / 1000
+                self.running[name] = now_seconds + limit.milliseconds / 1000
             elif due <= now_seconds + RESOLUTION_SECONDS:
-                del self._running[name]
+                del self.running[name]
                 yield name

@@ -7,10 +7,10 @@ an act of a machine does depends on this machine alone, so each is done once, an
 meets the same message in another configuration; the code runs some thousand times for a million configurations.
 
 What may happen: a message arrives, in any order; a controller fires or reports; whoever has something unanswered
-repeats it when nothing is under way; a command is completed; a sensor changes. And with a *budget* for each: a message
-is lost; one arrives and stays under way; a machine is killed, before or after an act but before anything of it leaves,
-and restored from what it kept; the operator has everything undecided given up. A controller that was restored is
-resumed at any time, with the answers of its machines.
+repeats it when nothing is under way; a command is completed; a sensor changes; a time begins, or is over. And with a
+*budget* for each: a message is lost; one arrives and stays under way; a machine is killed, before or after an act but
+before anything of it leaves, and restored from what it kept; the operator has everything undecided given up. A
+controller that was restored is resumed at any time, with the answers of its machines.
 
 Messages under way are a set: the same one twice is once, since one that stays is a copy too. Numbers are counted from
 the beginning (`numbering`), so that it ends. What an explored space is held to is the caller's: a `Watcher` sees each
@@ -19,10 +19,12 @@ step. Rejected: sets of messages that only grow, as in the proof; without number
 
 from __future__ import annotations
 
-from collections import deque
+import random
+from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from math import inf
 from typing import Any, Final
 
 from firable.executor.protocol.commands import Answer
@@ -41,13 +43,19 @@ from firable.executor.protocol.messages import (
     VoteRequest,
 )
 from firable.executor.protocol.token_player import TokenPlayer, Word
-from firable.executor.simulation.numbering import Collecting, Kept, Ranking, apply, apply_message, count_of
+from firable.executor.simulation.numbering import (
+    Collecting,
+    Kept,
+    Kind,
+    Ranking,
+    apply,
+    apply_message,
+    count_of,
+    forget_times,
+)
 from firable.executor.simulation.snapshots import clone, frozen
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import SignalKind
-
-COORDINATOR: Final = 0
-"""The place of the coordinator among the machines; controllers follow in the order of the decomposition."""
 
 Job = tuple[str, int, bool]
 """A command that a machine of the cell was given: its place, its entry, and whether it is done."""
@@ -65,7 +73,7 @@ class Budget:
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """Where everything stands; machines are numbers of `Explorer.machines`."""
+    """Where everything stands; machines are numbers of `Explorer.machines`, in the order of `Explorer.names`."""
 
     machines: tuple[int, ...]
     under_way: frozenset[Message]
@@ -100,6 +108,7 @@ class Stored:
     kept: Kept
 
 
+_FAULTS_ON_A_WAY: Final = 0.03
 Act = Callable[[Any], list[Effect]]
 """A call of a machine."""
 Watcher = Callable[["Explorer", Configuration, Step, Configuration], None]
@@ -126,20 +135,20 @@ class Explorer:
         controller: type[LocalController] = LocalController,
         senses: bool = True,
     ) -> None:
-        if len(coordinators(decomposition)) > 1:
-            raise ValueError("a net with layers is not explored: its rounds are numbered by several coordinators")
         self.decomposition = decomposition
         self.net = decomposition.net
         self.classes = (coordinator, controller)
         self.central = TokenPlayer.of(self.net)
-        self.names = ("", *(subnet.name for subnet in decomposition.subnets))
-        self.owner_of = {s.name: i for i, n in enumerate(decomposition.subnets, 1) for s in n.signals}
+        self.coordinators = coordinators(decomposition)
+        self.names = (*self.coordinators, *(subnet.name for subnet in decomposition.subnets))
+        """Coordinators from the top down, then controllers in the order of the decomposition."""
+        self.owner_of = {s.name: self.names.index(n.name) for n in decomposition.subnets for s in n.signals}
         sensors = [signal.name for signal in self.net.signals if signal.kind is SignalKind.SENSOR]
         self.sensors = tuple(sensors) if senses else ()
         self.machines: list[Stored] = []
         self.numbered: dict[Hashable, int] = {}
         self.acts: dict[Hashable, tuple[int, tuple[Effect, ...]]] = {}
-        self.found: dict[object, dict[tuple[str, str], set[int]]] = {}
+        self.found: dict[object, dict[Kind, set[int]]] = {}
         self.mentioned: dict[object, int] = {}
         self.mentions: dict[Hashable, int] = {}
         self.rankings: dict[frozenset[int], Ranking] = {}
@@ -171,6 +180,7 @@ class Explorer:
                 kept.pop(effect.key, None)
             elif isinstance(effect, Keep) and effect.value is not None:
                 kept[effect.key] = effect.value
+        forget_times(machine)
         return self._number(machine, kept)
 
     def _restored(self, number: int, which: int) -> tuple[int, tuple[Effect, ...]]:
@@ -178,9 +188,9 @@ class Explorer:
             kept = dict(self.machines[number].kept)
             coordinator, controller = self.classes
             machine: LocalController | Coordinator = (
-                controller.restored(self.decomposition, self.names[which], kept)
-                if which
-                else coordinator.restored(self.decomposition, kept)
+                coordinator.restored(self.decomposition, kept, self.names[which])
+                if which < len(self.coordinators)
+                else controller.restored(self.decomposition, self.names[which], kept)
             )
             effects = machine.start()
             known = self.acts[number, "restart"] = (self._kept(machine, kept, effects), tuple(effects))
@@ -192,7 +202,8 @@ class Explorer:
         """Everything started for the first time."""
         coordinator, controller = self.classes
         made: list[LocalController | Coordinator]
-        made = [coordinator(self.decomposition), *(controller(self.decomposition, name) for name in self.names[1:])]
+        made = [coordinator(self.decomposition, name) for name in self.coordinators]
+        made += [controller(self.decomposition, name) for name in self.names[len(made) :]]
         numbers, under_way, central = [], set[Message](), Word(self.net.initial_marking)
         for machine in made:
             effects = machine.start()
@@ -205,11 +216,11 @@ class Explorer:
         parts = (*found.machines, *found.under_way, *found.jobs)
         key = frozenset(map(self._mentioned, parts))
         if (ranking := self.rankings.get(key)) is None:
-            collected: dict[tuple[str, str], set[int]] = {}
+            collected: dict[Kind, set[int]] = {}
             for part in parts:
                 for kind, numbers in self._numbers(part).items():
                     collected[kind] = collected.get(kind, set()) | numbers
-            ranking = self.rankings[key] = Ranking(collected.items())
+            ranking = self.rankings[key] = Ranking(collected.items(), self.coordinators)
         if ranking.changes_nothing:
             return found
         return Configuration(
@@ -228,7 +239,7 @@ class Explorer:
             known = self.mentioned[part] = self.mentions.setdefault(key, len(self.mentions))
         return known
 
-    def _numbers(self, part: int | Message | Job) -> dict[tuple[str, str], set[int]]:
+    def _numbers(self, part: int | Message | Job) -> dict[Kind, set[int]]:
         if (known := self.found.get(part)) is None:
             collecting = Collecting()
             if isinstance(part, int):
@@ -258,7 +269,7 @@ class Explorer:
         """Everything that may happen in a configuration, and where it leads."""
         for message in at.under_way:
             yield from self._arrives(at, message)
-        for which in range(1, len(self.names)):
+        for which in range(len(self.coordinators), len(self.names)):
             yield from self._acts_of(at, which)
         for place, entry, done in at.jobs:
             if not done:
@@ -274,7 +285,7 @@ class Explorer:
 
     def _arrives(self, at: Configuration, message: Message) -> Iterator[tuple[Step, Configuration]]:
         to_controller = isinstance(message, VoteRequest | Decision | Hello)
-        which = self.names.index(message.controller) if to_controller else COORDINATOR
+        which = self.names.index(message.controller if to_controller else message.coordinator)
         left = Configuration(at.machines, at.under_way - {message}, at.jobs, at.budget, at.central)
         receive = partial(_receive, message)
         yield from self._does(left, "arrive", which, message, receive, always=True, before=at)
@@ -291,6 +302,15 @@ class Explorer:
                 (place, entry, self._answer(at, place, entry)) for place, entry in machine.commands.questions
             )
             yield from self._does(at, "resume", which, answers, partial(_resumed, answers), always=True)
+        if isinstance(machine, LocalController):
+            yield from self._times(at, which, machine)
+
+    def _times(self, at: Configuration, which: int, machine: LocalController) -> Iterator[tuple[Step, Configuration]]:
+        if machine.deadline() == -inf:
+            yield from self._does(at, "time begins", which, None, lambda machine: machine.tick(0.0))
+        for place, due in machine.timers.running.items():
+            if due > -inf:
+                yield from self._does(at, "time is over", which, place, partial(_over, place))
 
     def _answer(self, at: Configuration, place: str, entry: int) -> Answer:
         for job in at.jobs:
@@ -321,9 +341,10 @@ class Explorer:
                 yield self._crashes(at, which, at, at.machines[which], ())
         if budget.giving_up:
             less = Configuration(at.machines, at.under_way, at.jobs, _less(budget, "giving_up"), at.central)
-            yield from self._does(
-                less, "give up", COORDINATOR, None, lambda m: [*m.permit(0), *m.permit(None)], before=at
-            )
+            for which in range(len(self.coordinators)):
+                yield from self._does(
+                    less, "give up", which, None, lambda m: [*m.permit(0), *m.permit(None)], before=at
+                )
 
     def _does(
         self,
@@ -429,6 +450,31 @@ def explore(
     return space
 
 
+def wander(explorer: Explorer, budget: Budget, seed: int, length: int, watch: Watcher) -> Counter[str]:
+    """Go one way of so many steps through what is too much to be explored; `watch` sees the steps beside it, too.
+
+    Each kind of step that may come next is as likely as every other, and faults are spread over the way. Returns how
+    often each was taken. Cost: `length` times the steps that a configuration has, some twenty; the code runs anew in
+    most of them.
+    """
+    draw, taken = random.Random(seed), Counter[str]()
+    at = explorer.initial(budget)
+    for _ in range(length):
+        kinds: dict[str, list[Configuration]] = {}
+        for step, after in explorer.steps(at):
+            watch(explorer, at, step, after)
+            if after != at:
+                kinds.setdefault(step.kind, []).append(after)
+        if not kinds:
+            break
+        faults = {kind for kind in kinds if kind in ("lose", "give up") or kind.endswith("crash")}
+        wanted = kinds.keys() & faults if draw.random() < _FAULTS_ON_A_WAY else kinds.keys() - faults
+        kind = draw.choice(sorted(wanted or kinds))
+        taken[kind] += 1
+        at = draw.choice(kinds[kind])
+    return taken
+
+
 def _less(budget: Budget, kind: str) -> Budget:
     values = {name: getattr(budget, name) for name in ("losses", "copies", "crashes", "giving_up")}
     values[kind] -= 1
@@ -447,6 +493,11 @@ def _receive(message: Any, machine: Any) -> list[Effect]:
 
 def _read(completion: str, entry: int, machine: LocalController) -> list[Effect]:
     return machine.read(completion, value=True, entry=entry)
+
+
+def _over(place: str, machine: LocalController) -> list[Effect]:
+    machine.timers.running[place] = 0.0  # whatever the others are: clocks jump
+    return machine.tick(0.0)
 
 
 def _sense(sensor: str, value: bool, machine: LocalController) -> list[Effect]:

@@ -3,8 +3,10 @@
 Rounds, reports and commands are numbered upwards for ever, so no configuration would ever come again. But the machines
 only compare numbers, and count on from the largest. So a configuration behaves as the one in which its numbers are
 replaced, in their order, by the first ones of their epoch. This is the reduction by data symmetry of Ip and Dill
-(Formal Methods in System Design 9, 1996), for a type of which only the order matters. Rejected: to end after so many
-rounds; what needs one round more would never be seen.
+(Formal Methods in System Design 9, 1996), for a type of which only the order matters. Where the net has layers, each
+coordinator counts rounds of its own, whose numbers tell whose they are; these keep that, and only they are in order.
+Times are numbers too, of which only one thing matters here, where any may be over at any moment: whether it has begun.
+Rejected: to end after so many rounds; what needs one round more would never be seen.
 
 What counts what has to be known, and is said here once, in `apply` and `apply_message`: one walk over all numbers, with
 a `Numbering` that collects them or replaces them. A field of a machine that this walk has not been told of is refused:
@@ -13,8 +15,9 @@ a number that it overlooks would keep apart what is the same or, worse, be compa
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from math import inf
 from typing import Final, Protocol
 
 from firable.executor.protocol.commands import PREFIX, Commands
@@ -35,6 +38,8 @@ from firable.executor.protocol.messages import (
 from firable.nets.net import Net
 
 Kept = dict[str, Stored]
+Kind = tuple[str, str, str]
+"""What is numbered: rounds of a coordinator, reports of a controller to a coordinator, commands of one count."""
 
 _CONTROLLER: Final = frozenset(
     {
@@ -55,12 +60,12 @@ _LOW: Final = (1 << EPOCH_BITS) - 1
 class Numbering(Protocol):
     """What is done with each number."""
 
-    def round(self, number: int) -> int:
-        """The number of a round."""
+    def round(self, coordinator: str, number: int) -> int:
+        """The number of a round of a coordinator."""
         ...
 
-    def report(self, controller: str, number: int) -> int:
-        """The number of a report of a controller."""
+    def report(self, controller: str, coordinator: str, number: int) -> int:
+        """The number of a report of a controller to a coordinator."""
         ...
 
     def entry(self, count: str, number: int) -> int:
@@ -72,75 +77,82 @@ class Collecting:
     """Collects the numbers that there are."""
 
     def __init__(self) -> None:
-        self.found: dict[tuple[str, str], set[int]] = {}
+        self.found: dict[Kind, set[int]] = {}
 
-    def round(self, number: int) -> int:
+    def round(self, coordinator: str, number: int) -> int:
         """Note the number of a round."""
-        return self._note(("round", ""), number)
+        return self._note(("round", "", coordinator), number)
 
-    def report(self, controller: str, number: int) -> int:
+    def report(self, controller: str, coordinator: str, number: int) -> int:
         """Note the number of a report."""
-        return self._note(("report", controller), number)
+        return self._note(("report", controller, coordinator), number)
 
     def entry(self, count: str, number: int) -> int:
         """Note the number of a command."""
-        return self._note(("entry", count), number)
+        return self._note(("entry", count, ""), number)
 
-    def _note(self, kind: tuple[str, str], number: int) -> int:
+    def _note(self, kind: Kind, number: int) -> int:
         self.found.setdefault(kind, set()).add(number)
         return number
 
 
 class Ranking:
-    """Replaces each number by its rank among those of its epoch; what comes before the first of an epoch stays."""
+    """Replaces each number by its rank among those of its epoch; what comes before the first of an epoch stays.
 
-    def __init__(self, found: Iterable[tuple[tuple[str, str], set[int]]]) -> None:
-        self.ranks: dict[tuple[str, str], dict[int, int]] = {}
+    `coordinators` number every so many-th round, in this order.
+    """
+
+    def __init__(self, found: Iterable[tuple[Kind, set[int]]], coordinators: Sequence[str] = ("",)) -> None:
+        self.ranks: dict[Kind, dict[int, int]] = {}
         for kind, numbers in found:
             ranks = self.ranks[kind] = {}
-            first = 1 if kind[0] == "entry" else 0
+            first = {"entry": 1, "round": coordinators.index(kind[2])}.get(kind[0], 0)
+            stride = len(coordinators) if kind[0] == "round" else 1
             counted: dict[int, int] = {}
             for number in sorted(numbers):
                 epoch = number >> EPOCH_BITS
                 if number & _LOW == _LOW or number < first:
                     ranks[number] = number
                 else:
-                    ranks[number] = (epoch << EPOCH_BITS) + counted.get(epoch, first)
-                    counted[epoch] = counted.get(epoch, first) + 1
+                    begin = epoch << EPOCH_BITS
+                    skipped = (first - begin) % stride if kind[0] == "round" else first
+                    ranks[number] = counted.get(epoch, begin + skipped)
+                    counted[epoch] = ranks[number] + stride
         self.changes_nothing = all(n == rank for ranks in self.ranks.values() for n, rank in ranks.items())
         """Whether each number is its rank."""
 
-    def round(self, number: int) -> int:
+    def round(self, coordinator: str, number: int) -> int:
         """The rank of a round."""
-        return self.ranks["round", ""][number]
+        return self.ranks["round", "", coordinator][number]
 
-    def report(self, controller: str, number: int) -> int:
+    def report(self, controller: str, coordinator: str, number: int) -> int:
         """The rank of a report."""
-        return self.ranks["report", controller][number]
+        return self.ranks["report", controller, coordinator][number]
 
     def entry(self, count: str, number: int) -> int:
         """The rank of a command."""
-        return self.ranks["entry", count][number]
+        return self.ranks["entry", count, ""][number]
 
 
 def apply_message(message: Message, on: Numbering) -> Message:
     """A message with its numbers replaced."""
+    controller, coordinator = message.controller, message.coordinator
     match message:
         case Report():
-            return replace(message, readiness=_readiness(message.controller, message.readiness, on))
+            return replace(message, readiness=_readiness(controller, coordinator, message.readiness, on))
         case Vote() | Acknowledgement():
-            readiness = _readiness(message.controller, message.readiness, on)
-            return replace(message, round=on.round(message.round), readiness=readiness)
+            readiness = _readiness(controller, coordinator, message.readiness, on)
+            return replace(message, round=on.round(coordinator, message.round), readiness=readiness)
         case VoteRequest() | Decision():
             return replace(
                 message,
-                round=on.round(message.round),
-                closed_below=on.round(message.closed_below),
-                seen=on.report(message.controller, message.seen),
+                round=on.round(coordinator, message.round),
+                closed_below=on.round(coordinator, message.closed_below),
+                seen=on.report(controller, coordinator, message.seen),
             )
         case Hello():
-            seen = on.report(message.controller, message.seen)
-            return replace(message, closed_below=on.round(message.closed_below), seen=seen)
+            seen = on.report(controller, coordinator, message.seen)
+            return replace(message, closed_below=on.round(coordinator, message.closed_below), seen=seen)
 
 
 def apply(machine: LocalController | Coordinator, kept: Kept, on: Numbering) -> Kept:
@@ -149,20 +161,34 @@ def apply(machine: LocalController | Coordinator, kept: Kept, on: Numbering) -> 
     if unknown := vars(machine).keys() - known:
         raise TypeError(f"it is not known whether {sorted(unknown)} of {type(machine).__name__} hold numbers")
     if isinstance(machine, Coordinator):
-        machine.next_round = on.round(machine.next_round)
-        machine.seen = {name: on.report(name, number) for name, number in machine.seen.items()}
+        name = machine.name
+        machine.next_round = on.round(name, machine.next_round)
+        machine.seen = {each: on.report(each, name, number) for each, number in machine.seen.items()}
         for opened in machine.rounds.values():
-            opened.number = on.round(opened.number)
+            opened.number = on.round(name, opened.number)
         machine.rounds = {opened.number: opened for opened in machine.rounds.values()}
-        return {_key(key, on): value for key, value in kept.items()}
-    machine.promises = {on.round(number): promise for number, promise in machine.promises.items()}
-    machine.closed = {on.round(number) for number in machine.closed}
+        return {_key(key, lambda number: on.round(name, number)): value for key, value in kept.items()}
+
+    def renumbered(number: int) -> int:
+        return on.round(machine.coordinator_of(number), number)
+
+    machine.promises = {renumbered(number): promise for number, promise in machine.promises.items()}
+    machine.closed = {renumbered(number) for number in machine.closed}
     for above in machine.above.values():
-        above.closed_below, above.kept_below = on.round(above.closed_below), on.round(above.kept_below)
-        above.readiness = _readiness(machine.name, above.readiness, on)
-        above.told, above.seen = on.report(machine.name, above.told), on.report(machine.name, above.seen)
+        above.closed_below = on.round(above.name, above.closed_below)
+        above.kept_below = on.round(above.name, above.kept_below)
+        above.readiness = _readiness(machine.name, above.name, above.readiness, on)
+        above.told = on.report(machine.name, above.name, above.told)
+        above.seen = on.report(machine.name, above.name, above.seen)
     _commands(machine.commands, on)
-    return {_key(key, on): _value(key, value, machine.subnet, on) for key, value in kept.items()}
+    return {_key(key, renumbered): _value(key, value, machine.subnet, on) for key, value in kept.items()}
+
+
+def forget_times(machine: LocalController | Coordinator) -> None:
+    """Leave of the times of a controller only whether they have begun."""
+    if isinstance(machine, LocalController):
+        timers = machine.timers
+        timers.running = {place: inf if due > -inf else due for place, due in timers.running.items()}
 
 
 def count_of(place: str, net: Net) -> str:
@@ -175,19 +201,20 @@ def _commands(commands: Commands, on: Numbering) -> None:
         command.entry = on.entry(count_of(command.place, commands.subnet), command.entry)
 
 
-def _readiness(controller: str, readiness: Readiness, on: Numbering) -> Readiness:
-    return replace(readiness, sequence=on.report(controller, readiness.sequence))
+def _readiness(controller: str, coordinator: str, readiness: Readiness, on: Numbering) -> Readiness:
+    return replace(readiness, sequence=on.report(controller, coordinator, readiness.sequence))
 
 
-def _key(key: str, on: Numbering) -> str:
+def _key(key: str, renumbered: Callable[[int], int]) -> str:
     kind, slash, number = key.partition("/")
-    return f"{kind}/{on.round(int(number))}" if slash and kind in ("promise", "round") else key
+    return f"{kind}/{renumbered(int(number))}" if slash and kind in ("promise", "round") else key
 
 
 def _value(key: str, value: Stored, net: Net, on: Numbering) -> Stored:
     match value:
-        case [int(below), [*numbers]] if key.startswith("closed"):
-            return on.round(below), tuple(on.round(int(str(number))) for number in numbers)
+        case [int(below), [*numbers]] if key.partition("/")[0] == "closed":
+            name = key.partition("/")[2]  # of the coordinator, as `deciders.closed_key` has it
+            return on.round(name, below), tuple(on.round(name, int(str(number))) for number in numbers)
         case [str(place), int(entry), str(stage)] if key.startswith(PREFIX):
             return place, on.entry(count_of(place, net), entry), stage
     return value

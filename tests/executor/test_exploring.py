@@ -8,24 +8,33 @@ from typing import Any
 import pytest
 import support.abstraction
 from support import planted
+from support.examples import FIRST_SEED, seeds
 from support.gated_nets import GATE_READ_AGAIN, SENSOR
+from support.layered_nets import cells_in_a_line, contending, left_below, shared_robot
 from support.local_tie import LocalTie
+from support.planted_layers import PLANTED_LAYERS
 from support.reference import load_net
+from support.timed_nets import HANDOVER, TWO_TIMES
 
 from firable.decompose.protocol.parametric.logic import same
 from firable.decompose.protocol.parametric.script import Action, Demand
 from firable.decompose.protocol.parametric.system import PROTOCOL, Protocol, r, shadow
 from firable.decompose.splitting.cut import split
 from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Firing, ProtocolError
 from firable.executor.protocol.token_player import TokenPlayer
-from firable.executor.simulation.exploring import Budget, Configuration, Explorer, Space, explore
+from firable.executor.simulation.drawn import DRAWN
+from firable.executor.simulation.exploring import Budget, Configuration, Explorer, Space, Step, explore, wander
 from firable.executor.simulation.numbering import Collecting, Ranking, apply
 from firable.executor.simulation.snapshots import clone, frozen
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
+from firable.nets.text import parse_net
 
 NETS = ["local_gate", "remote_gate", "local_conflict", "local_output_conflict", "read_before_order", "ring"]
+LAYERED = split(shared_robot())
 LOSS, COPY, CRASH, GIVE_UP = Budget(losses=1), Budget(copies=1), Budget(crashes=1), Budget(giving_up=1)
 
 
@@ -69,6 +78,72 @@ def test_every_action_of_the_proof_is_met_with_faults_of_every_kind() -> None:
     assert {action.name for action in PROTOCOL.actions} - set(met) <= {"sense"}
 
 
+# --- Layers, time limits, and what is too large to be explored
+
+
+def test_in_layers_every_act_is_some_actions_of_the_proof_and_all_there_is_is_explored() -> None:
+    tie = LocalTie(LAYERED)
+    assert explore(Explorer(LAYERED), max_configurations=10_000, watch=tie).complete
+    assert tie.actions["decide"] > 0
+
+
+@pytest.mark.parametrize("budget", [LOSS, COPY, GIVE_UP, CRASH], ids=["loss", "copy", "giving up", "crash"])
+def test_in_layers_every_act_with_a_fault_is_some_actions_of_the_proof_as_far_as_it_is_explored(budget: Budget) -> None:
+    tie = LocalTie(LAYERED)
+    explore(Explorer(LAYERED), budget, max_configurations=1200, watch=tie)
+    assert tie.actions["promise"] > 0
+
+
+@pytest.mark.parametrize("budget", [Budget(), CRASH, COPY], ids=["no fault", "crash", "copy"])
+def test_with_time_limits_every_act_is_some_actions_of_the_proof_as_far_as_it_is_explored(budget: Budget) -> None:
+    fired: set[str] = set()
+    decomposition = split(parse_net(HANDOVER))
+    tie = LocalTie(decomposition)
+
+    def watch(explorer: Explorer, at: Configuration, step: Step, after: Configuration) -> None:
+        tie(explorer, at, step, after)
+        fired.update(effect.transition for effect in step.effects if isinstance(effect, Firing))
+
+    explore(Explorer(decomposition), budget, max_configurations=1200, watch=watch)
+    assert "a.go_timeout" in fired
+
+
+def wandered() -> dict[str, Decomposition]:
+    cells = {name: split(catalogue_net(name)) for name in ("one_robot", "one_robot_timed", "two_cells")}
+    nets = {"line": split(cells_in_a_line()), "two_times": split(TWO_TIMES)}
+    drawn = {f"{family}-{seed}": split(DRAWN[family](seed)) for family in DRAWN for seed in seeds(2)}
+    return {**cells, **nets, **drawn}
+
+
+@pytest.mark.seeds
+def test_on_ways_through_nets_too_large_to_be_explored_every_act_is_some_actions_of_the_proof() -> None:
+    met: Counter[str] = Counter()
+    for decomposition in wandered().values():
+        tie = LocalTie(decomposition)
+        wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 70, tie)
+        met += tie.actions
+    assert {action.name for action in PROTOCOL.actions} <= set(met)
+
+
+FOUND_IN_LAYERS = [
+    ("CountsAnyVote", LAYERED, Budget()),
+    ("NumbersOfItsOwn", LAYERED, Budget()),
+    ("PromisesToEach", left_below(split(contending())), Budget()),
+    ("ClosesRoundsOfOthers", LAYERED, Budget()),
+    ("KeepsOneListOfRounds", LAYERED, Budget()),
+]
+
+
+@pytest.mark.parametrize(("name", "decomposition", "budget"), FOUND_IN_LAYERS, ids=[n for n, _, _ in FOUND_IN_LAYERS])
+def test_a_drift_of_the_code_in_layers_is_no_action_of_the_proof(
+    name: str, decomposition: Decomposition, budget: Budget
+) -> None:
+    planted_in = PLANTED_LAYERS[name]
+    explorer = Explorer(decomposition, coordinator=planted_in.coordinator, controller=planted_in.controller)
+    with pytest.raises((AssertionError, ProtocolError, KeyError)):
+        explore(explorer, budget, max_configurations=6000, watch=LocalTie(decomposition))
+
+
 def test_every_act_on_the_cell_is_some_actions_of_the_proof_as_far_as_it_is_explored() -> None:
     decomposition = split(catalogue_net("one_robot"))
     tie = LocalTie(decomposition)
@@ -106,10 +181,23 @@ def test_from_every_configuration_something_fires_again_without_any_more_faults(
 
 
 def test_numbers_are_replaced_in_their_order_and_within_their_epoch() -> None:
-    found = {("round", ""): {7, 9, (1 << 32) + 3}, ("report", "a"): {-1, (1 << 32) - 1, 5}}
+    found = {("round", "", ""): {7, 9, (1 << 32) + 3}, ("report", "a", ""): {-1, (1 << 32) - 1, 5}}
     ranking = Ranking(found.items())
-    assert [ranking.round(n) for n in (7, 9, (1 << 32) + 3)] == [0, 1, 1 << 32]
-    assert [ranking.report("a", n) for n in (-1, 5, (1 << 32) - 1)] == [-1, 0, (1 << 32) - 1]
+    assert [ranking.round("", n) for n in (7, 9, (1 << 32) + 3)] == [0, 1, 1 << 32]
+    assert [ranking.report("a", "", n) for n in (-1, 5, (1 << 32) - 1)] == [-1, 0, (1 << 32) - 1]
+
+
+@pytest.mark.parametrize("epoch", [0, 1, 2])
+def test_numbers_of_rounds_still_tell_whose_they_are_and_begin_as_those_of_a_restarted_coordinator(epoch: int) -> None:
+    names = coordinators(LAYERED)
+    for name in names:
+        machine = Coordinator.restored(LAYERED, {"epoch": epoch - 1} if epoch else {}, name)
+        later = {machine.next_round + machine.stride * i for i in (3, 5)}
+        ranking = Ranking([(("round", "", name), later)], names)
+        assert [ranking.round(name, n) for n in sorted(later)] == [
+            machine.next_round,
+            machine.next_round + machine.stride,
+        ]
 
 
 def test_a_field_that_may_hold_numbers_and_is_not_known_is_refused() -> None:

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from support.examples import seeds
 from support.hosts import Cell
-from support.layered_nets import cells_in_a_line
+from support.layered_nets import cells_in_a_line, contending, left_below, shared_robot
 from support.owned_nets import owned_net
+from support.planted_layers import PLANTED_LAYERS
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
@@ -33,14 +34,14 @@ from firable.executor.protocol.messages import (
     ToCoordinator,
     VoteRequest,
 )
-from firable.executor.simulation.campaign import Passed, Run, rehearse
+from firable.executor.simulation.campaign import Failed, Passed, Run, rehearse
 from firable.executor.simulation.judge import Subject
-from firable.executor.simulation.network import Network, ProgressLostError, Simulation
+from firable.executor.simulation.network import Network, Simulation
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.net import Net
 from firable.semantics.replaying import replay
 from firable.semantics.trace import Fired
 
@@ -180,49 +181,16 @@ def test_who_decides_nothing_at_a_controller_may_not_speak_to_it() -> None:
         LocalController(LINE, "robot_a").receive(Hello("robot_a", 0, -1, 1, CELL_B))
 
 
-class NumbersOfItsOwn(Coordinator):
-    """Each coordinator counts its rounds from 0, and a number is taken for a name."""
-
-    def __init__(self, decomposition: Decomposition, name: str = TOP) -> None:
-        super().__init__(decomposition, name)
-        self.next_round, self.stride = 0, 1
-
-
-def test_rounds_that_are_numbered_by_each_coordinator_alone_are_found() -> None:
-    class Trusting(LocalController):
-        """It takes a round for that of whoever sends the message."""
-
-        def receive(self, message: ToController) -> list[Effect]:
-            self.speaking = message.coordinator
-            return super().receive(message)
-
-        def coordinator_of(self, number: int) -> str:
-            return getattr(self, "speaking", "") or super().coordinator_of(number)
-
-    for seed in range(20):
-        for machine in (LocalController, Trusting):
-            with pytest.raises((ProtocolError, ProgressLostError, InputError, KeyError)):
-                replay(LINE.net, Simulation(LINE, seed, BAD, NumbersOfItsOwn, machine).run(400))
+@pytest.mark.parametrize("name", PLANTED_LAYERS)
+def test_planted_fault_of_layers_is_found(name: str) -> None:
+    nets = (Subject(LINE), Subject(split(shared_robot())), Subject(left_below(split(contending()))))
+    for seed in range(600):
+        if isinstance(rehearse(nets[seed % 3], Run(seed), PLANTED_LAYERS[name]), Failed):
+            return
+    pytest.fail(f"{name} was not found")
 
 
 # --- Who contends has one decider
-
-
-def contending() -> Net:
-    """The cell's `within` and the line's `over` each close a gate of the other, at two controllers."""
-    below = [Controller(name, under="cell") for name in ("r", "m")]
-    controllers = (Controller("line", coordinator=True), Controller("cell"), *below, Controller("x"))
-    names = ("r.a", "r.b", "m.a", "m.b", "r.c", "r.d", "m.c", "m.d", "x.c", "x.d")
-    places = tuple(Place(name, name[0], marked=name[2] in "ac") for name in names)
-    within = Transition("within", ("r.a", "m.a"), ("r.b", "m.b"), ("m.c",))
-    over = Transition("over", ("r.c", "m.c", "x.c"), ("r.d", "m.d", "x.d"), ("r.a",))
-    return Net("contending", places, (within, over), controllers=controllers)
-
-
-def left_below(decomposition: Decomposition) -> Decomposition:
-    """The table with `within` in the hands of the cell."""
-    rows = tuple(replace(row, at="cell") if row.name == "within" else row for row in decomposition.coordinated)
-    return replace(decomposition, coordinated=rows)
 
 
 def in_step(decomposition: Decomposition, turns: int) -> tuple[list[str], int]:

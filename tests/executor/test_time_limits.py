@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples, seeds
 from support.hosts import Cell
-from support.timed_nets import timed_nets
+from support.timed_nets import HANDOVER, timed_nets
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.plant import NeverCompletes
@@ -34,18 +34,6 @@ from firable.nets.text import parse_net
 from firable.semantics.replaying import replay
 from firable.semantics.trace import CommandSent, Fired, SignalChanged, Trace, parse_trace
 
-HANDOVER = """\
-firable: 1
-cell: handover
-controllers:
-  a: {start: free, inputs: key, places: {free: , go: {send: {machine: A, command: GO}, until: there, within: 1s}}}
-  b: {start: idle, places: {idle: , has: }}
-transitions:
-  start: {from: a.free, to: a.go}
-  hand: {from: [a.go, b.idle], to: [a.free, b.has]}
-  again: {from: a.go_fault, to: a.go, if: a.key}
-  use: {from: b.has, to: b.idle}
-"""
 OVER = Taken("a.go_overdue", value=True)
 
 

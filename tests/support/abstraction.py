@@ -34,7 +34,7 @@ def net_structure(decomposition: Decomposition, rounds: Sequence[Thing], *, sign
         gates = {(t.name, gate.signal) for t in net.transitions for gate in t.external if gate.wanted is wanted}
         return frozenset(found | gates if signals else found)
 
-    completions = {(t.name, net.place(place).completion or "") for t in net.transitions for place in t.outputs}
+    cleared = {(t.name, name) for t in net.transitions for place in t.outputs for name in net.place(place).cleared}
     fixed: dict[str, Tuples] = {
         "coordinated": frozenset((name,) for name in rows),
         "takes-part": frozenset(part),
@@ -43,7 +43,7 @@ def net_structure(decomposition: Decomposition, rounds: Sequence[Thing], *, sign
         "permissive": arcs("permissive", wanted=True),
         "inhibitive": arcs("inhibitive", wanted=False),
         "signal": frozenset((name,) for name in sensed),
-        "clears": frozenset(key for key in completions if key[1] in sensed),
+        "clears": frozenset(key for key in cleared if key[1] in sensed),
     }
     some_home = decomposition.subnets[0].name
     return Structure(

@@ -21,7 +21,7 @@ from support.finite_structures import Structure, Thing
 
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
-from firable.executor.protocol.deciders import TOP, closed_key
+from firable.executor.protocol.deciders import closed_key, coordinators
 from firable.executor.protocol.messages import (
     Acknowledgement,
     Decision,
@@ -29,15 +29,16 @@ from firable.executor.protocol.messages import (
     Hello,
     Message,
     Sending,
+    ToController,
     Vote,
     VoteRequest,
 )
-from firable.executor.simulation.exploring import COORDINATOR, Configuration, Explorer, Step
+from firable.executor.simulation.exploring import Configuration, Explorer, Step
 from firable.nets.decomposition import Decomposition
 
 Key = tuple[Thing, ...]
-Closed = tuple[int, frozenset[int]]
-"""Below which round all are closed, and which others."""
+Closed = dict[str, tuple[int, frozenset[int]]]
+"""Of each coordinator, below which round all of its are closed, and which others."""
 
 
 class LocalTie:
@@ -47,6 +48,7 @@ class LocalTie:
         self.net = decomposition.net
         self.structure = net_structure(decomposition, (), signals=True)
         self.takes_part = self.structure.relations["takes-part"]
+        self.coordinators = coordinators(decomposition)
         self.actions: Counter[str] = Counter()
         self.acts: set[object] = set()
 
@@ -54,11 +56,11 @@ class LocalTie:
         del after
         if step.machine < 0:
             return  # a message is lost: nobody does anything
-        coordinator = explorer.machine(before.machines[COORDINATOR])
-        assert isinstance(coordinator, Coordinator)
         message = step.about if isinstance(step.about, Message) else None
         asked: tuple[str, ...] = ()
         if isinstance(message, Decision):
+            coordinator = explorer.machine(before.machines[explorer.names.index(message.coordinator)])
+            assert isinstance(coordinator, Coordinator)
             asked = self._asked(coordinator, message)
         act = (step.kind, step.machine, step.before, step.after, step.about, asked)
         if act in self.acts:
@@ -68,8 +70,9 @@ class LocalTie:
         if isinstance(was, Coordinator) and isinstance(now, Coordinator):
             self._coordinator(was, now, step, message)
         elif isinstance(was, LocalController) and isinstance(now, LocalController):
-            kept = [explorer.machines[number].kept.get(closed_key(TOP)) for number in (step.before, step.after)]
-            self._controller(was, now, _obeyed(kept[0]), _obeyed(kept[1]), step, message, asked)
+            kept = [explorer.machines[number].kept for number in (step.before, step.after)]
+            obeyed = [{name: _obeyed(each.get(closed_key(name))) for name in was.above} for each in kept]
+            self._controller(was, now, obeyed[0], obeyed[1], step, message, asked)
 
     def _asked(self, coordinator: Coordinator, message: Decision) -> tuple[str, ...]:
         """What the round of a decision had asked of the controller; nothing is known of one that is over."""
@@ -79,10 +82,13 @@ class LocalTie:
 
     def _told(self, rounds: Iterable[int], **relations: Iterable[Key]) -> Structure:
         numbers = tuple(sorted(set(rounds)))
-        things = {**self.structure.things, "Round": numbers, "Coordinator": ("",)}
-        one: dict[Thing, Thing] = dict.fromkeys(numbers, "")
-        functions = {**self.structure.functions, "coordinator-of": one}
+        things = {**self.structure.things, "Round": numbers, "Coordinator": self.coordinators}
+        whose: dict[Thing, Thing] = {number: self._whose(number) for number in numbers}
+        functions = {**self.structure.functions, "coordinator-of": whose}
         return with_relations(replace(self.structure, things=things, functions=functions), **relations)
+
+    def _whose(self, number: int) -> str:
+        return self.coordinators[number % len(self.coordinators)]
 
     # --- A controller
 
@@ -97,8 +103,13 @@ class LocalTie:
         asked: tuple[str, ...],
     ) -> None:
         name = was.name
-        below = max(obeyed_before[0], obeyed_after[0])
-        rounds = {*was.promises, *now.promises, *obeyed_before[1], *obeyed_after[1]}
+        if not step.kind.endswith("crash"):
+            for each, above in now.above.items():
+                heard = message.closed_below if isinstance(message, ToController) and message.coordinator == each else 0
+                assert above.closed_below == max(was.above[each].closed_below, heard), f"closed at {each}: {step}"
+        below = {each: max(obeyed_before[each][0], obeyed_after[each][0]) for each in was.above}
+        rounds = {*was.promises, *now.promises}
+        rounds |= {r for kept in (obeyed_before, obeyed_after) for _, numbers in kept.values() for r in numbers}
         asked_of: dict[int, set[str]] = {}
         for machine in (was, now):
             for number, promise in machine.promises.items():
@@ -110,7 +121,7 @@ class LocalTie:
             asked_of[message.round] |= {message.committed} if message.committed in was.parts else set()
         rounds |= set(asked_of)
         # Below what is closed, a promise that still stands is of a round that a restart of the coordinator gave up.
-        given_up = {number for number in was.promises if number < _below(now)}
+        given_up = {number for number in was.promises if number < now.above[self._whose(number)].closed_below}
         asked_keys = [(r, t, name) for r, names in asked_of.items() for t in names]
         commit = [
             k for k in asked_keys if isinstance(message, Decision) and k[:2] == (message.round, message.committed)
@@ -124,14 +135,15 @@ class LocalTie:
             marked += [s.name for s in machine.subnet.signals if machine.word & machine.player.signal_bit(s.name)]
             promised = [(r, t, name) for r, promise in machine.promises.items() for t in promise.promised]
             # Obeyed is what outlives a crash. Below what is closed, each round is closed or given up: told as closed.
-            obeyed = {key for key in asked_keys if key[0] < kept[0] or key[0] in kept[1]}
-            forgotten = {r for r in rounds if r < kept[0] and r not in given_up}
+            over = {r for r in rounds if r < kept[self._whose(r)][0] or r in kept[self._whose(r)][1]}
+            obeyed = {key for key in asked_keys if key[0] in over}
+            forgotten = {r for r in rounds if r < kept[self._whose(r)][0] and r not in given_up}
             obeyed |= {(r, t.name, name) for r in forgotten for t in self.net.transitions}
             return self._told(
                 rounds,
                 marked=[(each,) for each in marked],
                 begun=[(r,) for r in rounds],
-                closed=[(r,) for r in rounds if r < below and r not in given_up],
+                closed=[(r,) for r in rounds if r < below[self._whose(r)] and r not in given_up],
                 committed=[key[:2] for key in commit],
                 promised=promised,
                 obeyed=obeyed,
@@ -152,7 +164,7 @@ class LocalTie:
         first = play(first, released)
         self.actions.update(action for action, _ in released)
         fired = [e.transition for e in step.effects if isinstance(e, Firing)]
-        cleared = {self.net.place(e.place).completion for e in step.effects if isinstance(e, Sending)}
+        cleared = {name for e in step.effects if isinstance(e, Sending) for name in self.net.place(e.place).cleared}
         places = {place.name for place in self.net.places}
         changed = {key[0] for key in first.relations["marked"] ^ last.relations["marked"]} - places
         held = {key[0] for key in last.relations["marked"]}
@@ -235,7 +247,7 @@ class LocalTie:
         arrived = first.relations["acknowledgement"]
         last = self._sending(last, "acknowledgement", arrived)
         if step.kind == "crash":
-            reached = play(first, [("restart", ("",))])
+            reached = play(first, [("restart", (was.name,))])
             assert not differences(reached, last), (step, differences(reached, last))
             self.actions["restart"] += 1
         else:
@@ -277,12 +289,8 @@ class LocalTie:
         self.actions.update(name for name, _ in steps)
 
 
-def _obeyed(kept: object) -> Closed:
+def _obeyed(kept: object) -> tuple[int, frozenset[int]]:
     match kept:
         case [int(below), [*numbers]]:
             return below, frozenset(int(str(number)) for number in numbers)
     return 0, frozenset()
-
-
-def _below(machine: LocalController) -> int:
-    return max((above.closed_below for above in machine.above.values()), default=0)

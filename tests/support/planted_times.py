@@ -32,13 +32,13 @@ class GoesOnCounting(WithTimers):
         """Times that begin once."""
 
         def enter(self, place: str) -> None:
-            if place not in self._running:
+            if place not in self.running:
                 super().enter(place)
 
         def over(self, now_seconds: float, word: Word) -> Iterator[str]:
-            left = {name: due for name, due in self._running.items() if not self.waits(name, word)}
+            left = {name: due for name, due in self.running.items() if not self.waits(name, word)}
             yield from super().over(now_seconds, word)
-            self._running = {**left, **self._running}
+            self.running = {**left, **self.running}
 
     kind = Running
 
@@ -76,7 +76,7 @@ class ForgetsOthers(WithTimers):
         def over(self, now_seconds: float, word: Word) -> Iterator[str]:
             found = list(super().over(now_seconds, word))
             if found:
-                self._running.clear()
+                self.running.clear()
             yield from found
 
     kind = One
@@ -101,7 +101,7 @@ class TimesTheOutage(WithTimers):
         """Times that begin before the operator has resumed."""
 
         def begin_anew(self, word: Word) -> None:
-            self._running = {**{n: self._limit(n) for n in self.places if self.waits(n, word)}, **self._running}
+            self.running = {**{n: self._limit(n) for n in self.places if self.waits(n, word)}, **self.running}
 
         def _limit(self, place: str) -> float:
             within = self.places[place].within

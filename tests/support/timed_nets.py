@@ -6,7 +6,7 @@ from firable.executor.simulation.drawn import drawn_timed_net, with_limits
 from firable.nets.net import Net
 from firable.nets.text import parse_net
 
-__all__ = ["TWO_TIMES", "timed_nets", "waiting", "with_limits"]
+__all__ = ["HANDOVER", "TWO_TIMES", "timed_nets", "waiting", "with_limits"]
 
 
 def waiting(net: Net) -> list[str]:
@@ -21,6 +21,20 @@ def timed_nets() -> st.SearchStrategy[Net]:
     """
     return st.randoms(use_true_random=False).map(lambda draw: drawn_timed_net(draw, "timed"))
 
+
+HANDOVER = """\
+firable: 1
+cell: handover
+controllers:
+  a: {start: free, inputs: key, places: {free: , go: {send: {machine: A, command: GO}, until: there, within: 1s}}}
+  b: {start: idle, places: {idle: , has: }}
+transitions:
+  start: {from: a.free, to: a.go}
+  hand: {from: [a.go, b.idle], to: [a.free, b.has]}
+  again: {from: a.go_fault, to: a.go, if: a.key}
+  use: {from: b.has, to: b.idle}
+"""
+"""One machine that may be late, and whose completion is waited for in a transition of two controllers."""
 
 TWO_TIMES = parse_net("""\
 firable: 1
