@@ -310,6 +310,60 @@ class Compact:
     ) -> list[int] | None:
         """A way to a nearest marking in which a goal holds; `IndexError` for a goal that was not asked for."""
 
+def find_lasso(
+    n_places: int,
+    transitions: _Transitions,
+    initial: list[int],
+    labels: list[list[tuple[int, list[int]]]],
+    rows: list[list[tuple[int, bool, list[int], bool, int, list[int]]]],
+    n_marks: int,
+    *,
+    seed: int | None = None,
+    max_vertices: int,
+    max_memory_bytes: int,
+    max_seconds: float | None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Lasso:
+    """Look, depth first and under interleaving, for a run from M0 that a generalised Büchi automaton accepts.
+
+    The first arguments are those of `explore`; labels are formulas as `Stubborn.reach` takes them. A row holds the
+    edges of a state, the first row those of the first state: (label that the marking satisfies, whether only the
+    transitions listed are admitted or all but these, they, whether it may be taken in a deadlock, target, marks). A run
+    is accepted if it takes edges with each mark again and again. With a `seed` firings are tried in a drawn order. A
+    vertex is a marking with a state. Running out of a budget leaves the search incomplete.
+
+    Raises `ValueError` for a place, label, state, transition or mark out of range, more than 64 marks, a negative time.
+
+    >>> ring = [([0], [1], [], [], []), ([1], [0], [], [], [])]
+    >>> found = find_lasso(2, ring, [0], [[(2, [])]], [[(0, False, [], True, 0, [0])]], 1, max_vertices=100,
+    ...                    max_memory_bytes=1_000_000, max_seconds=None)
+    >>> found.complete, found.run
+    (True, ([], [0, 1]))
+    """
+
+@final
+class Lasso:
+    """What a search for a lasso found."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the question is answered."""
+    @property
+    def reason(self) -> str | None:
+        """Why not: "markings" for the vertices allowed, "memory", "time", "interrupted" or "cancelled"."""
+    @property
+    def run(self) -> tuple[list[int], list[int]] | None:
+        """The firings from M0 and those of the cycle, which is empty where the run ends in a deadlock; None: no run."""
+    @property
+    def n_vertices(self) -> int:
+        """How many vertices were met."""
+    @property
+    def n_edges(self) -> int:
+        """How many edges were followed."""
+    @property
+    def seconds(self) -> float:
+        """How long it took."""
+
 def explore_symbolically(
     n_places: int,
     transitions: _Transitions,

@@ -24,21 +24,33 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import Event
+from types import MappingProxyType
 from typing import Any, Final
 
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Limits
-from firable.analysis.methods import FIRST_KNOWERS, GOAL_LANES, GOALS, KNOWERS, SPACES, Method, Technique
+from firable.analysis.methods import (
+    FIRST_KNOWERS,
+    FORMULA_LANES,
+    FORMULAS,
+    GOAL_LANES,
+    GOALS,
+    KNOWERS,
+    SPACES,
+    Method,
+    Technique,
+)
 from firable.analysis.question import Question, unknown
 from firable.analysis.race import Contestant, race
 from firable.analysis.report import CheckReport, report_on
 from firable.analysis.settling import Lanes, Settling
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace
+from firable.analysis.temporal.queries import as_goal, question_of, temporal_question
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE, QUESTIONS
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.net import Net
+from firable.nets.net import Net, TemporalProperty
 from firable.nets.queries import Query
 from firable.nets.verdict import Cost, Status, Verdict, spelled
 from firable.semantics.trace import Discipline
@@ -52,6 +64,8 @@ _COUNTING_SECONDS_MAX: Final = 120.0
 _LEARNT_FIRST: Final = frozenset(question.name for question in QUESTIONS)
 _FIRST_LANES: Final = ((Method.REDUCTION, Method.WALK, Method.STATE_EQUATION),)
 _FIRST_SLICES_SECONDS: Final = (3.0, 10.0)
+_FORMULAS_SHARE: Final = 0.25  # of the time that is left, for formulas without sets of markings
+_FORMULA_SLICES_SECONDS: Final = (1.0, 5.0)
 
 
 def check(
@@ -118,15 +132,27 @@ class _Check:
         settling = self._settling()
         ends: list[str | None] = []
         space = self._whole(settling, course, ends)
+        if space is not None:  # sets may take far longer than one run that is nearby
+            self._ask_formulas(settling, _share(self.deadline, _FORMULAS_SHARE), _FORMULA_SLICES_SECONDS[:1])
         # What had no room with indexes may have it without.
         late = {Method.COMPACT: _COUNTING_SHARE} if {"memory", "markings"} & set(ends) else {}
-        return self._settled(self._report(space or first), settling, FIRST_KNOWERS | late, GOAL_LANES, course)
+        report = self._report(space or first, settling.found)
+        return self._settled(report, settling, FIRST_KNOWERS | late, (*GOAL_LANES, *FORMULA_LANES), course)
 
     def _begin(self, settling: Settling, deadline: Deadline) -> None:
         """Settle, beside the search for all markings, what others follow from, by quick techniques."""
         for of, share in FIRST_KNOWERS.items():
             settling.learn(of, _LEARNT_FIRST, _moment(deadline, share))
+        self._ask_formulas(settling, deadline, _FORMULA_SLICES_SECONDS)
         settling.ask(_asked_of(DEADLOCK_FREE), (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
+
+    def _ask_formulas(self, settling: Settling, deadline: Deadline, slices_seconds: Sequence[float]) -> None:
+        """Settle the formulas that do not come down to goals, one after the other, as far as that is quick."""
+        questions = [question_of(query) for query in self.queries if query.formula and not as_goal(query.formula)]
+        temporal = [of for of in self.net.properties if isinstance(of, TemporalProperty) and not as_goal(of.formula)]
+        for question in (*map(temporal_question, temporal), *questions):
+            if not deadline.over:
+                settling.ask(_asked_of(question), (), FORMULA_LANES, deadline, slices_seconds)
 
     def by(self, method: Method) -> CheckReport:
         """The report of one technique: what it does not decide stays unknown."""
@@ -139,8 +165,9 @@ class _Check:
             return _told(self._report(space), [f"{words}: {_size(space)}"])
         report = self._report(self._nothing())
         knowers = {of: 1.0 for of in KNOWERS if of is method}
-        lanes = ((method,),) if method in GOALS else ()
-        words = (KNOWERS | GOALS)[method].words
+        formulas = {of: words for techniques in FORMULAS.values() for of, words in techniques.items()}
+        lanes = ((method,),) if method in GOALS | formulas else ()
+        words = (KNOWERS | GOALS | formulas)[method].words
         return self._settled(report, self._settling(), knowers, lanes, [f"{words}, and nothing else"])
 
     def _settling(self) -> Settling:
@@ -150,15 +177,15 @@ class _Check:
         """A space of M0 alone, of which nothing is concluded but what holds of M0."""
         return self._explore(replace(self.budget, markings=1))
 
-    def _report(self, space: StateSpace[Any]) -> CheckReport:
+    def _report(self, space: StateSpace[Any], known: Mapping[str, Verdict] = MappingProxyType({})) -> CheckReport:
         """The report on a space; Ctrl-C leaves unknown what is not decided yet, and twice ends all."""
         try:
-            return report_on(space, self.queries)
+            return report_on(space, self.queries, known)
         except KeyboardInterrupt:
             if self.interrupted.is_set():
                 raise
             self.interrupted.set()
-            return _told(report_on(space, self.queries), ["interrupted"])
+            return _told(report_on(space, self.queries, known), ["interrupted"])
 
     def _explore(self, budget: Budget, threads: int = 1) -> ReachabilityGraph:
         """Some markings, or all; by as many threads whatever the machine, since they say how markings are numbered."""

@@ -2,7 +2,8 @@
 
 To add one: its file, which opens with the idea and its source, and one row here. A technique either *holds* all
 markings, so that every verdict may be asked of it, or decides *goals*, or *knows* some verdicts at once from the
-structure of the net. They are loaded when they are used, because solvers take a second to load.
+structure of the net, or decides *formulas* of a temporal logic. They are loaded when they are used, because solvers
+take a second to load.
 """
 
 from __future__ import annotations
@@ -13,16 +14,20 @@ from enum import StrEnum
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
+from firable.nets.temporal import Logic
+
 if TYPE_CHECKING:  # the command line reads this table for its help, and so loads nothing with it
     from firable.analysis.goal import Finding, Limits
     from firable.analysis.question import Known
     from firable.analysis.spaces.space import StateSpace
     from firable.nets.formula import Formula
     from firable.nets.net import Net
+    from firable.nets.temporal import Temporal
 
     GoalDecider = Callable[[Net, Formula, Limits], Finding]
     SpaceMaker = Callable[[Net, Limits], StateSpace[Any]]
     Knower = Callable[[Net, Limits], Mapping[str, Known]]
+    FormulaDecider = Callable[[Net, Temporal, Limits], Known]
 
 
 class Method(StrEnum):
@@ -40,6 +45,7 @@ class Method(StrEnum):
     STUBBORN_SETS = "stubborn-sets"
     COMPACT = "compact"
     WALK = "walk"
+    ON_THE_FLY = "on-the-fly"
 
 
 F = TypeVar("F")
@@ -100,8 +106,18 @@ GOALS: Final[dict[Method, Technique[GoalDecider]]] = {
     Method.COMPACT: Technique("compact search", "firable.analysis.compact:decide_by_compact_search"),
 }
 
+FORMULAS: Final[dict[Logic, dict[Method, Technique[FormulaDecider]]]] = {
+    Logic.LTL: {
+        Method.ON_THE_FLY: Technique("on the fly", "firable.analysis.temporal.on_the_fly:decide_ltl_on_the_fly")
+    },
+    Logic.CTL: {},
+}
+
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (
     (Method.REDUCTION, Method.WALK, Method.STUBBORN_SETS, Method.BOUNDED),
     (Method.STATE_EQUATION, Method.K_INDUCTION, Method.PDR, Method.COMPACT),
 )
 """How `auto` races them: what finds violations beside what proves; each lane in turns that grow."""
+
+FORMULA_LANES: Final[tuple[tuple[Method, ...], ...]] = ((Method.ON_THE_FLY,),)
+"""The same, for formulas that do not come down to goals."""

@@ -9,7 +9,7 @@ technique can conclude from a part by forgetting a check. A technique with anoth
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
@@ -39,10 +39,11 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """The answer to the question of a verdict by a technique that needs no state space, and which technique."""
+    """The answer to the question of a verdict by a technique that needs no state space, which one, and its cost."""
 
     answer: Answer
     method: str
+    cost: Cost = field(default_factory=Cost)
 
 
 @dataclass(frozen=True, slots=True)

@@ -118,8 +118,13 @@ class CheckReport:
         raise KeyError(name)
 
 
-def report_on(space: StateSpace[Any], queries: Iterable[Query] = ()) -> CheckReport:
-    """Decide every verdict of this room, and the queries, on a state space that was explored before."""
+def report_on(
+    space: StateSpace[Any], queries: Iterable[Query] = (), known: Mapping[str, Verdict] = MappingProxyType({})
+) -> CheckReport:
+    """Decide every verdict of this room, and the queries, on a state space that was explored before.
+
+    Of temporal properties and of queries the verdicts that are `known`, by name, are taken as they are.
+    """
     behaviour, conflicts = Behaviour(space), ConflictAnalysis(space)
     steps = _steps(space)
     verdicts = [
@@ -129,8 +134,8 @@ def report_on(space: StateSpace[Any], queries: Iterable[Query] = ()) -> CheckRep
         *([] if steps is None else [conflict.steps_serialisable(steps)]),
         *(decide(space) for decide in _ON_SPACE),
         starvation_free(behaviour),
-        *decide_properties(space),
-        *(answer(space, query) for query in queries),
+        *decide_properties(space, known),
+        *(known.get(f"query.{query.name}") or answer(space, query) for query in queries),
     ]
     return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), tuple(verdicts), space)
 

@@ -1,9 +1,10 @@
 """Settling verdicts one by one: what `check` does where no technique holds all markings, or while some still try.
 
-A verdict is settled in one of three ways, whichever is first:
+A verdict is settled in one of four ways, whichever is first:
 
 - a technique *knows* it at once, from the structure of the net or a few walks (`KNOWERS` of the table of methods);
 - it comes down to *goals*, and techniques race each other for each of these (`GOALS`);
+- it is a *formula* that does not, and techniques for formulas race each other (`FORMULAS`);
 - it *follows* from verdicts that are settled (`firable.analysis.verdicts.consequences`).
 
 Nothing is settled twice, and what is settled is kept from one stage to the next, so it can be begun beside the search
@@ -22,8 +23,8 @@ from typing import Final
 from firable.analysis._engine import IncompleteGraph
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Finding, Limits
-from firable.analysis.methods import GOALS, KNOWERS, WORTH_ASKING, Method
-from firable.analysis.question import Answer, Question, no, yes
+from firable.analysis.methods import FORMULAS, GOALS, KNOWERS, WORTH_ASKING, Method
+from firable.analysis.question import Answer, Known, Question, no, yes
 from firable.analysis.race import SLICES_SECONDS, Contestant, Outcome, T, race
 from firable.analysis.spaces.space import WitnessError
 from firable.analysis.temporal.queries import question_of
@@ -35,7 +36,7 @@ from firable.analysis.verdicts.starvation import STARVATION
 from firable.nets.formula import Formula
 from firable.nets.net import Net, TemporalProperty
 from firable.nets.queries import Query, QueryKind
-from firable.nets.temporal import Temporal
+from firable.nets.temporal import Logic, Temporal
 from firable.nets.verdict import Cost, Status, Verdict
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
@@ -110,7 +111,7 @@ class Settling:
             return
         asked = goals_of(self.net, verdict.name, fired) or query_goals(self.queries, verdict)
         if asked is None:
-            self._combine(verdict, lanes, deadline, slices_seconds)
+            self._by_formula(verdict, lanes, deadline, slices_seconds)
             return
         if len(asked[1]) > _GOALS_MAX:
             return
@@ -126,11 +127,36 @@ class Settling:
         if finding is not None:
             self._settle(question, yes(finding.witness), finding.method, finding.cost)
 
-    def _combine(self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float]) -> None:
-        """Settle the verdict on a formula that is put together from goals."""
-        formula, branching = self._formula_of(verdict.name)
-        if formula is None or not is_combined(formula, branching=branching):
+    def _by_formula(self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float]) -> None:
+        """Settle the verdict on a formula of CTL or LTL."""
+        if (found := self._formula_of(verdict.name)) is None:
             return
+        formula, logic = found
+        if is_combined(formula, branching=logic is Logic.CTL):
+            self._combine(verdict, formula, lanes, deadline, slices_seconds)
+        able = FORMULAS[logic]
+        contestants = [
+            [Contestant(able[of].words, partial(_judged, logic, of, self.net, formula)) for of in lane if of in able]
+            for lane in lanes
+        ]
+        if verdict.name in self.found or deadline.over or not any(contestants):
+            return
+        outcome = self._told(
+            verdict.name, self.noted(race(contestants, Limits(deadline, self.memory_bytes), slices_seconds))
+        )
+        if (known := outcome.answer) is not None:
+            question = Question(verdict.name, verdict.statement, verdict.weight)
+            self._settle(question, known.answer, known.method, known.cost)
+
+    def _combine(
+        self,
+        verdict: Verdict,
+        formula: Temporal,
+        lanes: Lanes,
+        deadline: Deadline,
+        slices_seconds: Sequence[float],
+    ) -> None:
+        """Settle the verdict on a formula that is put together from goals."""
         asked: list[Finding] = []
 
         def reached(goal: Formula) -> Finding | None:
@@ -148,15 +174,15 @@ class Settling:
         question = Question(verdict.name, verdict.statement, verdict.weight)
         self._settle(question, Answer(holds, witness=witness), method, cost)
 
-    def _formula_of(self, name: str) -> tuple[Temporal | None, bool]:
-        """The temporal formula of a query or a property, by the name of its verdict, and whether it is of CTL."""
+    def _formula_of(self, name: str) -> tuple[Temporal, Logic] | None:
+        """The temporal formula of a query or a property, by the name of its verdict, and its logic."""
         for query in self.queries:
-            if name == f"query.{query.name}":
-                return query.formula, query.kind is QueryKind.CTL
+            if name == f"query.{query.name}" and query.formula is not None:
+                return query.formula, Logic(query.kind)
         for of in self.net.properties:
             if name == f"property.{of.name}" and isinstance(of, TemporalProperty):
-                return of.formula, QueryKind(of.logic) is QueryKind.CTL
-        return None, False
+                return of.formula, of.logic
+        return None
 
     def _pass_on(self, decided: Mapping[str, Verdict]) -> None:
         """Answer the queries that ask for what a verdict on the net says."""
@@ -182,15 +208,20 @@ class Settling:
         if deadline.over:
             return None
         contestants = [
-            [Contestant(GOALS[of].words, partial(_decided, of, self.net, goal.formula)) for of in lane]
+            [Contestant(GOALS[of].words, partial(_decided, of, self.net, goal.formula)) for of in lane if of in GOALS]
             for lane in lanes
         ]
-        outcome = self.noted(race(contestants, Limits(deadline, self.memory_bytes), slices_seconds))
-        if outcome.answer is None:
-            self.course.append(f"{name}: {'; '.join(outcome.told)}")
-        else:
-            self.course.append(f"{name}: {outcome.winner} was first")
-        return outcome.answer
+        if not any(contestants):
+            return None
+        return self._told(
+            name, self.noted(race(contestants, Limits(deadline, self.memory_bytes), slices_seconds))
+        ).answer
+
+    def _told(self, name: str, outcome: Outcome[T]) -> Outcome[T]:
+        """The outcome of a race about a verdict, which the course tells."""
+        said = "; ".join(outcome.told) if outcome.answer is None else f"{outcome.winner} was first"
+        self.course.append(f"{name}: {said}")
+        return outcome
 
     def noted(self, outcome: Outcome[T]) -> Outcome[T]:
         """The outcome; where Ctrl-C ended the race nothing else is begun, and what is known is reported."""
@@ -224,3 +255,8 @@ def _decided(of: Method, net: Net, formula: Formula, limits: Limits) -> Finding 
     if found.reachable:
         _marking_of(net, formula, found)
     return found
+
+
+def _judged(logic: Logic, of: Method, net: Net, formula: Temporal, limits: Limits) -> Known:
+    """What a technique says of a formula; raises `IncompleteGraph` where it does not decide."""
+    return FORMULAS[logic][of].load()(net, formula, limits)

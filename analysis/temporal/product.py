@@ -11,8 +11,8 @@ from a pair of it, for each mark an edge with that mark can be reached that lead
 from formulas are one state with edges to itself, so two shortcuts carry the whole: going back through such a state is
 one backward closure of the space, and staying in it for ever is EG.
 
-Rejected: nested depth-first search over pairs of single markings. It is better where the first lasso is near, but it
-has no counterpart on a decision diagram, and markings one by one are slow in Python.
+Pairs of single markings, one after the other, are better where the first lasso is near or the space too large to be
+held: that is a technique of its own (`temporal.on_the_fly`), which has no counterpart on a decision diagram.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Product(Generic[S]):
             row = []
             for edge in edges:
                 markings = _where(sets, edge.atoms)
-                by = _firings(net, edge.fires, edge.spared)
+                by = firings_of(net, edge.fires, edge.spared)
                 possible = by is None or by or not edge.fires
                 if possible and not sets.empty(markings):
                     row.append(ProductEdge(markings, by, not edge.fires, edge.target, edge.marks))
@@ -70,7 +70,7 @@ class Product(Generic[S]):
     @cached_property
     def parts(self) -> tuple[tuple[int, ...], ...]:
         """The strongly connected parts of the automaton, each after all that it leads to."""
-        return _components([[edge.target for edge in edges] for edges in self.edges])
+        return components([[edge.target for edge in edges] for edges in self.edges])
 
     def reaching(self, goal: Pairs[S], within: Pairs[S] | None = None) -> Pairs[S]:
         """The pairs from which a pair of the goal can be reached, going only through `within`."""
@@ -188,7 +188,7 @@ def _where(sets: Sets[S], atoms: Iterable[Formula]) -> S:
     return sets.both(*(sets.of(atom) for atom in sorted(atoms, key=repr)))
 
 
-def _firings(net: Net, fires: frozenset[str], spared: frozenset[str]) -> frozenset[int] | None:
+def firings_of(net: Net, fires: frozenset[str], spared: frozenset[str]) -> frozenset[int] | None:
     """The transitions that an edge admits, one at a time: None for all of them."""
     if not fires and not spared:
         return None
@@ -196,7 +196,7 @@ def _firings(net: Net, fires: frozenset[str], spared: frozenset[str]) -> frozens
     return frozenset(net.transition_index[name] for name in admitted - spared)
 
 
-def _components(targets: list[list[int]]) -> tuple[tuple[int, ...], ...]:
+def components(targets: list[list[int]]) -> tuple[tuple[int, ...], ...]:
     """The strongly connected components of a small graph, each after those that it leads to (Tarjan 1972)."""
     index: dict[int, int] = {}
     low: dict[int, int] = {}

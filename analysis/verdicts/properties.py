@@ -9,6 +9,8 @@ of CTL or LTL (`firable.analysis.temporal`).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from firable.analysis.question import Answer, Question, no, yes
@@ -67,10 +69,14 @@ def decide_property(space: StateSpace[Any], of: Property) -> Verdict:
     return Question(f"property.{of.name}", statement(of)).ask(space, find)
 
 
-def decide_properties(space: StateSpace[Any]) -> tuple[Verdict, ...]:
-    """The verdicts on all properties of the net, in the order of the file."""
+def decide_properties(
+    space: StateSpace[Any], known: Mapping[str, Verdict] = MappingProxyType({})
+) -> tuple[Verdict, ...]:
+    """The verdicts on all properties of the net, in the order of the file; of temporal ones those that are `known`."""
     return tuple(
-        decide_temporal(space, of) if isinstance(of, TemporalProperty) else decide_property(space, of)
+        known.get(f"property.{of.name}") or decide_temporal(space, of)
+        if isinstance(of, TemporalProperty)
+        else decide_property(space, of)
         for of in space.net.properties
     )
 

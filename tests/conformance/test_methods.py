@@ -1,4 +1,4 @@
-"""Every technique of the table that decides goals, against the oracle; a technique that is added is held to it at once.
+"""Every technique of the table that decides goals or formulas, against the oracle; one that is added is held to it too.
 
 Not to decide is allowed here; what a technique must decide is said by the tests of its own.
 """
@@ -13,18 +13,23 @@ from support.examples import examples
 from support.lively_nets import lively_nets
 from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
+from support.temporal_formulas import ctl_formulas, ltl_formulas
 from support.timed_nets import timed_nets
 from support.whole_nets import formulas
 
+from firable.analysis._engine import IncompleteGraph
 from firable.analysis.check import check
 from firable.analysis.deadline import Deadline
 from firable.analysis.goal import Limits
-from firable.analysis.methods import GOALS, SPACES, Method
+from firable.analysis.methods import FORMULAS, GOALS, SPACES, Method
 from firable.analysis.report import report_on
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.spaces.space import Witnesses
+from firable.analysis.temporal.queries import answer
 from firable.nets.formula import Deadlock, Formula
 from firable.nets.net import Net
+from firable.nets.queries import Query, QueryKind
+from firable.nets.temporal import Logic
 from firable.nets.verdict import Status
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
@@ -61,6 +66,22 @@ def test_a_technique_decides_goals_as_the_oracle_does(method: Method, net: Net, 
     goal = data.draw(formulas([place.name for place in net.places], [t.name for t in net.transitions]))
     decides_as_the_oracle(method, net, goal)
     decides_as_the_oracle(method, net, Deadlock())
+
+
+@pytest.mark.parametrize(("logic", "method"), [(logic, method) for logic in Logic for method in FORMULAS[logic]])
+@examples(30)
+@given(net=SMALL_NETS, data=st.data())
+def test_a_technique_decides_formulas_as_the_oracle_does(
+    logic: Logic, method: Method, net: Net, data: st.DataObject
+) -> None:
+    drawn = ltl_formulas if logic is Logic.LTL else ctl_formulas
+    formula = data.draw(drawn([place.name for place in net.places], [t.name for t in net.transitions]))
+    try:
+        found = FORMULAS[logic][method].load()(net, formula, limits())
+    except IncompleteGraph:
+        return
+    query = Query("q", QueryKind(logic), formula)
+    assert answer(NaiveSpace(net), query).status is (Status.PROVED if found.answer.holds else Status.VIOLATED)
 
 
 @pytest.mark.parametrize("method", [method for method in Method if method not in (Method.AUTO, Method.EXPLICIT)])

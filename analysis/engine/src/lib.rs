@@ -34,6 +34,8 @@ pub mod indexes;
 #[forbid(unsafe_code)]
 pub mod known;
 #[forbid(unsafe_code)]
+pub mod lasso;
+#[forbid(unsafe_code)]
 pub mod marking;
 #[forbid(unsafe_code)]
 pub mod net;
@@ -89,6 +91,8 @@ mod extension {
     use crate::python::explore::explore;
     #[pymodule_export]
     use crate::python::graph::Graph;
+    #[pymodule_export]
+    use crate::python::lasso::{Lasso, find_lasso};
     #[pymodule_export]
     use crate::python::stubborn::{Search, Stubborn};
     use crate::python::{BudgetExceeded, IncompleteGraph};

@@ -10,6 +10,7 @@ pub(crate) mod components;
 pub(crate) mod diagram;
 pub(crate) mod explore;
 pub(crate) mod graph;
+pub(crate) mod lasso;
 pub(crate) mod rows;
 pub(crate) mod stubborn;
 
