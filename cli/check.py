@@ -167,6 +167,7 @@ def _refuse_beside_machines() -> None:
 
 def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: bool) -> Report:
     from firable.cli.cache import key_of, opened_cache
+    from firable.nets.verdict import held_to
 
     loaded = load_net(argument)
     net = loaded.net
@@ -190,11 +191,13 @@ def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: boo
         files = write_folder(folder, _traces(net, kept.verdicts, asked.discipline))
     if evidence_dir is not None:
         files += write_folder(_folder(evidence_dir, argument, many=many), documents)
+    with loaded.placing():
+        verdicts = held_to(net.expected, kept.verdicts)
     return Report(
         "check",
         argument,
         net,
-        kept.verdicts,
+        verdicts,
         discipline=asked.discipline,
         figures=kept.figures,
         course=kept.course,

@@ -61,6 +61,7 @@ def loop_report(argument: str, machines: str, allowed: Budget, loop_file: str | 
     from firable.analysis.loop.faults import check_faults
     from firable.analysis.loop.verdicts import check_loop
     from firable.nets.printing import format_net
+    from firable.nets.verdict import held_to
 
     loaded, model = load_net(argument), read_machines(machines)
     with loaded.placing():
@@ -71,11 +72,13 @@ def loop_report(argument: str, machines: str, allowed: Budget, loop_file: str | 
         write_text(loop_file, format_net(report.closed.net))
         files = (loop_file,)
     figures = report.closed.figures
+    with loaded.placing():
+        verdicts = held_to(loaded.net.expected, (*report.verdicts, *faults))
     return Report(
         "check",
         argument,
         loaded.net,
-        (*report.verdicts, *faults),
+        verdicts,
         discipline="interleaving",
         notes=loaded.notes,
         files=files,

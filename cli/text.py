@@ -100,7 +100,7 @@ def show_verdicts(
     told: dict[tuple[object, ...], str] = {}
     width = max((len(verdict.name) for verdict in verdicts), default=0)
     for weight, title in _HEADINGS.items():
-        some = [verdict for verdict in verdicts if verdict.weight.value == weight]
+        some = [v for v in verdicts if ("required" if v.expected is not None else v.weight.value) == weight]
         if some:
             click.echo(f"\n{click.style(title, bold=True)}")
         for verdict in some:
@@ -118,6 +118,8 @@ def verdict_line(verdict: Verdict, width: int = 0, words: Mapping[str, str] = WO
 def mark(verdict: Verdict, words: Mapping[str, str] = WORDS) -> tuple[str, str, str | None]:
     """How a verdict ended: a sign, a word, a colour."""
     weight, status = verdict.weight.value, verdict.status.value
+    if verdict.expected is not None and status != "unknown":
+        return ("=", "expected", None) if verdict.outcome.value == "proved" else ("✗", "changed", "red")
     if status == "proved":
         return "✓", "yes" if weight == "information" else words["proved"], "green"
     if status == "unknown":
@@ -140,8 +142,15 @@ def reasons(
     """
     from firable.nets.rules import rule_of
 
-    told = {} if told is None else told
     status = verdict.status.value
+    told = {} if told is None else told
+    if verdict.expected is not None and verdict.outcome.value != "unknown":
+        changed = verdict.outcome.value == "violated"
+        yield (
+            f"[F3024] the file expects {verdict.expected}, and it is {status}" if changed else f"{status}, as expected"
+        )
+        if not verbose and not (changed and status == "violated"):
+            return
     if verbose:
         yield f"by {verdict.method}{_cost(verdict.cost)}"
     if status == "unknown" and verdict.bound:
@@ -196,17 +205,25 @@ def told_steps(net: Net, firings: Sequence[Sequence[str]], first: int = 1) -> It
             yield f"{number} {name:<{width}}  {net.transition(name).description}".rstrip()
 
 
+_OUTCOMES: Final = {"violated": "changed", "unknown": "unknown though expected", "proved": "as expected"}
+
+
 def show_summary(report: Report) -> None:
     """Print the last line: how it ended, and how many verdicts there are of each kind."""
-    required = [verdict for verdict in report.verdicts if verdict.weight.value == "required"]
+    expected = [verdict for verdict in report.verdicts if verdict.expected]
+    others = [verdict for verdict in report.verdicts if not verdict.expected]
     parts = []
     for status in ("violated", "unknown", "proved"):
-        if n := sum(verdict.status.value == status for verdict in required):
+        if n := sum(verdict.status.value == status and verdict.matters for verdict in others):
             parts.append(f"{n} {status}")
-    warnings = sum(v.weight.value == "warning" and v.status.value != "proved" for v in report.verdicts)
+    for outcome, word in _OUTCOMES.items():
+        if n := sum(verdict.outcome.value == outcome for verdict in expected):
+            parts.append(f"{n} {word}")
+    warnings = sum(verdict.weight.value == "warning" and verdict.status.value != "proved" for verdict in others)
     if warnings:
         parts.append(counted(warnings, "warning"))
-    word, colour = {0: ("all hold", "green"), 1: ("violated", "red")}.get(report.exit_code, ("not decided", "yellow"))
+    good = "all as expected" if any(verdict.status.value == "violated" for verdict in expected) else "all hold"
+    word, colour = {0: (good, "green"), 1: ("violated", "red")}.get(report.exit_code, ("not decided", "yellow"))
     click.echo(f"\n{click.style(word, fg=colour, bold=True)}: {', '.join(parts) or 'there is nothing to hold'}")
     show_page(report)
 

@@ -76,6 +76,7 @@ CODES: Final[dict[str, str]] = {
     "F2027": "controllers that are no tree",
     "F2028": "a time limit without a completion",
     "F2029": "not a time limit",
+    "F2030": "an expectation of an unknown verdict",
     # F3: analysis
     "F3001": "a machine is started that no command ever stops",
     "F3002": "an output signal on a place marked in M0",
@@ -98,6 +99,7 @@ CODES: Final[dict[str, str]] = {
     "F3021": "a transition that starves under the arbiters",
     "F3022": "a property of the file does not hold",
     "F3023": "a query does not hold",
+    "F3024": "a verdict that the file expects otherwise",
     "F3030": "a command to a machine that is busy",
     "F3031": "an accident of the machines",
     "F3032": "a completion that is lost",

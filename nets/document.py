@@ -217,6 +217,10 @@ class NetDocument(StrictDocument):
     transitions: dict[Name, TransitionDocument | None] | None = None
     arbiters: dict[Name, ArbiterDocument] | None = None
     properties: dict[Name, PropertyDocument] | None = None
+    expect: dict[Name, Literal["proved", "violated"]] | None = Field(
+        default=None,
+        description="Verdicts of `firable check` that are known to end so: it fails when one of them changes.",
+    )
 
 
 def json_schema() -> dict[str, Any]:

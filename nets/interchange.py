@@ -42,6 +42,7 @@ from firable.nets.net import (
     Transition,
 )
 from firable.nets.temporal import Logic, format_temporal, logics, parse_temporal
+from firable.nets.verdict import Expectation, Status
 
 FORMAT: Final = "firable-net/3"
 
@@ -107,6 +108,7 @@ def net_to_json(net: Net) -> dict[str, Any]:
         ],
         "arbiters": [{"name": a.name, "among": list(a.among), "by": str(a.by)} for a in net.arbiters],
         "properties": [_property_to_json(p) for p in net.properties],
+        **({"expected": {one.verdict: str(one.status) for one in net.expected}} if net.expected else {}),
     }
 
 
@@ -176,6 +178,7 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
         tuple(Arbiter(a.name, tuple(a.among), ArbitrationRule(a.by)) for a in record.arbiters),
         tuple(_property(p) for p in record.properties),
         record.description,
+        tuple(Expectation(name, Status(end)) for name, end in record.expected.items()),
     )
     try:
         return Net(*parts)
@@ -206,7 +209,7 @@ def _without_descriptions(data: dict[str, Any]) -> dict[str, Any]:
         if isinstance(value, list)
         else value
         for key, value in data.items()
-        if key != "description"
+        if key not in {"description", "expected"}
     }
 
 
@@ -342,3 +345,4 @@ class _NetRecord(_Record):
     transitions: list[_TransitionRecord]
     arbiters: list[_ArbiterRecord]
     properties: list[_PropertyRecord]
+    expected: dict[str, Literal["proved", "violated"]] = {}

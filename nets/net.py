@@ -25,6 +25,7 @@ from typing import Final
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula
 from firable.nets.temporal import Logic, Temporal
+from firable.nets.verdict import Expectation
 
 Marking = int
 """The set of places with a token; bit i is place i of the net."""
@@ -274,6 +275,7 @@ class Net:
     arbiters: tuple[Arbiter, ...] = ()
     properties: tuple[Property | TemporalProperty, ...] = ()
     description: str = field(default="", compare=False)
+    expected: tuple[Expectation, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         from firable.nets.well_formed import problems  # here, because the rules speak of the records above

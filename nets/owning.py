@@ -65,6 +65,7 @@ def with_owners(net: Net, owner_of: Mapping[str, str], controllers: Sequence[Con
         net.arbiters,
         tuple(_renamed(prop, named.__getitem__) for prop in net.properties),
         net.description,
+        net.expected,
     )
 
 

@@ -188,6 +188,10 @@ def _lines(net: Net) -> Iterator[str]:
         ((a.name, [("among", _list(a.among)), ("by", str(a.by))]) for a in net.arbiters),
     )
     yield from _table("properties", ((p.name, _property(p)) for p in net.properties))
+    if net.expected:
+        yield ""
+        yield "expect:"
+        yield from (f"  {_text(one.verdict)}: {one.status}" for one in net.expected)
 
 
 def _scope(net: Net, places: list[Place], inputs: list[Signal], prefix: str, indent: str) -> Iterator[str]:

@@ -56,6 +56,8 @@ def rule_of(verdict: Verdict) -> str:
     >>> rule_of(Verdict("loop.property.no_crash", Status.VIOLATED, "...", "explicit"))
     'F3022'
     """
+    if verdict.expected is not None and verdict.outcome is Status.VIOLATED:
+        return "F3024"
     if verdict.code:
         return verdict.code
     if verdict.status is Status.UNKNOWN:

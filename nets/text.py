@@ -58,6 +58,7 @@ from firable.nets.time_limits import (
     parse_time,
     timer_name,
 )
+from firable.nets.verdict import Expectation, Status
 from firable.nets.yaml_tree import Node, data, parse_tree
 
 SIZE_BYTES_MAX: Final = 16 * 1024 * 1024
@@ -164,7 +165,15 @@ class _Reading:
         )
         try:
             net = Net(
-                document.cell, places, transitions, signals, controllers, arbiters, properties, document.description
+                document.cell,
+                places,
+                transitions,
+                signals,
+                controllers,
+                arbiters,
+                properties,
+                document.description,
+                tuple(Expectation(name, Status(end)) for name, end in (document.expect or {}).items()),
             )
         except InputError as error:
             raise InputError(self.positions.place(self.problems + list(error.diagnostics))) from None

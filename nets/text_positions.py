@@ -145,6 +145,9 @@ class Positions:
                 for match in re.finditer(r"[^\s()\[\],\"]+", formula.text):
                     yield ("properties", name, match.group()), _Within(formula, match.start(), len(match.group()))
 
+        for name, key, _ in _entries(self.tree, "expect"):
+            yield ("expect", name), key
+
     def _scope(self, scope: Node, path: Subject, prefix: str) -> Iterator[tuple[Subject, _Found]]:
         for item in _names(scope, "start"):
             yield (*path, "start", item.text), item

@@ -9,7 +9,7 @@ or the names of the files an independent checker reads. The record lies in this 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from enum import StrEnum
 from typing import Any
@@ -62,7 +62,7 @@ class Verdict:
 
     `discipline` says how transitions fire, where the verdict depends on it: `interleaving` or `step`. `bound` says how
     far an UNKNOWN was looked at. `subjects` are the transitions or places concerned. `evidence` names
-    the files that an independent checker reads.
+    the files that an independent checker reads. `expected` is how the net file says that it ends.
     """
 
     name: str
@@ -78,11 +78,24 @@ class Verdict:
     evidence: tuple[str, ...] = ()
     cost: Cost = Cost()
     discipline: str = ""
+    expected: Status | None = None
 
     @property
     def holds(self) -> bool:
         """Whether the property is proved."""
         return self.status is Status.PROVED
+
+    @property
+    def matters(self) -> bool:
+        """Whether this verdict can fail the whole: it must hold, or the file says how it ends."""
+        return self.weight is Weight.REQUIRED or self.expected is not None
+
+    @property
+    def outcome(self) -> Status:
+        """What the verdict means for the whole: where the file expects one, whether it ended so."""
+        if self.expected is None or self.status is Status.UNKNOWN:
+            return self.status
+        return Status.PROVED if self.status is self.expected else Status.VIOLATED
 
     def to_json(self) -> dict[str, Any]:
         """The verdict as JSON data, without measured times; what is empty is left out."""
@@ -107,10 +120,49 @@ class Verdict:
                 "assignment": [[name, value] for name, value in self.witness.assignment],
                 "note": self.witness.note,
             }
+        if self.expected is not None:
+            data["expected"] = self.expected.value
         for key in ("markings", "edges"):
             if getattr(self.cost, key) is not None:
                 data[key] = getattr(self.cost, key)
         return data
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """How a net file says that one of the verdicts of `firable check` ends: proved or violated, and no change of it."""
+
+    verdict: str
+    status: Status
+
+
+def held_to(expected: Iterable[Expectation], verdicts: Iterable[Verdict]) -> tuple[Verdict, ...]:
+    """The verdicts, each with how the net file expects it to end.
+
+    Raises `InputError` F2030 for an expectation of a verdict that is none of them. Those of a cell with its machines
+    (`loop.*`, `fault.*`) and those of the net alone are never among each other, and wait for one another.
+    """
+    from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
+
+    known = {verdict.name: verdict for verdict in verdicts}
+    by_name = {one.verdict: one.status for one in expected}
+    with_machines = any(map(_of_machines, known))
+    unknown = [name for name in by_name if name not in known and _of_machines(name) is with_machines]
+    if unknown:
+        raise InputError(
+            Diagnostic(
+                "F2030",
+                f"`expect` names the verdict '{name}', which is none of this net",
+                did_you_mean(name, list(known)) + "write the name as `firable check` prints it",
+                ("expect", name),
+            )
+            for name in unknown
+        )
+    return tuple(replace(verdict, expected=by_name.get(name)) for name, verdict in known.items())
+
+
+def _of_machines(name: str) -> bool:
+    return name.startswith(("loop.", "fault."))
 
 
 def spelled(count: int) -> str:
@@ -123,8 +175,8 @@ def spelled(count: int) -> str:
 
 
 def overall(verdicts: Iterable[Verdict]) -> Status:
-    """The status of all required verdicts together: unknown never passes, and a violation outweighs it."""
-    statuses = {verdict.status for verdict in verdicts if verdict.weight is Weight.REQUIRED}
+    """The outcome of all verdicts that matter together: unknown never passes, and a violation outweighs it."""
+    statuses = {verdict.outcome for verdict in verdicts if verdict.matters}
     if Status.VIOLATED in statuses:
         return Status.VIOLATED
     return Status.UNKNOWN if Status.UNKNOWN in statuses else Status.PROVED

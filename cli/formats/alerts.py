@@ -35,11 +35,18 @@ class Alert:
 def alerts(report: Report) -> Iterator[Alert]:
     """The verdicts that are not proved and matter: what must hold and does not or is unknown, and warnings."""
     for verdict in report.verdicts:
-        if verdict.status is Status.PROVED or verdict.weight is Weight.INFORMATION:
-            continue
-        required = verdict.weight is Weight.REQUIRED
-        if required or verdict.status is Status.VIOLATED:
-            yield Alert(report, verdict, required)
+        if verdict.matters:
+            if verdict.outcome is not Status.PROVED:
+                yield Alert(report, verdict, is_error=True)
+        elif verdict.weight is Weight.WARNING and verdict.status is Status.VIOLATED:
+            yield Alert(report, verdict, is_error=False)
+
+
+def ending(verdict: Verdict) -> str:
+    """How an alerting verdict ended, in a word or two."""
+    if verdict.status is Status.UNKNOWN:
+        return "not decided"
+    return "violated" if verdict.expected is None else "changed"
 
 
 def place_of(report: Report, verdict: Verdict) -> Span | None:
@@ -47,6 +54,8 @@ def place_of(report: Report, verdict: Verdict) -> Span | None:
     positions = report.positions
     if positions is None:
         return None
+    if verdict.expected is not None and (span := positions.of("expect", verdict.name)):
+        return span
     family, _, rest = verdict.name.removeprefix("loop.").partition(".")
     if family == "property" and (span := positions.of("properties", rest)):
         return span

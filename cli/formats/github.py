@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from firable.cli.formats.alerts import alerts, place_of
+from firable.cli.formats.alerts import alerts, ending, place_of
 from firable.cli.report import Outcome
 from firable.cli.text import reasons
 from firable.nets.diagnostics import Diagnostic, Severity, Span
@@ -29,8 +29,7 @@ def _lines(outcome: Outcome) -> Iterator[str]:
         for alert in alerts(report):
             verdict = alert.verdict
             told = [f"{verdict.statement}", *reasons(report.net_of(verdict), verdict)]
-            word = "violated" if verdict.status.value == "violated" else "not decided"
-            title = f"{rule_of(verdict)} {verdict.name} {word}"
+            title = f"{rule_of(verdict)} {verdict.name} {ending(verdict)}"
             span = place_of(report, verdict)
             yield _annotation("error" if alert.is_error else "warning", span, report.input, title, "\n".join(told))
 

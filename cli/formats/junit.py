@@ -15,10 +15,11 @@ from typing import Final
 
 from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
+from firable.cli.formats.alerts import ending
 from firable.cli.report import Outcome, Report
 from firable.cli.text import reasons
 from firable.nets.rules import rule_of
-from firable.nets.verdict import Status, Verdict, Weight
+from firable.nets.verdict import Status, Verdict
 
 _NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -52,13 +53,12 @@ def _suite(command: str, report: Report) -> TestSuite:
 def _case(report: Report, verdict: Verdict, classname: str) -> TestCase:
     case = TestCase(_clean(verdict.name), _clean(classname))
     told = _clean("\n".join((verdict.statement, *reasons(report.net_of(verdict), verdict))))
-    if verdict.status is Status.PROVED:
+    if not verdict.matters or verdict.outcome is Status.PROVED:
+        if verdict.status is not Status.PROVED:
+            case.system_out = told
         return case
-    if verdict.weight is not Weight.REQUIRED:
-        case.system_out = told
-        return case
-    kind, word = (Failure, "violated") if verdict.status is Status.VIOLATED else (Error, "not decided")
-    result = kind(_clean(f"{word}: {verdict.statement}"), rule_of(verdict))
+    kind = Error if verdict.status is Status.UNKNOWN else Failure
+    result = kind(_clean(f"{ending(verdict)}: {verdict.statement}"), rule_of(verdict))
     result.text = told
     case.result = [result]
     return case

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
 
-from firable.cli.formats.alerts import Alert, alerts, place_of, place_of_name
+from firable.cli.formats.alerts import Alert, alerts, ending, place_of, place_of_name
 from firable.cli.report import ExitCode, Outcome, Report
 from firable.cli.text import reasons
 from firable.nets.diagnostics import CODES, Diagnostic, Severity, Span
@@ -97,7 +97,7 @@ def _result(alert: Alert) -> dict[str, Any]:
     report, verdict = alert.report, alert.verdict
     net = report.net_of(verdict)
     told = [line.strip() for line in reasons(net, verdict)]
-    word = {"violated": "violated", "unknown": "not decided"}[verdict.status.value]
+    word = ending(verdict)
     result: dict[str, Any] = {
         "ruleId": rule_of(verdict),
         "level": _LEVELS[alert.is_error],

@@ -228,9 +228,15 @@ def test_every_field_of_a_verdict_is_read_back() -> None:
         cost=Cost(3, 0),
         discipline="step",
     )
-    assert all(getattr(full, field.name) for field in fields(full))
+    assert {field.name for field in fields(full) if not getattr(full, field.name)} == {"expected"}
     bundle = replace(BUNDLE, verdicts=(*VERDICTS, full))
     assert Bundle.from_bytes(bundle.to_bytes()).verdicts[-1] == full
+
+
+def test_a_bundle_expects_no_violation() -> None:
+    known = Verdict("v", Status.VIOLATED, "it holds", "by hand", expected=Status.VIOLATED)
+    with pytest.raises(InputError):
+        Bundle.from_bytes(replace(BUNDLE, verdicts=(*VERDICTS, known)).to_bytes())
 
 
 def test_our_own_fault_is_not_called_a_damaged_bundle(monkeypatch: pytest.MonkeyPatch) -> None:
