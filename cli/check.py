@@ -19,6 +19,7 @@ from firable.cli.options import (
     budget,
     formats_option,
     load_net,
+    net_files,
     page_option,
     with_page,
     write_folder,
@@ -133,12 +134,13 @@ def check(
     Deadlock, contact, dead and live transitions, conflicts, gate races, commands, the properties that the file itself
     states, and queries in CTL, LTL and more (docs/queries.md). Each verdict is proved, violated (with a firing
     sequence, a shortest one where exploring found it) or unknown (with the bound reached); Ctrl-C ends the search and
-    shows what is known so far.
+    shows what is known so far. A folder stands for the net files (*.firable.yaml) below it.
 
     With --machines the external gates are no longer free: they open as the machines of the plant allow. What differs
     is shown side by side, and what a fault of each machine leads to.
     """
     allowed = budget(**limits)
+    nets = net_files(nets)
     if page is not None and len(nets) > 1:
         raise click.UsageError("--report is a page on one net: name one NET")
     if machines is not None:

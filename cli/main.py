@@ -20,6 +20,7 @@ from firable import __version__
 from firable.cli import (
     bundle,
     check,
+    ci,
     convert,
     draw,
     live_io,
@@ -89,6 +90,7 @@ for _command in (
     verify.verify,
     draw.draw,
     convert.convert,
+    ci.ci,
     schema.schema,
 ):
     firable.add_command(_command)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 CATALOGUE = "catalogue:"
+NET_FILE = ".firable.yaml"
 _MEBIBYTE = 2**20
 
 net_argument = click.argument("net", metavar="NET")
@@ -143,6 +144,24 @@ def load_net(argument: str) -> Loaded:
         raise click.UsageError(_not_in_catalogue(name)) from None
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+
+
+def net_files(arguments: Sequence[str]) -> tuple[str, ...]:
+    """The arguments, with every folder replaced by the net files below it, in the order of their names.
+
+    Folders whose names begin with a dot are left out. A folder without a net file stays, for its reader to refuse.
+    """
+    found: dict[str, None] = {}
+    for argument in arguments:
+        folder = Path(argument)
+        below = [] if argument.startswith(CATALOGUE) or not folder.is_dir() else sorted(folder.rglob(f"*{NET_FILE}"))
+        shown = [path for path in below if not _is_hidden(path.relative_to(folder)) and path.is_file()]
+        found |= dict.fromkeys(map(str, shown) if shown else [argument])
+    return tuple(found)
+
+
+def _is_hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts[:-1])
 
 
 def catalogue_file(argument: str, kind: str) -> Path:

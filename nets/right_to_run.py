@@ -53,7 +53,7 @@ def required_verdicts(decomposition: Decomposition) -> Iterator[str]:
     O8 where there are layers, ownership, M0, commands, and arbitration; and the theorem on the protocol.
     """
     net = decomposition.net
-    yield from _required_of_the_net(net)
+    yield from required_of_the_net(net)
     yield from (f"{equation}.{t.name}" for t in net.transitions for equation in ("eq7", "eq8", "o3"))
     yield from (f"eq9-10.{place.name}" for place in net.places)
     yield from (f"o2.{t.name}" for t in net.transitions if len(_owners(net, t)) > 1)
@@ -77,8 +77,8 @@ def _owners(net: Net, transition: Transition) -> set[str | None]:
     return {net.place(name).owner for name in places} | {net.signal(g.signal).owner for g in transition.external}
 
 
-def _required_of_the_net(net: Net) -> Iterator[str]:
-    """The verdicts on the central net, which depend on how transitions fire."""
+def required_of_the_net(net: Net) -> Iterator[str]:
+    """The names of the verdicts of `firable check` that must hold of a net, by which transitions fire one at a time."""
     yield from CHECKED
     yield from (f"property.{prop.name}" for prop in net.properties)
 
@@ -91,7 +91,7 @@ def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
     must bring what another solver can check; and the subnets must join into the very net.
     """
     problems = []
-    on_the_net = set(_required_of_the_net(bundle.net))
+    on_the_net = set(required_of_the_net(bundle.net))
     by_name: dict[str, list[Verdict]] = {}
     for verdict in bundle.verdicts:
         by_name.setdefault(verdict.name, []).append(verdict)
