@@ -70,6 +70,11 @@ class Decomposition:
     subnets: tuple[Net, ...]
     coordinated: tuple[Coordinated, ...]
     groups: tuple[ArbitrationGroup, ...]
+    free: tuple[tuple[str, str], ...] = ()
+    """The parts that are free of promise, as pairs of a transition and a controller: their yes stands until the firing.
+
+    A split names none. Who has proved the votes persistent may name those of which `firable.nets.knowledge` says that
+    they disturb nobody; who reads them demands both (`firable.nets.right_to_run`)."""
 
     @property
     def table(self) -> tuple[Coordinated, ...]:

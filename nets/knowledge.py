@@ -24,7 +24,7 @@ from typing import Any
 from firable.nets.contention import contentions
 from firable.nets.decomposition import Decomposition
 from firable.nets.layers import Layers
-from firable.nets.net import Net, Transition
+from firable.nets.net import Net, SignalKind, Transition
 
 
 class Because(StrEnum):
@@ -268,10 +268,11 @@ def _keeping(subnet: Net) -> Callable[[Transition], bool]:
     def keeps(part: Transition) -> bool:
         alone = all(takers[p] == 1 for p in part.inputs) and all(putters[p] == 1 for p in part.outputs)
         inputs = set(part.inputs)
-        return (
-            alone
-            and not shows_what_it_clears(part)
-            and all(gate.wanted and gate.signal in senders and senders[gate.signal] <= inputs for gate in part.external)
+        lasting = all(
+            # A timer falls by itself when its controller restarts, a completion never.
+            subnet.signal(gate.signal).kind is SignalKind.COMPLETION and gate.wanted and senders[gate.signal] <= inputs
+            for gate in part.external
         )
+        return alone and lasting and not shows_what_it_clears(part)
 
     return keeps

@@ -33,13 +33,16 @@ EXECUTED_BY: Final = "interleaving"
 CHECKED: Final = ("contact-free", "deadlock-free", "quasi-live", "conflicting-commands", "shared-completions")
 """The verdicts on every net, whatever its file states, without which it may not run."""
 
-_ADVANCES: Final = ("promise", "hear", "give-up", "restart", "apply", "release", "note", "close", "forget")
+_VOTING: Final = ("promise", "stand", "hear")
+_AFTER: Final = ("give-up", "restart", "apply", "apply-free", "release", "note", "close", "forget")
+_ADVANCES: Final = (*_VOTING, *_AFTER)
 PROTOCOL: Final = (
     "protocol.starts",
-    *(f"protocol.keeps.{action}" for action in ("ask", "promise", "hear", "decide", *_ADVANCES[2:], "fire", "sense")),
+    *(f"protocol.keeps.{action}" for action in ("ask", *_VOTING, "decide", *_AFTER, "fire", "sense", "sense-late")),
+    *("protocol.waits.enabled", "protocol.waits.promised", "protocol.persists.decide", "protocol.persists.fire"),
     *("protocol.follows.decide", "protocol.follows.fire", "protocol.rest", "protocol.once", "protocol.expected"),
-    *(f"protocol.home.{step}" for step in ("some", "give-up", "apply", "release", "note", "close")),
-    *(f"protocol.complete.{step}" for step in ("ask", "promise", "hear", "decide", "fire", "sense")),
+    *(f"protocol.home.{step}" for step in ("some", "give-up", "apply", "apply-free", "release", "note", "close")),
+    *(f"protocol.complete.{step}" for step in ("ask", *_VOTING, "decide", "fire", "sense")),
     *(f"protocol.advances.{action}" for action in _ADVANCES),
 )
 """The theorem on the protocol by which every net is executed (docs/protocol-invariant.md)."""

@@ -25,7 +25,8 @@ from the others, and the others from the order that comes late. `Persistence.fre
    that it clears by sending a command, unless that one needs an output place of it full: until the order comes, the
    signal still shows the completion of a command before, and the output place is empty.
 3. It asks no external gate but completions of commands on its own input places, which nothing at its controller can
-   send anew while the yes stands: a promise would hold these back (O4).
+   send anew while the yes stands: a promise would hold these back (O4). A timer is none: it falls when its controller
+   restarts, and the yes would be older than that.
 4. It belongs to a transition of its own: an order names its round, a round is asked anew only when the one before it
    has been acknowledged by all, and a vote of another round is not counted. The firing of the transition itself takes
    every yes of it back, and persistence says nothing of that.

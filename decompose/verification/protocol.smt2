@@ -4,7 +4,7 @@
 ; A relation with a number, as marked.1, is what a step makes of it; a definition with one speaks of these.
 ; To check it with another solver: cvc5 --incremental FILE, or z3 FILE; every name is followed by `unsat`.
 ; It can be decided, for functions and what depends on what go one way through the sorts:
-;   Place, Round, Coordinator, Transition, Controller.
+;   Place, Transition, Controller, Round, Coordinator.
 (set-logic UF)
 (declare-sort Place 0)
 (declare-sort Round 0)
@@ -22,12 +22,16 @@
 (declare-fun closed (Round) Bool)
 (declare-fun promised (Round Transition Controller) Bool)
 (declare-fun obeyed (Round Transition Controller) Bool)
+(declare-fun stands (Transition Controller) Bool)
 (declare-fun request (Round Transition Controller) Bool)
 (declare-fun vote (Round Transition Controller) Bool)
 (declare-fun commit-order (Round Transition Controller) Bool)
 (declare-fun abort-order (Round Transition Controller) Bool)
 (declare-fun acknowledgement (Round Transition Controller) Bool)
 (declare-fun coordinator-of (Round) Coordinator)
+(declare-fun decider (Transition) Coordinator)
+(declare-fun behind (Transition Transition Controller) Bool)
+(declare-fun lasting (Place) Bool)
 (declare-fun coordinated (Transition) Bool)
 (declare-fun input (Transition Place) Bool)
 (declare-fun output (Transition Place) Bool)
@@ -37,6 +41,8 @@
 (declare-fun takes-part (Transition Controller) Bool)
 (declare-fun owner (Place) Controller)
 (declare-fun home (Transition) Controller)
+(declare-fun free (Transition Controller) Bool)
+(declare-fun signal (Place) Bool)
 (define-fun reads ((t Transition) (p Place)) Bool
   (or (input t p) (output t p) (permissive t p) (inhibitive t p)))
 (define-fun writes ((t Transition) (p Place)) Bool
@@ -47,6 +53,26 @@
 (assert (forall ((u Transition) (q Place)) (=> (and (coordinated u) (touches u q)) (takes-part u (owner q)))))
 ; assumed of every net: a local transition moves and reads places of its home alone
 (assert (forall ((u Transition) (q Place)) (=> (and (not (coordinated u)) (touches u q)) (= (owner q) (home u)))))
+; assumed of every net: a part that is free of promise is one of a coordinated transition
+(assert (forall ((t Transition) (c Controller)) (=> (free t c) (and (coordinated t) (takes-part t c)))))
+; assumed of every net: no other transition takes an input of a free part, or reads it full
+(assert (forall ((t Transition) (c Controller) (p Place) (u Transition))
+  (=> (and (free t c) (= (owner p) c) (not (= t u)) (input t p)) (and (not (input u p)) (not (permissive u p))))))
+; assumed of every net: no other transition fills an output of a free part, or reads it empty
+(assert (forall ((t Transition) (c Controller) (p Place) (u Transition))
+  (=>
+    (and (free t c) (= (owner p) c) (not (= t u)) (output t p))
+    (and (not (output u p)) (not (inhibitive u p))))))
+; assumed of every net: who reads a signal that a free part clears needs a place full that it fills
+(assert (forall ((t Transition) (c Controller) (p Place) (u Transition))
+  (=> (and (free t c) (= (owner p) c) (not (= t u)) (clears t p) (reads u p)) (behind u t c))))
+; assumed of every net: what a command clears is a signal
+(assert (forall ((t Transition) (p Place)) (=> (clears t p) (signal p))))
+; assumed of every net: of signals a free part reads such alone, at 1, as fall by a command
+(assert (forall ((t Transition) (c Controller) (p Place))
+  (=>
+    (and (free t c) (= (owner p) c) (signal p))
+    (and (not (input t p)) (not (output t p)) (not (inhibitive t p)) (=> (permissive t p) (lasting p))))))
 ; invariant V1: a part with a vote stays promised until its order is obeyed
 (define-fun inv-V1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
@@ -71,7 +97,7 @@
 ; invariant V4: a committed part stays promised until it is applied
 (define-fun inv-V4 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (committed r t) (takes-part t c) (not (obeyed r t c))) (promised r t c))))
+    (=> (and (committed r t) (takes-part t c) (not (free t c)) (not (obeyed r t c))) (promised r t c))))
 ; invariant V5: a round commits one transition at most
 (define-fun inv-V5 () Bool
   (forall ((r Round) (t Transition) (u Transition)) (=> (and (committed r t) (committed r u)) (= t u))))
@@ -85,18 +111,43 @@
     (=>
       (not (exists ((r Round) (t Transition)) (and (committed r t) (not (obeyed r t (owner p))) (writes t p))))
       (= (marked p) (shadow p)))))
-; invariant asked: what is asked for is coordinated, in a round that is begun
+; invariant F1: while a vote stands, the part has its inputs full and its outputs empty in its subnet
+(define-fun inv-F1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=> (and (stands t c) (= (owner p) c)) (and (=> (input t p) (marked p)) (=> (output t p) (not (marked p)))))))
+; invariant F2: a standing vote that counts holds in the central net
+(define-fun underway ((r Round) (t Transition) (c Controller)) Bool
+  (and (committed r t) (free t c) (not (obeyed r t c))))
+(define-fun counts ((t Transition) (c Controller)) Bool
+  (and (stands t c) (not (exists ((s Round)) (underway s t c)))))
+(define-fun inv-F2 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (counts t c) (= (owner p) c))
+      (and
+        (=> (or (input t p) (permissive t p)) (shadow p))
+        (=> (or (output t p) (inhibitive t p)) (not (shadow p)))))))
+; invariant F3: a vote stands until the order is applied, one order at a time
+(define-fun inv-F3 () Bool
+  (forall ((r Round) (t Transition) (c Controller) (s Round))
+    (=> (underway r t c) (and (stands t c) (=> (underway s t c) (= r s))))))
+; invariant stands: votes stand of free parts alone
+(define-fun inv-stands () Bool
+  (forall ((t Transition) (c Controller)) (=> (stands t c) (free t c))))
+; invariant asked: what is asked for is coordinated, in a round of who decides it that is begun
 (define-fun inv-asked () Bool
-  (forall ((r Round) (t Transition)) (=> (asked r t) (and (begun r) (coordinated t)))))
+  (forall ((r Round) (t Transition))
+    (=> (asked r t) (and (begun r) (coordinated t) (= (coordinator-of r) (decider t))))))
 ; invariant decided: a round that is decided was begun
 (define-fun inv-decided () Bool
   (forall ((r Round)) (=> (decided r) (begun r))))
 ; invariant committed: what is committed was asked for, in a round that is decided
 (define-fun inv-committed () Bool
   (forall ((r Round) (t Transition)) (=> (committed r t) (and (decided r) (asked r t)))))
-; invariant request: requests go to those who take part in what is asked for
+; invariant request: requests go to those who have to promise a part of what is asked for
 (define-fun inv-request () Bool
-  (forall ((r Round) (t Transition) (c Controller)) (= (request r t c) (and (asked r t) (takes-part t c)))))
+  (forall ((r Round) (t Transition) (c Controller))
+    (= (request r t c) (and (asked r t) (takes-part t c) (not (free t c))))))
 ; invariant promised: a promise was requested, is voted for, and no order of it has been obeyed
 (define-fun inv-promised () Bool
   (forall ((r Round) (t Transition) (c Controller))
@@ -108,27 +159,27 @@
 (define-fun inv-commit-order () Bool
   (forall ((r Round) (t Transition) (c Controller))
     (= (commit-order r t c) (and (committed r t) (takes-part t c)))))
-; invariant abort-order: orders to abort are those of whatever else was asked for in a decided round
+; invariant abort-order: orders to abort are those of whatever else had to be promised in a decided round
 (define-fun inv-abort-order () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (= (abort-order r t c) (and (decided r) (asked r t) (not (committed r t)) (takes-part t c)))))
+    (= (abort-order r t c) (and (decided r) (asked r t) (not (committed r t)) (takes-part t c) (not (free t c))))))
 ; invariant obeyed: orders are obeyed in rounds that are decided
 (define-fun inv-obeyed () Bool
   (forall ((r Round) (t Transition) (c Controller)) (=> (obeyed r t c) (decided r))))
-; invariant acknowledgement: who takes part in what is asked for acknowledges what it has obeyed, and only that
+; invariant acknowledgement: who was asked, or ordered to commit, acknowledges what it has obeyed, and only that
 (define-fun inv-acknowledgement () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (= (acknowledgement r t c) (and (request r t c) (obeyed r t c)))))
+    (= (acknowledgement r t c) (and (or (request r t c) (commit-order r t c)) (obeyed r t c)))))
 ; invariant noted: what the coordinator notes was acknowledged
 (define-fun inv-noted () Bool
   (forall ((r Round) (t Transition) (c Controller)) (=> (noted r t c) (acknowledgement r t c))))
 ; invariant closed: a closed round is begun and decided
 (define-fun inv-closed () Bool
   (forall ((r Round)) (=> (closed r) (and (begun r) (decided r)))))
-; invariant closed-obeyed: in a closed round all have obeyed
-(define-fun inv-closed-obeyed () Bool
+; invariant closed-noted: in a closed round all have acknowledged
+(define-fun inv-closed-noted () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (closed r) (asked r t) (takes-part t c)) (obeyed r t c))))
+    (=> (and (closed r) (asked r t) (takes-part t c) (or (not (free t c)) (committed r t))) (noted r t c))))
 (define-fun invariant () Bool
   (and
     inv-V1
@@ -138,6 +189,10 @@
     inv-V5
     inv-S1
     inv-S2
+    inv-F1
+    inv-F2
+    inv-F3
+    inv-stands
     inv-asked
     inv-decided
     inv-committed
@@ -150,7 +205,7 @@
     inv-acknowledgement
     inv-noted
     inv-closed
-    inv-closed-obeyed))
+    inv-closed-noted))
 
 ; the invariant holds at the start
 (push 1)
@@ -178,6 +233,8 @@
 (assert (forall ((s Round) (u Transition) (d Controller)) (not (promised s u d))))
 ; given: nothing is obeyed
 (assert (forall ((s Round) (u Transition) (d Controller)) (not (obeyed s u d))))
+; given: nothing is stands
+(assert (forall ((u Transition) (d Controller)) (not (stands u d))))
 ; given: nothing is request
 (assert (forall ((s Round) (u Transition) (d Controller)) (not (request s u d))))
 ; given: nothing is vote
@@ -200,8 +257,13 @@
 (declare-const r Round)
 ; given: the invariant
 (assert invariant)
-; ask: the coordinator decides it
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; ask: it is coordinated
 (assert (coordinated t))
+; ask: the round is one of the coordinator that decides it
+(assert (= (coordinator-of r) (decider t)))
 ; ask: the round is not decided
 (assert (not (decided r)))
 ; begun after 'ask'
@@ -212,29 +274,33 @@
   (or (asked s u) (and (= s r) (= u t))))
 ; request after 'ask'
 (define-fun request.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (request s u d) (and (= s r) (= u t) (takes-part t d))))
+  (or (request s u d) (and (= s r) (= u t) (takes-part t d) (not (free t d)))))
 (define-fun inv-asked.1 () Bool
-  (forall ((r Round) (t Transition)) (=> (asked.1 r t) (and (begun.1 r) (coordinated t)))))
+  (forall ((r Round) (t Transition))
+    (=> (asked.1 r t) (and (begun.1 r) (coordinated t) (= (coordinator-of r) (decider t))))))
 (define-fun inv-decided.1 () Bool
   (forall ((r Round)) (=> (decided r) (begun.1 r))))
 (define-fun inv-committed.1 () Bool
   (forall ((r Round) (t Transition)) (=> (committed r t) (and (decided r) (asked.1 r t)))))
 (define-fun inv-request.1 () Bool
-  (forall ((r Round) (t Transition) (c Controller)) (= (request.1 r t c) (and (asked.1 r t) (takes-part t c)))))
+  (forall ((r Round) (t Transition) (c Controller))
+    (= (request.1 r t c) (and (asked.1 r t) (takes-part t c) (not (free t c))))))
 (define-fun inv-promised.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
     (=> (promised r t c) (and (request.1 r t c) (vote r t c) (not (obeyed r t c))))))
 (define-fun inv-abort-order.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (= (abort-order r t c) (and (decided r) (asked.1 r t) (not (committed r t)) (takes-part t c)))))
+    (=
+      (abort-order r t c)
+      (and (decided r) (asked.1 r t) (not (committed r t)) (takes-part t c) (not (free t c))))))
 (define-fun inv-acknowledgement.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (= (acknowledgement r t c) (and (request.1 r t c) (obeyed r t c)))))
+    (= (acknowledgement r t c) (and (or (request.1 r t c) (commit-order r t c)) (obeyed r t c)))))
 (define-fun inv-closed.1 () Bool
   (forall ((r Round)) (=> (closed r) (and (begun.1 r) (decided r)))))
-(define-fun inv-closed-obeyed.1 () Bool
+(define-fun inv-closed-noted.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (closed r) (asked.1 r t) (takes-part t c)) (obeyed r t c))))
+    (=> (and (closed r) (asked.1 r t) (takes-part t c) (or (not (free t c)) (committed r t))) (noted r t c))))
 (define-fun invariant.1 () Bool
   (and
     inv-V1
@@ -244,6 +310,10 @@
     inv-V5
     inv-S1
     inv-S2
+    inv-F1
+    inv-F2
+    inv-F3
+    inv-stands
     inv-asked.1
     inv-decided.1
     inv-committed.1
@@ -256,7 +326,7 @@
     inv-acknowledgement.1
     inv-noted
     inv-closed.1
-    inv-closed-obeyed.1))
+    inv-closed-noted.1))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -265,11 +335,16 @@
 ; 'promise' keeps the invariant
 (push 1)
 (echo "protocol.keeps.promise")
-(declare-const r Round)
-(declare-const t Transition)
 (declare-const c Controller)
+(declare-const t Transition)
+(declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; given: 'promise' waits for no place that a free part fills whose vote stands (waits.enabled)
+(assert (forall ((u Transition)) (=> (stands u c) (not (behind t u c)))))
 ; promise: a request of the round has arrived
 (assert (request r t c))
 ; promise: no order of the round has been obeyed
@@ -298,7 +373,7 @@
     (=> (and (promised.1 r t c) (promised.1 s u c) (not (= r s)) (= (owner p) c)) (not (disturb-at t u p)))))
 (define-fun inv-V4.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (committed r t) (takes-part t c) (not (obeyed r t c))) (promised.1 r t c))))
+    (=> (and (committed r t) (takes-part t c) (not (free t c)) (not (obeyed r t c))) (promised.1 r t c))))
 (define-fun inv-promised.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
     (=> (promised.1 r t c) (and (request r t c) (vote.1 r t c) (not (obeyed r t c))))))
@@ -313,6 +388,10 @@
     inv-V5
     inv-S1
     inv-S2
+    inv-F1
+    inv-F2
+    inv-F3
+    inv-stands
     inv-asked
     inv-decided
     inv-committed
@@ -325,7 +404,79 @@
     inv-acknowledgement
     inv-noted
     inv-closed
-    inv-closed-obeyed))
+    inv-closed-noted))
+; and what is to be shown does not hold
+(assert (not invariant.1))
+(check-sat)
+(pop 1)
+
+; 'stand' keeps the invariant
+(push 1)
+(echo "protocol.keeps.stand")
+(declare-const c Controller)
+(declare-const t Transition)
+; given: the invariant
+(assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; given: 'stand' waits for no place that a free part fills whose vote stands (waits.enabled)
+(assert (forall ((u Transition)) (=> (stands u c) (not (behind t u c)))))
+; stand: the part is free of promise
+(assert (free t c))
+; stand: the part is enabled in the subnet
+(assert (part-enabled t c))
+(define-fun undisturbed-locally ((t Transition) (c Controller)) Bool
+  (forall ((s Round) (u Transition) (q Place))
+    (=> (and (promised s u c) (= (owner q) c)) (not (disturb-at t u q)))))
+; stand: no promise is disturbed (O1)
+(assert (undisturbed-locally t c))
+; stands after 'stand'
+(define-fun stands.1 ((u Transition) (d Controller)) Bool
+  (or (stands u d) (and (= u t) (= d c))))
+(define-fun inv-F1.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=> (and (stands.1 t c) (= (owner p) c)) (and (=> (input t p) (marked p)) (=> (output t p) (not (marked p)))))))
+(define-fun counts.1 ((t Transition) (c Controller)) Bool
+  (and (stands.1 t c) (not (exists ((s Round)) (underway s t c)))))
+(define-fun inv-F2.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (counts.1 t c) (= (owner p) c))
+      (and
+        (=> (or (input t p) (permissive t p)) (shadow p))
+        (=> (or (output t p) (inhibitive t p)) (not (shadow p)))))))
+(define-fun inv-F3.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller) (s Round))
+    (=> (underway r t c) (and (stands.1 t c) (=> (underway s t c) (= r s))))))
+(define-fun inv-stands.1 () Bool
+  (forall ((t Transition) (c Controller)) (=> (stands.1 t c) (free t c))))
+(define-fun invariant.1 () Bool
+  (and
+    inv-V1
+    inv-V2
+    inv-V3
+    inv-V4
+    inv-V5
+    inv-S1
+    inv-S2
+    inv-F1.1
+    inv-F2.1
+    inv-F3.1
+    inv-stands.1
+    inv-asked
+    inv-decided
+    inv-committed
+    inv-request
+    inv-promised
+    inv-heard
+    inv-commit-order
+    inv-abort-order
+    inv-obeyed
+    inv-acknowledgement
+    inv-noted
+    inv-closed
+    inv-closed-noted))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -339,6 +490,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; hear: a vote of the round has arrived
 (assert (vote r t c))
 ; heard after 'hear'
@@ -355,6 +509,10 @@
     inv-V5
     inv-S1
     inv-S2
+    inv-F1
+    inv-F2
+    inv-F3
+    inv-stands
     inv-asked
     inv-decided
     inv-committed
@@ -367,7 +525,7 @@
     inv-acknowledgement
     inv-noted
     inv-closed
-    inv-closed-obeyed))
+    inv-closed-noted))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -376,16 +534,31 @@
 ; 'decide' keeps the invariant
 (push 1)
 (echo "protocol.keeps.decide")
-(declare-const r Round)
 (declare-const t Transition)
+(declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+(define-fun falsifies-at ((t Transition) (u Transition) (p Place)) Bool
+  (or
+    (and (or (input t p) (clears t p)) (or (input u p) (permissive u p)))
+    (and (output t p) (or (output u p) (inhibitive u p)))))
+; given: 'decide' takes no standing vote back (persists.decide)
+(assert (forall ((u Transition) (d Controller) (q Place))
+  (=> (and (counts u d) (not (= u t)) (= (owner q) d)) (not (falsifies-at t u q)))))
 ; decide: the round asks for it
 (assert (asked r t))
 ; decide: the round is not decided
 (assert (not (decided r)))
-; decide: all who take part have voted yes
-(assert (forall ((d Controller)) (=> (takes-part t d) (heard r t d))))
+; decide: all who have to promise have voted yes
+(assert (forall ((d Controller)) (=> (and (takes-part t d) (not (free t d))) (heard r t d))))
+; decide: the votes of free parts stand
+(assert (forall ((d Controller)) (=> (free t d) (stands t d))))
+; decide: no earlier order of it to a free part is unacknowledged
+(assert (forall ((s Round) (d Controller))
+  (=> (and (free t d) (committed s t) (= (coordinator-of s) (coordinator-of r))) (noted s t d))))
 ; decided after 'decide'
 (define-fun decided.1 ((s Round)) Bool
   (or (decided s) (= s r)))
@@ -397,7 +570,7 @@
   (or (commit-order s u d) (and (= s r) (= u t) (takes-part t d))))
 ; abort-order after 'decide'
 (define-fun abort-order.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (abort-order s u d) (and (= s r) (asked r u) (not (= u t)) (takes-part u d))))
+  (or (abort-order s u d) (and (= s r) (asked r u) (not (= u t)) (takes-part u d) (not (free u d)))))
 ; shadow after 'decide'
 (define-fun shadow.1 ((q Place)) Bool
   (or (output t q) (and (shadow q) (not (input t q)) (not (clears t q)))))
@@ -406,7 +579,7 @@
     (=> (and (promised r t c) (or (not (decided.1 r)) (committed.1 r t))) (part-enabled t c))))
 (define-fun inv-V4.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (committed.1 r t) (takes-part t c) (not (obeyed r t c))) (promised r t c))))
+    (=> (and (committed.1 r t) (takes-part t c) (not (free t c)) (not (obeyed r t c))) (promised r t c))))
 (define-fun inv-V5.1 () Bool
   (forall ((r Round) (t Transition) (u Transition)) (=> (and (committed.1 r t) (committed.1 r u)) (= t u))))
 (define-fun inv-S1.1 () Bool
@@ -417,6 +590,20 @@
     (=>
       (not (exists ((r Round) (t Transition)) (and (committed.1 r t) (not (obeyed r t (owner p))) (writes t p))))
       (= (marked p) (shadow.1 p)))))
+(define-fun underway.1 ((r Round) (t Transition) (c Controller)) Bool
+  (and (committed.1 r t) (free t c) (not (obeyed r t c))))
+(define-fun counts.1 ((t Transition) (c Controller)) Bool
+  (and (stands t c) (not (exists ((s Round)) (underway.1 s t c)))))
+(define-fun inv-F2.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (counts.1 t c) (= (owner p) c))
+      (and
+        (=> (or (input t p) (permissive t p)) (shadow.1 p))
+        (=> (or (output t p) (inhibitive t p)) (not (shadow.1 p)))))))
+(define-fun inv-F3.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller) (s Round))
+    (=> (underway.1 r t c) (and (stands t c) (=> (underway.1 s t c) (= r s))))))
 (define-fun inv-decided.1 () Bool
   (forall ((r Round)) (=> (decided.1 r) (begun r))))
 (define-fun inv-committed.1 () Bool
@@ -426,11 +613,19 @@
     (= (commit-order.1 r t c) (and (committed.1 r t) (takes-part t c)))))
 (define-fun inv-abort-order.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (= (abort-order.1 r t c) (and (decided.1 r) (asked r t) (not (committed.1 r t)) (takes-part t c)))))
+    (=
+      (abort-order.1 r t c)
+      (and (decided.1 r) (asked r t) (not (committed.1 r t)) (takes-part t c) (not (free t c))))))
 (define-fun inv-obeyed.1 () Bool
   (forall ((r Round) (t Transition) (c Controller)) (=> (obeyed r t c) (decided.1 r))))
+(define-fun inv-acknowledgement.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller))
+    (= (acknowledgement r t c) (and (or (request r t c) (commit-order.1 r t c)) (obeyed r t c)))))
 (define-fun inv-closed.1 () Bool
   (forall ((r Round)) (=> (closed r) (and (begun r) (decided.1 r)))))
+(define-fun inv-closed-noted.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller))
+    (=> (and (closed r) (asked r t) (takes-part t c) (or (not (free t c)) (committed.1 r t))) (noted r t c))))
 (define-fun invariant.1 () Bool
   (and
     inv-V1
@@ -440,6 +635,10 @@
     inv-V5.1
     inv-S1.1
     inv-S2.1
+    inv-F1
+    inv-F2.1
+    inv-F3.1
+    inv-stands
     inv-asked
     inv-decided.1
     inv-committed.1
@@ -449,10 +648,10 @@
     inv-commit-order.1
     inv-abort-order.1
     inv-obeyed.1
-    inv-acknowledgement
+    inv-acknowledgement.1
     inv-noted
     inv-closed.1
-    inv-closed-obeyed))
+    inv-closed-noted.1))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -464,6 +663,9 @@
 (declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; give-up: the round is begun
 (assert (begun r))
 ; give-up: the round is not decided
@@ -473,7 +675,7 @@
   (or (decided s) (= s r)))
 ; abort-order after 'give-up'
 (define-fun abort-order.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (abort-order s u d) (and (= s r) (asked r u) (takes-part u d))))
+  (or (abort-order s u d) (and (= s r) (asked r u) (takes-part u d) (not (free u d)))))
 (define-fun inv-V2.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
     (=> (and (promised r t c) (or (not (decided.1 r)) (committed r t))) (part-enabled t c))))
@@ -483,7 +685,9 @@
   (forall ((r Round) (t Transition)) (=> (committed r t) (and (decided.1 r) (asked r t)))))
 (define-fun inv-abort-order.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (= (abort-order.1 r t c) (and (decided.1 r) (asked r t) (not (committed r t)) (takes-part t c)))))
+    (=
+      (abort-order.1 r t c)
+      (and (decided.1 r) (asked r t) (not (committed r t)) (takes-part t c) (not (free t c))))))
 (define-fun inv-obeyed.1 () Bool
   (forall ((r Round) (t Transition) (c Controller)) (=> (obeyed r t c) (decided.1 r))))
 (define-fun inv-closed.1 () Bool
@@ -497,6 +701,10 @@
     inv-V5
     inv-S1
     inv-S2
+    inv-F1
+    inv-F2
+    inv-F3
+    inv-stands
     inv-asked
     inv-decided.1
     inv-committed.1
@@ -509,7 +717,7 @@
     inv-acknowledgement
     inv-noted
     inv-closed.1
-    inv-closed-obeyed))
+    inv-closed-noted))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -521,12 +729,17 @@
 (declare-const k Coordinator)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; decided after 'restart'
 (define-fun decided.1 ((s Round)) Bool
   (or (decided s) (and (begun s) (= (coordinator-of s) k))))
 ; abort-order after 'restart'
 (define-fun abort-order.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (abort-order s u d) (and (asked s u) (takes-part u d) (not (decided s)) (= (coordinator-of s) k))))
+  (or
+    (abort-order s u d)
+    (and (asked s u) (takes-part u d) (not (free u d)) (not (decided s)) (= (coordinator-of s) k))))
 (define-fun inv-V2.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
     (=> (and (promised r t c) (or (not (decided.1 r)) (committed r t))) (part-enabled t c))))
@@ -536,7 +749,9 @@
   (forall ((r Round) (t Transition)) (=> (committed r t) (and (decided.1 r) (asked r t)))))
 (define-fun inv-abort-order.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (= (abort-order.1 r t c) (and (decided.1 r) (asked r t) (not (committed r t)) (takes-part t c)))))
+    (=
+      (abort-order.1 r t c)
+      (and (decided.1 r) (asked r t) (not (committed r t)) (takes-part t c) (not (free t c))))))
 (define-fun inv-obeyed.1 () Bool
   (forall ((r Round) (t Transition) (c Controller)) (=> (obeyed r t c) (decided.1 r))))
 (define-fun inv-closed.1 () Bool
@@ -550,6 +765,10 @@
     inv-V5
     inv-S1
     inv-S2
+    inv-F1
+    inv-F2
+    inv-F3
+    inv-stands
     inv-asked
     inv-decided.1
     inv-committed.1
@@ -562,7 +781,7 @@
     inv-acknowledgement
     inv-noted
     inv-closed.1
-    inv-closed-obeyed))
+    inv-closed-noted))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -576,6 +795,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; apply: the order to commit has arrived
 (assert (commit-order r t c))
 ; apply: it is promised
@@ -612,7 +834,7 @@
     (=> (and (promised.1 r t c) (promised.1 s u c) (not (= r s)) (= (owner p) c)) (not (disturb-at t u p)))))
 (define-fun inv-V4.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (committed r t) (takes-part t c) (not (obeyed.1 r t c))) (promised.1 r t c))))
+    (=> (and (committed r t) (takes-part t c) (not (free t c)) (not (obeyed.1 r t c))) (promised.1 r t c))))
 (define-fun inv-S1.1 () Bool
   (forall ((r Round) (t Transition) (p Place))
     (=> (and (committed r t) (not (obeyed.1 r t (owner p))) (writes t p)) (= (shadow p) (output t p)))))
@@ -621,6 +843,25 @@
     (=>
       (not (exists ((r Round) (t Transition)) (and (committed r t) (not (obeyed.1 r t (owner p))) (writes t p))))
       (= (marked.1 p) (shadow p)))))
+(define-fun inv-F1.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (stands t c) (= (owner p) c))
+      (and (=> (input t p) (marked.1 p)) (=> (output t p) (not (marked.1 p)))))))
+(define-fun underway.1 ((r Round) (t Transition) (c Controller)) Bool
+  (and (committed r t) (free t c) (not (obeyed.1 r t c))))
+(define-fun counts.1 ((t Transition) (c Controller)) Bool
+  (and (stands t c) (not (exists ((s Round)) (underway.1 s t c)))))
+(define-fun inv-F2.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (counts.1 t c) (= (owner p) c))
+      (and
+        (=> (or (input t p) (permissive t p)) (shadow p))
+        (=> (or (output t p) (inhibitive t p)) (not (shadow p)))))))
+(define-fun inv-F3.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller) (s Round))
+    (=> (underway.1 r t c) (and (stands t c) (=> (underway.1 s t c) (= r s))))))
 (define-fun inv-promised.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
     (=> (promised.1 r t c) (and (request r t c) (vote r t c) (not (obeyed.1 r t c))))))
@@ -628,12 +869,9 @@
   (forall ((r Round) (t Transition) (c Controller)) (=> (obeyed.1 r t c) (decided r))))
 (define-fun inv-acknowledgement.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (= (acknowledgement.1 r t c) (and (request r t c) (obeyed.1 r t c)))))
+    (= (acknowledgement.1 r t c) (and (or (request r t c) (commit-order r t c)) (obeyed.1 r t c)))))
 (define-fun inv-noted.1 () Bool
   (forall ((r Round) (t Transition) (c Controller)) (=> (noted r t c) (acknowledgement.1 r t c))))
-(define-fun inv-closed-obeyed.1 () Bool
-  (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (closed r) (asked r t) (takes-part t c)) (obeyed.1 r t c))))
 (define-fun invariant.1 () Bool
   (and
     inv-V1.1
@@ -643,6 +881,10 @@
     inv-V5
     inv-S1.1
     inv-S2.1
+    inv-F1.1
+    inv-F2.1
+    inv-F3.1
+    inv-stands
     inv-asked
     inv-decided
     inv-committed
@@ -655,7 +897,124 @@
     inv-acknowledgement.1
     inv-noted.1
     inv-closed
-    inv-closed-obeyed.1))
+    inv-closed-noted))
+; and what is to be shown does not hold
+(assert (not invariant.1))
+(check-sat)
+(pop 1)
+
+; 'apply-free' keeps the invariant
+(push 1)
+(echo "protocol.keeps.apply-free")
+(declare-const r Round)
+(declare-const t Transition)
+(declare-const c Controller)
+; given: the invariant
+(assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; apply-free: the order to commit has arrived
+(assert (commit-order r t c))
+; apply-free: the part is free of promise
+(assert (free t c))
+; apply-free: no order of the round has been obeyed
+(assert (not (obeyed r t c)))
+; marked after 'apply-free'
+(define-fun marked.1 ((q Place)) Bool
+  (or
+    (and (= (owner q) c) (or (output t q) (and (marked q) (not (input t q)) (not (clears t q)))))
+    (and (not (= (owner q) c)) (marked q))))
+; stands after 'apply-free'
+(define-fun stands.1 ((u Transition) (d Controller)) Bool
+  (and (stands u d) (not (and (= u t) (= d c)))))
+; obeyed after 'apply-free'
+(define-fun obeyed.1 ((s Round) (u Transition) (d Controller)) Bool
+  (or (obeyed s u d) (and (= s r) (= u t) (= d c))))
+; acknowledgement after 'apply-free'
+(define-fun acknowledgement.1 ((s Round) (u Transition) (d Controller)) Bool
+  (or (acknowledgement s u d) (and (= s r) (= u t) (= d c))))
+(define-fun inv-V1.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller))
+    (=> (and (vote r t c) (not (obeyed.1 r t c))) (promised r t c))))
+(define-fun part-enabled.1 ((t Transition) (c Controller)) Bool
+  (forall ((q Place))
+    (=>
+      (= (owner q) c)
+      (and
+        (=> (or (input t q) (permissive t q)) (marked.1 q))
+        (=> (or (output t q) (inhibitive t q)) (not (marked.1 q)))))))
+(define-fun inv-V2.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller))
+    (=> (and (promised r t c) (or (not (decided r)) (committed r t))) (part-enabled.1 t c))))
+(define-fun inv-V4.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller))
+    (=> (and (committed r t) (takes-part t c) (not (free t c)) (not (obeyed.1 r t c))) (promised r t c))))
+(define-fun inv-S1.1 () Bool
+  (forall ((r Round) (t Transition) (p Place))
+    (=> (and (committed r t) (not (obeyed.1 r t (owner p))) (writes t p)) (= (shadow p) (output t p)))))
+(define-fun inv-S2.1 () Bool
+  (forall ((p Place))
+    (=>
+      (not (exists ((r Round) (t Transition)) (and (committed r t) (not (obeyed.1 r t (owner p))) (writes t p))))
+      (= (marked.1 p) (shadow p)))))
+(define-fun inv-F1.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (stands.1 t c) (= (owner p) c))
+      (and (=> (input t p) (marked.1 p)) (=> (output t p) (not (marked.1 p)))))))
+(define-fun underway.1 ((r Round) (t Transition) (c Controller)) Bool
+  (and (committed r t) (free t c) (not (obeyed.1 r t c))))
+(define-fun counts.1 ((t Transition) (c Controller)) Bool
+  (and (stands.1 t c) (not (exists ((s Round)) (underway.1 s t c)))))
+(define-fun inv-F2.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (counts.1 t c) (= (owner p) c))
+      (and
+        (=> (or (input t p) (permissive t p)) (shadow p))
+        (=> (or (output t p) (inhibitive t p)) (not (shadow p)))))))
+(define-fun inv-F3.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller) (s Round))
+    (=> (underway.1 r t c) (and (stands.1 t c) (=> (underway.1 s t c) (= r s))))))
+(define-fun inv-stands.1 () Bool
+  (forall ((t Transition) (c Controller)) (=> (stands.1 t c) (free t c))))
+(define-fun inv-promised.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller))
+    (=> (promised r t c) (and (request r t c) (vote r t c) (not (obeyed.1 r t c))))))
+(define-fun inv-obeyed.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller)) (=> (obeyed.1 r t c) (decided r))))
+(define-fun inv-acknowledgement.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller))
+    (= (acknowledgement.1 r t c) (and (or (request r t c) (commit-order r t c)) (obeyed.1 r t c)))))
+(define-fun inv-noted.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller)) (=> (noted r t c) (acknowledgement.1 r t c))))
+(define-fun invariant.1 () Bool
+  (and
+    inv-V1.1
+    inv-V2.1
+    inv-V3
+    inv-V4.1
+    inv-V5
+    inv-S1.1
+    inv-S2.1
+    inv-F1.1
+    inv-F2.1
+    inv-F3.1
+    inv-stands.1
+    inv-asked
+    inv-decided
+    inv-committed
+    inv-request
+    inv-promised.1
+    inv-heard
+    inv-commit-order
+    inv-abort-order
+    inv-obeyed.1
+    inv-acknowledgement.1
+    inv-noted.1
+    inv-closed
+    inv-closed-noted))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -669,6 +1028,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; release: the order to abort has arrived
 (assert (abort-order r t c))
 ; promised after 'release'
@@ -691,7 +1053,7 @@
     (=> (and (promised.1 r t c) (promised.1 s u c) (not (= r s)) (= (owner p) c)) (not (disturb-at t u p)))))
 (define-fun inv-V4.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (committed r t) (takes-part t c) (not (obeyed.1 r t c))) (promised.1 r t c))))
+    (=> (and (committed r t) (takes-part t c) (not (free t c)) (not (obeyed.1 r t c))) (promised.1 r t c))))
 (define-fun inv-S1.1 () Bool
   (forall ((r Round) (t Transition) (p Place))
     (=> (and (committed r t) (not (obeyed.1 r t (owner p))) (writes t p)) (= (shadow p) (output t p)))))
@@ -700,6 +1062,20 @@
     (=>
       (not (exists ((r Round) (t Transition)) (and (committed r t) (not (obeyed.1 r t (owner p))) (writes t p))))
       (= (marked p) (shadow p)))))
+(define-fun underway.1 ((r Round) (t Transition) (c Controller)) Bool
+  (and (committed r t) (free t c) (not (obeyed.1 r t c))))
+(define-fun counts.1 ((t Transition) (c Controller)) Bool
+  (and (stands t c) (not (exists ((s Round)) (underway.1 s t c)))))
+(define-fun inv-F2.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (counts.1 t c) (= (owner p) c))
+      (and
+        (=> (or (input t p) (permissive t p)) (shadow p))
+        (=> (or (output t p) (inhibitive t p)) (not (shadow p)))))))
+(define-fun inv-F3.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller) (s Round))
+    (=> (underway.1 r t c) (and (stands t c) (=> (underway.1 s t c) (= r s))))))
 (define-fun inv-promised.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
     (=> (promised.1 r t c) (and (request r t c) (vote r t c) (not (obeyed.1 r t c))))))
@@ -707,12 +1083,9 @@
   (forall ((r Round) (t Transition) (c Controller)) (=> (obeyed.1 r t c) (decided r))))
 (define-fun inv-acknowledgement.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (= (acknowledgement.1 r t c) (and (request r t c) (obeyed.1 r t c)))))
+    (= (acknowledgement.1 r t c) (and (or (request r t c) (commit-order r t c)) (obeyed.1 r t c)))))
 (define-fun inv-noted.1 () Bool
   (forall ((r Round) (t Transition) (c Controller)) (=> (noted r t c) (acknowledgement.1 r t c))))
-(define-fun inv-closed-obeyed.1 () Bool
-  (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (closed r) (asked r t) (takes-part t c)) (obeyed.1 r t c))))
 (define-fun invariant.1 () Bool
   (and
     inv-V1.1
@@ -722,6 +1095,10 @@
     inv-V5
     inv-S1.1
     inv-S2.1
+    inv-F1
+    inv-F2.1
+    inv-F3.1
+    inv-stands
     inv-asked
     inv-decided
     inv-committed
@@ -734,7 +1111,7 @@
     inv-acknowledgement.1
     inv-noted.1
     inv-closed
-    inv-closed-obeyed.1))
+    inv-closed-noted))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -748,6 +1125,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; note: an acknowledgement of the round has arrived
 (assert (acknowledgement r t c))
 ; noted after 'note'
@@ -755,6 +1135,9 @@
   (or (noted s u d) (and (= s r) (= u t) (= d c))))
 (define-fun inv-noted.1 () Bool
   (forall ((r Round) (t Transition) (c Controller)) (=> (noted.1 r t c) (acknowledgement r t c))))
+(define-fun inv-closed-noted.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller))
+    (=> (and (closed r) (asked r t) (takes-part t c) (or (not (free t c)) (committed r t))) (noted.1 r t c))))
 (define-fun invariant.1 () Bool
   (and
     inv-V1
@@ -764,6 +1147,10 @@
     inv-V5
     inv-S1
     inv-S2
+    inv-F1
+    inv-F2
+    inv-F3
+    inv-stands
     inv-asked
     inv-decided
     inv-committed
@@ -776,7 +1163,7 @@
     inv-acknowledgement
     inv-noted.1
     inv-closed
-    inv-closed-obeyed))
+    inv-closed-noted.1))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -788,18 +1175,22 @@
 (declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; close: the round is decided
 (assert (decided r))
-; close: all who were asked have obeyed
-(assert (forall ((u Transition) (d Controller)) (=> (and (asked r u) (takes-part u d)) (noted r u d))))
+; close: all who got an order have obeyed
+(assert (forall ((u Transition) (d Controller))
+  (=> (and (asked r u) (takes-part u d) (or (not (free u d)) (committed r u))) (noted r u d))))
 ; closed after 'close'
 (define-fun closed.1 ((s Round)) Bool
   (or (closed s) (= s r)))
 (define-fun inv-closed.1 () Bool
   (forall ((r Round)) (=> (closed.1 r) (and (begun r) (decided r)))))
-(define-fun inv-closed-obeyed.1 () Bool
+(define-fun inv-closed-noted.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (closed.1 r) (asked r t) (takes-part t c)) (obeyed r t c))))
+    (=> (and (closed.1 r) (asked r t) (takes-part t c) (or (not (free t c)) (committed r t))) (noted r t c))))
 (define-fun invariant.1 () Bool
   (and
     inv-V1
@@ -809,6 +1200,10 @@
     inv-V5
     inv-S1
     inv-S2
+    inv-F1
+    inv-F2
+    inv-F3
+    inv-stands
     inv-asked
     inv-decided
     inv-committed
@@ -821,7 +1216,7 @@
     inv-acknowledgement
     inv-noted
     inv-closed.1
-    inv-closed-obeyed.1))
+    inv-closed-noted.1))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -834,6 +1229,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; forget: a message says that the round is closed
 (assert (closed r))
 ; obeyed after 'forget'
@@ -844,7 +1242,7 @@
     (=> (and (vote r t c) (not (obeyed.1 r t c))) (promised r t c))))
 (define-fun inv-V4.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (committed r t) (takes-part t c) (not (obeyed.1 r t c))) (promised r t c))))
+    (=> (and (committed r t) (takes-part t c) (not (free t c)) (not (obeyed.1 r t c))) (promised r t c))))
 (define-fun inv-S1.1 () Bool
   (forall ((r Round) (t Transition) (p Place))
     (=> (and (committed r t) (not (obeyed.1 r t (owner p))) (writes t p)) (= (shadow p) (output t p)))))
@@ -853,6 +1251,20 @@
     (=>
       (not (exists ((r Round) (t Transition)) (and (committed r t) (not (obeyed.1 r t (owner p))) (writes t p))))
       (= (marked p) (shadow p)))))
+(define-fun underway.1 ((r Round) (t Transition) (c Controller)) Bool
+  (and (committed r t) (free t c) (not (obeyed.1 r t c))))
+(define-fun counts.1 ((t Transition) (c Controller)) Bool
+  (and (stands t c) (not (exists ((s Round)) (underway.1 s t c)))))
+(define-fun inv-F2.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (counts.1 t c) (= (owner p) c))
+      (and
+        (=> (or (input t p) (permissive t p)) (shadow p))
+        (=> (or (output t p) (inhibitive t p)) (not (shadow p)))))))
+(define-fun inv-F3.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller) (s Round))
+    (=> (underway.1 r t c) (and (stands t c) (=> (underway.1 s t c) (= r s))))))
 (define-fun inv-promised.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
     (=> (promised r t c) (and (request r t c) (vote r t c) (not (obeyed.1 r t c))))))
@@ -860,10 +1272,7 @@
   (forall ((r Round) (t Transition) (c Controller)) (=> (obeyed.1 r t c) (decided r))))
 (define-fun inv-acknowledgement.1 () Bool
   (forall ((r Round) (t Transition) (c Controller))
-    (= (acknowledgement r t c) (and (request r t c) (obeyed.1 r t c)))))
-(define-fun inv-closed-obeyed.1 () Bool
-  (forall ((r Round) (t Transition) (c Controller))
-    (=> (and (closed r) (asked r t) (takes-part t c)) (obeyed.1 r t c))))
+    (= (acknowledgement r t c) (and (or (request r t c) (commit-order r t c)) (obeyed.1 r t c)))))
 (define-fun invariant.1 () Bool
   (and
     inv-V1.1
@@ -873,6 +1282,10 @@
     inv-V5
     inv-S1.1
     inv-S2.1
+    inv-F1
+    inv-F2.1
+    inv-F3.1
+    inv-stands
     inv-asked
     inv-decided
     inv-committed
@@ -885,7 +1298,7 @@
     inv-acknowledgement.1
     inv-noted
     inv-closed
-    inv-closed-obeyed.1))
+    inv-closed-noted))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -897,6 +1310,18 @@
 (declare-const t Transition)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; given: 'fire' waits for no place that a free part fills whose vote stands (waits.enabled)
+(assert (forall ((u Transition)) (=> (stands u (home t)) (not (behind t u (home t))))))
+(define-fun falsifies-at ((t Transition) (u Transition) (p Place)) Bool
+  (or
+    (and (or (input t p) (clears t p)) (or (input u p) (permissive u p)))
+    (and (output t p) (or (output u p) (inhibitive u p)))))
+; given: 'fire' takes no standing vote back (persists.fire)
+(assert (forall ((u Transition) (d Controller) (q Place))
+  (=> (and (counts u d) (not (= u t)) (= (owner q) d)) (not (falsifies-at t u q)))))
 ; fire: it is local
 (assert (not (coordinated t)))
 ; fire: it is enabled in the subnet of its home
@@ -932,6 +1357,18 @@
     (=>
       (not (exists ((r Round) (t Transition)) (and (committed r t) (not (obeyed r t (owner p))) (writes t p))))
       (= (marked.1 p) (shadow.1 p)))))
+(define-fun inv-F1.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (stands t c) (= (owner p) c))
+      (and (=> (input t p) (marked.1 p)) (=> (output t p) (not (marked.1 p)))))))
+(define-fun inv-F2.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (counts t c) (= (owner p) c))
+      (and
+        (=> (or (input t p) (permissive t p)) (shadow.1 p))
+        (=> (or (output t p) (inhibitive t p)) (not (shadow.1 p)))))))
 (define-fun invariant.1 () Bool
   (and
     inv-V1
@@ -941,6 +1378,10 @@
     inv-V5
     inv-S1.1
     inv-S2.1
+    inv-F1.1
+    inv-F2.1
+    inv-F3
+    inv-stands
     inv-asked
     inv-decided
     inv-committed
@@ -953,7 +1394,7 @@
     inv-acknowledgement
     inv-noted
     inv-closed
-    inv-closed-obeyed))
+    inv-closed-noted))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
 (check-sat)
@@ -962,14 +1403,20 @@
 ; 'sense' keeps the invariant
 (push 1)
 (echo "protocol.keeps.sense")
-(declare-fun signal (Place) Bool)
 (declare-const p Place)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; sense: it is a signal
 (assert (signal p))
 ; sense: no promise reads or clears it
 (assert (forall ((s Round) (u Transition)) (=> (promised s u (owner p)) (not (touches u p)))))
+; sense: it does not fall where only a command may clear it
+(assert (not (and (lasting p) (marked p))))
+; sense: no free part that is decided and not yet applied clears it
+(assert (forall ((s Round) (u Transition)) (=> (underway s u (owner p)) (not (clears u p)))))
 ; marked after 'sense'
 (define-fun marked.1 ((q Place)) Bool
   (or (and (= q p) (not (marked q))) (and (not (= q p)) (marked q))))
@@ -994,6 +1441,18 @@
     (=>
       (not (exists ((r Round) (t Transition)) (and (committed r t) (not (obeyed r t (owner p))) (writes t p))))
       (= (marked.1 p) (shadow.1 p)))))
+(define-fun inv-F1.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (stands t c) (= (owner p) c))
+      (and (=> (input t p) (marked.1 p)) (=> (output t p) (not (marked.1 p)))))))
+(define-fun inv-F2.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (counts t c) (= (owner p) c))
+      (and
+        (=> (or (input t p) (permissive t p)) (shadow.1 p))
+        (=> (or (output t p) (inhibitive t p)) (not (shadow.1 p)))))))
 (define-fun invariant.1 () Bool
   (and
     inv-V1
@@ -1003,6 +1462,10 @@
     inv-V5
     inv-S1.1
     inv-S2.1
+    inv-F1.1
+    inv-F2.1
+    inv-F3
+    inv-stands
     inv-asked
     inv-decided
     inv-committed
@@ -1015,9 +1478,216 @@
     inv-acknowledgement
     inv-noted
     inv-closed
-    inv-closed-obeyed))
+    inv-closed-noted))
 ; and what is to be shown does not hold
 (assert (not invariant.1))
+(check-sat)
+(pop 1)
+
+; 'sense-late' keeps the invariant
+(push 1)
+(echo "protocol.keeps.sense-late")
+(declare-const p Place)
+(declare-const r Round)
+(declare-const t Transition)
+; given: the invariant
+(assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; sense-late: it is a signal
+(assert (signal p))
+; sense-late: a free part that is decided and not yet applied clears it
+(assert (and (underway r t (owner p)) (clears t p)))
+; marked after 'sense-late'
+(define-fun marked.1 ((q Place)) Bool
+  (or (and (= q p) (not (marked q))) (and (not (= q p)) (marked q))))
+(define-fun part-enabled.1 ((t Transition) (c Controller)) Bool
+  (forall ((q Place))
+    (=>
+      (= (owner q) c)
+      (and
+        (=> (or (input t q) (permissive t q)) (marked.1 q))
+        (=> (or (output t q) (inhibitive t q)) (not (marked.1 q)))))))
+(define-fun inv-V2.1 () Bool
+  (forall ((r Round) (t Transition) (c Controller))
+    (=> (and (promised r t c) (or (not (decided r)) (committed r t))) (part-enabled.1 t c))))
+(define-fun inv-S2.1 () Bool
+  (forall ((p Place))
+    (=>
+      (not (exists ((r Round) (t Transition)) (and (committed r t) (not (obeyed r t (owner p))) (writes t p))))
+      (= (marked.1 p) (shadow p)))))
+(define-fun inv-F1.1 () Bool
+  (forall ((t Transition) (c Controller) (p Place))
+    (=>
+      (and (stands t c) (= (owner p) c))
+      (and (=> (input t p) (marked.1 p)) (=> (output t p) (not (marked.1 p)))))))
+(define-fun invariant.1 () Bool
+  (and
+    inv-V1
+    inv-V2.1
+    inv-V3
+    inv-V4
+    inv-V5
+    inv-S1
+    inv-S2.1
+    inv-F1.1
+    inv-F2
+    inv-F3
+    inv-stands
+    inv-asked
+    inv-decided
+    inv-committed
+    inv-request
+    inv-promised
+    inv-heard
+    inv-commit-order
+    inv-abort-order
+    inv-obeyed
+    inv-acknowledgement
+    inv-noted
+    inv-closed
+    inv-closed-noted))
+; and what is to be shown does not hold
+(assert (not invariant.1))
+(check-sat)
+(pop 1)
+
+; what is enabled at its controller waits for no place that a free part fills whose vote stands
+(push 1)
+(echo "protocol.waits.enabled")
+(declare-const t Transition)
+(declare-const c Controller)
+(declare-const u Transition)
+; given: the invariant
+(assert invariant)
+; given: besides
+(assert (and (part-enabled t c) (stands u c)))
+; given: behind
+(assert (=> (behind t u c) (exists ((q Place)) (and (= (owner q) c) (output u q) (or (input t q) (permissive t q))))))
+; and what is to be shown does not hold
+(assert (not (not (behind t u c))))
+(check-sat)
+(pop 1)
+
+; what is promised there and may still be applied waits for no place that a free part fills whose vote stands
+(push 1)
+(echo "protocol.waits.promised")
+(declare-const r Round)
+(declare-const t Transition)
+(declare-const c Controller)
+(declare-const u Transition)
+; given: the invariant
+(assert invariant)
+; given: besides
+(assert (and (promised r t c) (or (not (decided r)) (committed r t)) (stands u c)))
+; given: behind
+(assert (=> (behind t u c) (exists ((q Place)) (and (= (owner q) c) (output u q) (or (input t q) (permissive t q))))))
+; and what is to be shown does not hold
+(assert (not (not (behind t u c))))
+(check-sat)
+(pop 1)
+
+; what fires at 'decide' takes no standing vote back that counts
+(push 1)
+(echo "protocol.persists.decide")
+(declare-const c Controller)
+(declare-const u Transition)
+(declare-const t Transition)
+(declare-const p Place)
+(declare-const r Round)
+; given: the invariant
+(assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+(define-fun central-enabled ((t Transition)) Bool
+  (forall ((q Place))
+    (and
+      (=> (or (input t q) (permissive t q)) (shadow q))
+      (=> (or (output t q) (inhibitive t q)) (not (shadow q))))))
+(define-fun falsifies-at ((t Transition) (u Transition) (p Place)) Bool
+  (or
+    (and (or (input t p) (clears t p)) (or (input u p) (permissive u p)))
+    (and (output t p) (or (output u p) (inhibitive u p)))))
+; given: the net: a yes that holds is taken back by nothing else that is enabled
+(assert (=>
+  (and
+    (forall ((q Place))
+      (=>
+        (= (owner q) c)
+        (and
+          (=> (or (input u q) (permissive u q)) (shadow q))
+          (=> (or (output u q) (inhibitive u q)) (not (shadow q))))))
+    (central-enabled t)
+    (free u c)
+    (not (= u t)))
+  (=> (= (owner p) c) (not (falsifies-at t u p)))))
+; given: besides
+(assert (and
+  (asked r t)
+  (not (decided r))
+  (forall ((d Controller)) (=> (and (takes-part t d) (not (free t d))) (heard r t d)))
+  (forall ((d Controller)) (=> (free t d) (stands t d)))
+  (forall ((s Round) (d Controller))
+    (=> (and (free t d) (committed s t) (= (coordinator-of s) (coordinator-of r))) (noted s t d)))
+  (counts u c)
+  (not (= u t))
+  (= (owner p) c)))
+; and what is to be shown does not hold
+(assert (not (not (falsifies-at t u p))))
+(check-sat)
+(pop 1)
+
+; what fires at 'fire' takes no standing vote back that counts
+(push 1)
+(echo "protocol.persists.fire")
+(declare-const t Transition)
+(declare-const c Controller)
+(declare-const u Transition)
+(declare-const p Place)
+; given: the invariant
+(assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; given: waits for no place that a free part fills whose vote stands (waits.enabled)
+(assert (forall ((u Transition)) (=> (stands u (home t)) (not (behind t u (home t))))))
+(define-fun central-enabled ((t Transition)) Bool
+  (forall ((q Place))
+    (and
+      (=> (or (input t q) (permissive t q)) (shadow q))
+      (=> (or (output t q) (inhibitive t q)) (not (shadow q))))))
+(define-fun falsifies-at ((t Transition) (u Transition) (p Place)) Bool
+  (or
+    (and (or (input t p) (clears t p)) (or (input u p) (permissive u p)))
+    (and (output t p) (or (output u p) (inhibitive u p)))))
+; given: the net: a yes that holds is taken back by nothing else that is enabled
+(assert (=>
+  (and
+    (forall ((q Place))
+      (=>
+        (= (owner q) c)
+        (and
+          (=> (or (input u q) (permissive u q)) (shadow q))
+          (=> (or (output u q) (inhibitive u q)) (not (shadow q))))))
+    (central-enabled t)
+    (free u c)
+    (not (= u t)))
+  (=> (= (owner p) c) (not (falsifies-at t u p)))))
+(define-fun undisturbed-locally ((t Transition) (c Controller)) Bool
+  (forall ((s Round) (u Transition) (q Place))
+    (=> (and (promised s u c) (= (owner q) c)) (not (disturb-at t u q)))))
+; given: besides
+(assert (and
+  (not (coordinated t))
+  (part-enabled t (home t))
+  (undisturbed-locally t (home t))
+  (counts u c)
+  (not (= u t))
+  (= (owner p) c)))
+; and what is to be shown does not hold
+(assert (not (not (falsifies-at t u p))))
 (check-sat)
 (pop 1)
 
@@ -1028,8 +1698,17 @@
 (declare-const t Transition)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
-(assert (and (asked r t) (not (decided r)) (forall ((d Controller)) (=> (takes-part t d) (heard r t d)))))
+(assert (and
+  (asked r t)
+  (not (decided r))
+  (forall ((d Controller)) (=> (and (takes-part t d) (not (free t d))) (heard r t d)))
+  (forall ((d Controller)) (=> (free t d) (stands t d)))
+  (forall ((s Round) (d Controller))
+    (=> (and (free t d) (committed s t) (= (coordinator-of s) (coordinator-of r))) (noted s t d)))))
 (define-fun central-enabled ((t Transition)) Bool
   (forall ((q Place))
     (and
@@ -1046,11 +1725,18 @@
 (declare-const t Transition)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 (define-fun undisturbed-locally ((t Transition) (c Controller)) Bool
   (forall ((s Round) (u Transition) (q Place))
     (=> (and (promised s u c) (= (owner q) c)) (not (disturb-at t u q)))))
 ; given: besides
-(assert (and (not (coordinated t)) (part-enabled t (home t)) (undisturbed-locally t (home t))))
+(assert (and
+  (not (coordinated t))
+  (part-enabled t (home t))
+  (undisturbed-locally t (home t))
+  (forall ((u Transition)) (=> (stands u (home t)) (not (behind t u (home t)))))))
 (define-fun central-enabled ((t Transition)) Bool
   (forall ((q Place))
     (and
@@ -1066,6 +1752,9 @@
 (echo "protocol.rest")
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
 (assert (forall ((s Round)) (=> (decided s) (closed s))))
 ; and what is to be shown does not hold
@@ -1081,15 +1770,18 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
-(assert (and (commit-order r t c) (promised r t c)))
+(assert (or (and (commit-order r t c) (promised r t c)) (and (commit-order r t c) (free t c) (not (obeyed r t c)))))
 ; and what is to be shown does not hold
 (assert (not
   (forall ((q Place)) (=> (= (owner q) c) (and (=> (input t q) (marked q)) (=> (output t q) (not (marked q))))))))
 (check-sat)
 (pop 1)
 
-; an order that was not obeyed finds its part promised and enabled
+; an order that was not obeyed finds its part promised and enabled, or free
 (push 1)
 (echo "protocol.expected")
 (declare-const r Round)
@@ -1097,8 +1789,11 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
-(assert (and (commit-order r t c) (not (obeyed r t c))))
+(assert (and (commit-order r t c) (not (obeyed r t c)) (not (free t c))))
 ; and what is to be shown does not hold
 (assert (not (and (promised r t c) (part-enabled t c))))
 (check-sat)
@@ -1110,21 +1805,25 @@
 (declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
 (assert (and (begun r) (not (closed r))))
 ; and what is to be shown does not hold
 (assert (not
   (or
-    (exists ((r Round)) (and (begun r) (not (decided r))))
-    (exists ((r Round) (t Transition) (c Controller)) (and (commit-order r t c) (not (obeyed r t c))))
-    (exists ((r Round) (t Transition) (c Controller)) (and (abort-order r t c) (not (obeyed r t c))))
-    (exists ((r Round) (t Transition) (c Controller)) (and (acknowledgement r t c) (not (noted r t c))))
-    (exists ((r Round))
-      (and
-        (begun r)
-        (decided r)
-        (not (closed r))
-        (forall ((u Transition) (d Controller)) (=> (and (asked r u) (takes-part u d)) (noted r u d))))))))
+    (and (begun r) (not (decided r)))
+    (exists ((t Transition) (c Controller)) (and (commit-order r t c) (not (obeyed r t c)) (not (free t c))))
+    (exists ((t Transition) (c Controller)) (and (commit-order r t c) (not (obeyed r t c)) (free t c)))
+    (exists ((t Transition) (c Controller)) (and (abort-order r t c) (not (obeyed r t c))))
+    (exists ((t Transition) (c Controller)) (and (acknowledgement r t c) (not (noted r t c))))
+    (and
+      (begun r)
+      (decided r)
+      (not (closed r))
+      (forall ((u Transition) (d Controller))
+        (=> (and (asked r u) (takes-part u d) (or (not (free u d)) (committed r u))) (noted r u d)))))))
 (check-sat)
 (pop 1)
 
@@ -1134,6 +1833,9 @@
 (declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
 (assert (and (begun r) (not (decided r))))
 ; decided after 'give-up'
@@ -1141,7 +1843,7 @@
   (or (decided s) (= s r)))
 ; abort-order after 'give-up'
 (define-fun abort-order.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (abort-order s u d) (and (= s r) (asked r u) (takes-part u d))))
+  (or (abort-order s u d) (and (= s r) (asked r u) (takes-part u d) (not (free u d)))))
 ; and what is to be shown does not hold
 (assert (not
   (and
@@ -1150,12 +1852,12 @@
     (forall ((s Round)) (=> (and (begun s) (not (decided.1 s))) (and (begun s) (not (decided s)))))
     (forall ((s Round) (u Transition) (d Controller))
       (=>
-        (and (asked s u) (takes-part u d) (not (obeyed s u d)))
-        (and (asked s u) (takes-part u d) (not (obeyed s u d)))))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d)))))
     (forall ((s Round) (u Transition) (d Controller))
       (=>
-        (and (asked s u) (takes-part u d) (not (noted s u d)))
-        (and (asked s u) (takes-part u d) (not (noted s u d)))))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))))
     (forall ((s Round)) (=> (and (begun s) (not (closed s))) (and (begun s) (not (closed s)))))
     (or
       (exists ((s Round)) (and (begun s) (not (decided s)) (not (and (begun s) (not (decided.1 s))))))
@@ -1163,14 +1865,16 @@
         (and
           (asked s u)
           (takes-part u d)
+          (or (not (free u d)) (committed s u))
           (not (obeyed s u d))
-          (not (and (asked s u) (takes-part u d) (not (obeyed s u d))))))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d))))))
       (exists ((s Round) (u Transition) (d Controller))
         (and
           (asked s u)
           (takes-part u d)
+          (or (not (free u d)) (committed s u))
           (not (noted s u d))
-          (not (and (asked s u) (takes-part u d) (not (noted s u d))))))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d))))))
       (exists ((s Round)) (and (begun s) (not (closed s)) (not (and (begun s) (not (closed s))))))))))
 (check-sat)
 (pop 1)
@@ -1183,8 +1887,11 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
-(assert (and (commit-order r t c) (not (obeyed r t c))))
+(assert (and (commit-order r t c) (not (obeyed r t c)) (not (free t c))))
 ; marked after 'apply'
 (define-fun marked.1 ((q Place)) Bool
   (or
@@ -1207,12 +1914,12 @@
     (forall ((s Round)) (=> (and (begun s) (not (decided s))) (and (begun s) (not (decided s)))))
     (forall ((s Round) (u Transition) (d Controller))
       (=>
-        (and (asked s u) (takes-part u d) (not (obeyed.1 s u d)))
-        (and (asked s u) (takes-part u d) (not (obeyed s u d)))))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed.1 s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d)))))
     (forall ((s Round) (u Transition) (d Controller))
       (=>
-        (and (asked s u) (takes-part u d) (not (noted s u d)))
-        (and (asked s u) (takes-part u d) (not (noted s u d)))))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))))
     (forall ((s Round)) (=> (and (begun s) (not (closed s))) (and (begun s) (not (closed s)))))
     (or
       (exists ((s Round)) (and (begun s) (not (decided s)) (not (and (begun s) (not (decided s))))))
@@ -1220,14 +1927,79 @@
         (and
           (asked s u)
           (takes-part u d)
+          (or (not (free u d)) (committed s u))
           (not (obeyed s u d))
-          (not (and (asked s u) (takes-part u d) (not (obeyed.1 s u d))))))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed.1 s u d))))))
       (exists ((s Round) (u Transition) (d Controller))
         (and
           (asked s u)
           (takes-part u d)
+          (or (not (free u d)) (committed s u))
           (not (noted s u d))
-          (not (and (asked s u) (takes-part u d) (not (noted s u d))))))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d))))))
+      (exists ((s Round)) (and (begun s) (not (closed s)) (not (and (begun s) (not (closed s))))))))))
+(check-sat)
+(pop 1)
+
+; by a free part, too, and less is to be done then
+(push 1)
+(echo "protocol.home.apply-free")
+(declare-const r Round)
+(declare-const t Transition)
+(declare-const c Controller)
+; given: the invariant
+(assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; given: besides
+(assert (and (commit-order r t c) (not (obeyed r t c)) (free t c)))
+; marked after 'apply-free'
+(define-fun marked.1 ((q Place)) Bool
+  (or
+    (and (= (owner q) c) (or (output t q) (and (marked q) (not (input t q)) (not (clears t q)))))
+    (and (not (= (owner q) c)) (marked q))))
+; stands after 'apply-free'
+(define-fun stands.1 ((u Transition) (d Controller)) Bool
+  (and (stands u d) (not (and (= u t) (= d c)))))
+; obeyed after 'apply-free'
+(define-fun obeyed.1 ((s Round) (u Transition) (d Controller)) Bool
+  (or (obeyed s u d) (and (= s r) (= u t) (= d c))))
+; acknowledgement after 'apply-free'
+(define-fun acknowledgement.1 ((s Round) (u Transition) (d Controller)) Bool
+  (or (acknowledgement s u d) (and (= s r) (= u t) (= d c))))
+; and what is to be shown does not hold
+(assert (not
+  (and
+    (commit-order r t c)
+    (free t c)
+    (not (obeyed r t c))
+    (forall ((s Round)) (=> (and (begun s) (not (decided s))) (and (begun s) (not (decided s)))))
+    (forall ((s Round) (u Transition) (d Controller))
+      (=>
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed.1 s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d)))))
+    (forall ((s Round) (u Transition) (d Controller))
+      (=>
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))))
+    (forall ((s Round)) (=> (and (begun s) (not (closed s))) (and (begun s) (not (closed s)))))
+    (or
+      (exists ((s Round)) (and (begun s) (not (decided s)) (not (and (begun s) (not (decided s))))))
+      (exists ((s Round) (u Transition) (d Controller))
+        (and
+          (asked s u)
+          (takes-part u d)
+          (or (not (free u d)) (committed s u))
+          (not (obeyed s u d))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed.1 s u d))))))
+      (exists ((s Round) (u Transition) (d Controller))
+        (and
+          (asked s u)
+          (takes-part u d)
+          (or (not (free u d)) (committed s u))
+          (not (noted s u d))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d))))))
       (exists ((s Round)) (and (begun s) (not (closed s)) (not (and (begun s) (not (closed s))))))))))
 (check-sat)
 (pop 1)
@@ -1240,6 +2012,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
 (assert (and (abort-order r t c) (not (obeyed r t c))))
 ; promised after 'release'
@@ -1258,12 +2033,12 @@
     (forall ((s Round)) (=> (and (begun s) (not (decided s))) (and (begun s) (not (decided s)))))
     (forall ((s Round) (u Transition) (d Controller))
       (=>
-        (and (asked s u) (takes-part u d) (not (obeyed.1 s u d)))
-        (and (asked s u) (takes-part u d) (not (obeyed s u d)))))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed.1 s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d)))))
     (forall ((s Round) (u Transition) (d Controller))
       (=>
-        (and (asked s u) (takes-part u d) (not (noted s u d)))
-        (and (asked s u) (takes-part u d) (not (noted s u d)))))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))))
     (forall ((s Round)) (=> (and (begun s) (not (closed s))) (and (begun s) (not (closed s)))))
     (or
       (exists ((s Round)) (and (begun s) (not (decided s)) (not (and (begun s) (not (decided s))))))
@@ -1271,14 +2046,16 @@
         (and
           (asked s u)
           (takes-part u d)
+          (or (not (free u d)) (committed s u))
           (not (obeyed s u d))
-          (not (and (asked s u) (takes-part u d) (not (obeyed.1 s u d))))))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed.1 s u d))))))
       (exists ((s Round) (u Transition) (d Controller))
         (and
           (asked s u)
           (takes-part u d)
+          (or (not (free u d)) (committed s u))
           (not (noted s u d))
-          (not (and (asked s u) (takes-part u d) (not (noted s u d))))))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d))))))
       (exists ((s Round)) (and (begun s) (not (closed s)) (not (and (begun s) (not (closed s))))))))))
 (check-sat)
 (pop 1)
@@ -1291,6 +2068,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
 (assert (and (acknowledgement r t c) (not (noted r t c))))
 ; noted after 'note'
@@ -1303,12 +2083,12 @@
     (forall ((s Round)) (=> (and (begun s) (not (decided s))) (and (begun s) (not (decided s)))))
     (forall ((s Round) (u Transition) (d Controller))
       (=>
-        (and (asked s u) (takes-part u d) (not (obeyed s u d)))
-        (and (asked s u) (takes-part u d) (not (obeyed s u d)))))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d)))))
     (forall ((s Round) (u Transition) (d Controller))
       (=>
-        (and (asked s u) (takes-part u d) (not (noted.1 s u d)))
-        (and (asked s u) (takes-part u d) (not (noted s u d)))))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted.1 s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))))
     (forall ((s Round)) (=> (and (begun s) (not (closed s))) (and (begun s) (not (closed s)))))
     (or
       (exists ((s Round)) (and (begun s) (not (decided s)) (not (and (begun s) (not (decided s))))))
@@ -1316,14 +2096,16 @@
         (and
           (asked s u)
           (takes-part u d)
+          (or (not (free u d)) (committed s u))
           (not (obeyed s u d))
-          (not (and (asked s u) (takes-part u d) (not (obeyed s u d))))))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d))))))
       (exists ((s Round) (u Transition) (d Controller))
         (and
           (asked s u)
           (takes-part u d)
+          (or (not (free u d)) (committed s u))
           (not (noted s u d))
-          (not (and (asked s u) (takes-part u d) (not (noted.1 s u d))))))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted.1 s u d))))))
       (exists ((s Round)) (and (begun s) (not (closed s)) (not (and (begun s) (not (closed s))))))))))
 (check-sat)
 (pop 1)
@@ -1334,12 +2116,16 @@
 (declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
 (assert (and
   (begun r)
   (decided r)
   (not (closed r))
-  (forall ((u Transition) (d Controller)) (=> (and (asked r u) (takes-part u d)) (noted r u d)))))
+  (forall ((u Transition) (d Controller))
+    (=> (and (asked r u) (takes-part u d) (or (not (free u d)) (committed r u))) (noted r u d)))))
 ; closed after 'close'
 (define-fun closed.1 ((s Round)) Bool
   (or (closed s) (= s r)))
@@ -1347,16 +2133,17 @@
 (assert (not
   (and
     (decided r)
-    (forall ((u Transition) (d Controller)) (=> (and (asked r u) (takes-part u d)) (noted r u d)))
+    (forall ((u Transition) (d Controller))
+      (=> (and (asked r u) (takes-part u d) (or (not (free u d)) (committed r u))) (noted r u d)))
     (forall ((s Round)) (=> (and (begun s) (not (decided s))) (and (begun s) (not (decided s)))))
     (forall ((s Round) (u Transition) (d Controller))
       (=>
-        (and (asked s u) (takes-part u d) (not (obeyed s u d)))
-        (and (asked s u) (takes-part u d) (not (obeyed s u d)))))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d)))))
     (forall ((s Round) (u Transition) (d Controller))
       (=>
-        (and (asked s u) (takes-part u d) (not (noted s u d)))
-        (and (asked s u) (takes-part u d) (not (noted s u d)))))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))
+        (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d)))))
     (forall ((s Round)) (=> (and (begun s) (not (closed.1 s))) (and (begun s) (not (closed s)))))
     (or
       (exists ((s Round)) (and (begun s) (not (decided s)) (not (and (begun s) (not (decided s))))))
@@ -1364,14 +2151,16 @@
         (and
           (asked s u)
           (takes-part u d)
+          (or (not (free u d)) (committed s u))
           (not (obeyed s u d))
-          (not (and (asked s u) (takes-part u d) (not (obeyed s u d))))))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (obeyed s u d))))))
       (exists ((s Round) (u Transition) (d Controller))
         (and
           (asked s u)
           (takes-part u d)
+          (or (not (free u d)) (committed s u))
           (not (noted s u d))
-          (not (and (asked s u) (takes-part u d) (not (noted s u d))))))
+          (not (and (asked s u) (takes-part u d) (or (not (free u d)) (committed s u)) (not (noted s u d))))))
       (exists ((s Round)) (and (begun s) (not (closed s)) (not (and (begun s) (not (closed.1 s))))))))))
 (check-sat)
 (pop 1)
@@ -1383,13 +2172,21 @@
 (declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 (define-fun central-enabled ((t Transition)) Bool
   (forall ((q Place))
     (and
       (=> (or (input t q) (permissive t q)) (shadow q))
       (=> (or (output t q) (inhibitive t q)) (not (shadow q))))))
 ; given: besides
-(assert (and (forall ((s Round)) (=> (begun s) (closed s))) (coordinated t) (central-enabled t) (not (begun r))))
+(assert (and
+  (forall ((s Round)) (=> (begun s) (closed s)))
+  (coordinated t)
+  (central-enabled t)
+  (not (begun r))
+  (= (coordinator-of r) (decider t))))
 ; begun after 'ask'
 (define-fun begun.1 ((s Round)) Bool
   (or (begun s) (= s r)))
@@ -1398,21 +2195,23 @@
   (or (asked s u) (and (= s r) (= u t))))
 ; request after 'ask'
 (define-fun request.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (request s u d) (and (= s r) (= u t) (takes-part t d))))
+  (or (request s u d) (and (= s r) (= u t) (takes-part t d) (not (free t d)))))
 ; and what is to be shown does not hold
 (assert (not
   (and
     (coordinated t)
+    (= (coordinator-of r) (decider t))
     (not (decided r))
     (asked.1 r t)
     (not (decided r))
     (central-enabled t)
-    (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (= s r)))
+    (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (and (= s r) (= u t))))
+    (forall ((s Round)) (=> (decided s) (closed s)))
     (forall ((q Place)) (= (marked q) (shadow q))))))
 (check-sat)
 (pop 1)
 
-; then each who takes part can promise its part
+; then each who has to promise can promise its part
 (push 1)
 (echo "protocol.complete.promise")
 (declare-const r Round)
@@ -1420,6 +2219,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 (define-fun central-enabled ((t Transition)) Bool
   (forall ((q Place))
     (and
@@ -1430,9 +2232,11 @@
   (asked r t)
   (not (decided r))
   (central-enabled t)
-  (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (= s r)))
+  (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (and (= s r) (= u t))))
+  (forall ((s Round)) (=> (decided s) (closed s)))
   (forall ((q Place)) (= (marked q) (shadow q)))
   (takes-part t c)
+  (not (free t c))
   (not (promised r t c))))
 ; promised after 'promise'
 (define-fun promised.1 ((s Round) (u Transition) (d Controller)) Bool
@@ -1453,9 +2257,57 @@
     (asked r t)
     (not (decided r))
     (central-enabled t)
-    (forall ((s Round) (u Transition) (d Controller)) (=> (promised.1 s u d) (= s r)))
+    (forall ((s Round) (u Transition) (d Controller)) (=> (promised.1 s u d) (and (= s r) (= u t))))
+    (forall ((s Round)) (=> (decided s) (closed s)))
     (forall ((q Place)) (= (marked q) (shadow q)))
     (promised.1 r t c))))
+(check-sat)
+(pop 1)
+
+; and each of whom a part is free of promise can vote on it
+(push 1)
+(echo "protocol.complete.stand")
+(declare-const r Round)
+(declare-const t Transition)
+(declare-const c Controller)
+; given: the invariant
+(assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+(define-fun central-enabled ((t Transition)) Bool
+  (forall ((q Place))
+    (and
+      (=> (or (input t q) (permissive t q)) (shadow q))
+      (=> (or (output t q) (inhibitive t q)) (not (shadow q))))))
+; given: besides
+(assert (and
+  (asked r t)
+  (not (decided r))
+  (central-enabled t)
+  (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (and (= s r) (= u t))))
+  (forall ((s Round)) (=> (decided s) (closed s)))
+  (forall ((q Place)) (= (marked q) (shadow q)))
+  (free t c)))
+; stands after 'stand'
+(define-fun stands.1 ((u Transition) (d Controller)) Bool
+  (or (stands u d) (and (= u t) (= d c))))
+(define-fun undisturbed-locally ((t Transition) (c Controller)) Bool
+  (forall ((s Round) (u Transition) (q Place))
+    (=> (and (promised s u c) (= (owner q) c)) (not (disturb-at t u q)))))
+; and what is to be shown does not hold
+(assert (not
+  (and
+    (free t c)
+    (part-enabled t c)
+    (undisturbed-locally t c)
+    (asked r t)
+    (not (decided r))
+    (central-enabled t)
+    (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (and (= s r) (= u t))))
+    (forall ((s Round)) (=> (decided s) (closed s)))
+    (forall ((q Place)) (= (marked q) (shadow q)))
+    (stands.1 t c))))
 (check-sat)
 (pop 1)
 
@@ -1467,6 +2319,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 (define-fun central-enabled ((t Transition)) Bool
   (forall ((q Place))
     (and
@@ -1477,7 +2332,8 @@
   (asked r t)
   (not (decided r))
   (central-enabled t)
-  (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (= s r)))
+  (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (and (= s r) (= u t))))
+  (forall ((s Round)) (=> (decided s) (closed s)))
   (forall ((q Place)) (= (marked q) (shadow q)))
   (promised r t c)))
 ; heard after 'hear'
@@ -1490,7 +2346,8 @@
     (asked r t)
     (not (decided r))
     (central-enabled t)
-    (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (= s r)))
+    (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (and (= s r) (= u t))))
+    (forall ((s Round)) (=> (decided s) (closed s)))
     (forall ((q Place)) (= (marked q) (shadow q)))
     (heard.1 r t c))))
 (check-sat)
@@ -1503,6 +2360,9 @@
 (declare-const t Transition)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 (define-fun central-enabled ((t Transition)) Bool
   (forall ((q Place))
     (and
@@ -1513,9 +2373,10 @@
   (asked r t)
   (not (decided r))
   (central-enabled t)
-  (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (= s r)))
+  (forall ((s Round) (u Transition) (d Controller)) (=> (promised s u d) (and (= s r) (= u t))))
+  (forall ((s Round)) (=> (decided s) (closed s)))
   (forall ((q Place)) (= (marked q) (shadow q)))
-  (forall ((d Controller)) (=> (takes-part t d) (heard r t d)))))
+  (forall ((d Controller)) (=> (takes-part t d) (or (heard r t d) (and (free t d) (stands t d)))))))
 ; decided after 'decide'
 (define-fun decided.1 ((s Round)) Bool
   (or (decided s) (= s r)))
@@ -1527,12 +2388,19 @@
   (or (commit-order s u d) (and (= s r) (= u t) (takes-part t d))))
 ; abort-order after 'decide'
 (define-fun abort-order.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (abort-order s u d) (and (= s r) (asked r u) (not (= u t)) (takes-part u d))))
+  (or (abort-order s u d) (and (= s r) (asked r u) (not (= u t)) (takes-part u d) (not (free u d)))))
 ; shadow after 'decide'
 (define-fun shadow.1 ((q Place)) Bool
   (or (output t q) (and (shadow q) (not (input t q)) (not (clears t q)))))
 ; and what is to be shown does not hold
-(assert (not (and (asked r t) (not (decided r)) (forall ((d Controller)) (=> (takes-part t d) (heard r t d))))))
+(assert (not
+  (and
+    (asked r t)
+    (not (decided r))
+    (forall ((d Controller)) (=> (and (takes-part t d) (not (free t d))) (heard r t d)))
+    (forall ((d Controller)) (=> (free t d) (stands t d)))
+    (forall ((s Round) (d Controller))
+      (=> (and (free t d) (committed s t) (= (coordinator-of s) (coordinator-of r))) (noted s t d))))))
 (check-sat)
 (pop 1)
 
@@ -1542,6 +2410,9 @@
 (declare-const t Transition)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 (define-fun central-enabled ((t Transition)) Bool
   (forall ((q Place))
     (and
@@ -1565,15 +2436,17 @@
 (check-sat)
 (pop 1)
 
-; with no round open, every signal can change
+; with no round open, every signal can change, but for completions that have come
 (push 1)
 (echo "protocol.complete.sense")
-(declare-fun signal (Place) Bool)
 (declare-const p Place)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; given: besides
-(assert (and (forall ((s Round)) (=> (begun s) (closed s))) (signal p)))
+(assert (and (forall ((s Round)) (=> (begun s) (closed s))) (signal p) (not (and (lasting p) (marked p)))))
 ; marked after 'sense'
 (define-fun marked.1 ((q Place)) Bool
   (or (and (= q p) (not (marked q))) (and (not (= q p)) (marked q))))
@@ -1581,18 +2454,28 @@
 (define-fun shadow.1 ((q Place)) Bool
   (or (and (= q p) (not (shadow q))) (and (not (= q p)) (shadow q))))
 ; and what is to be shown does not hold
-(assert (not (and (signal p) (forall ((s Round) (u Transition)) (=> (promised s u (owner p)) (not (touches u p)))))))
+(assert (not
+  (and
+    (signal p)
+    (forall ((s Round) (u Transition)) (=> (promised s u (owner p)) (not (touches u p))))
+    (not (and (lasting p) (marked p)))
+    (forall ((s Round) (u Transition)) (=> (underway s u (owner p)) (not (clears u p)))))))
 (check-sat)
 (pop 1)
 
 ; 'promise' changes nothing, or makes something known for good
 (push 1)
 (echo "protocol.advances.promise")
-(declare-const r Round)
-(declare-const t Transition)
 (declare-const c Controller)
+(declare-const t Transition)
+(declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; given: 'promise' waits for no place that a free part fills whose vote stands (waits.enabled)
+(assert (forall ((u Transition)) (=> (stands u c) (not (behind t u c)))))
 ; promise: a request of the round has arrived
 (assert (request r t c))
 ; promise: no order of the round has been obeyed
@@ -1644,6 +2527,64 @@
 (check-sat)
 (pop 1)
 
+; 'stand' changes nothing, or makes something known for good
+(push 1)
+(echo "protocol.advances.stand")
+(declare-const c Controller)
+(declare-const t Transition)
+; given: the invariant
+(assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; given: 'stand' waits for no place that a free part fills whose vote stands (waits.enabled)
+(assert (forall ((u Transition)) (=> (stands u c) (not (behind t u c)))))
+; stand: the part is free of promise
+(assert (free t c))
+; stand: the part is enabled in the subnet
+(assert (part-enabled t c))
+(define-fun undisturbed-locally ((t Transition) (c Controller)) Bool
+  (forall ((s Round) (u Transition) (q Place))
+    (=> (and (promised s u c) (= (owner q) c)) (not (disturb-at t u q)))))
+; stand: no promise is disturbed (O1)
+(assert (undisturbed-locally t c))
+; stands after 'stand'
+(define-fun stands.1 ((u Transition) (d Controller)) Bool
+  (or (stands u d) (and (= u t) (= d c))))
+; and what is to be shown does not hold
+(assert (not
+  (and
+    (forall ((s Round) (u Transition)) (=> (asked s u) (asked s u)))
+    (forall ((s Round)) (=> (begun s) (begun s)))
+    (or
+      (forall ((u Transition) (d Controller)) (= (stands.1 u d) (stands u d)))
+      (and
+        (forall ((s Round) (u Transition) (d Controller))
+          (=> (and (begun s) (vote s u d)) (and (begun s) (vote s u d))))
+        (forall ((s Round) (u Transition) (d Controller))
+          (=> (and (begun s) (heard s u d)) (and (begun s) (heard s u d))))
+        (forall ((s Round)) (=> (and (begun s) (decided s)) (and (begun s) (decided s))))
+        (forall ((s Round) (u Transition) (d Controller))
+          (=> (and (begun s) (obeyed s u d)) (and (begun s) (obeyed s u d))))
+        (forall ((s Round) (u Transition) (d Controller))
+          (=> (and (begun s) (noted s u d)) (and (begun s) (noted s u d))))
+        (forall ((s Round)) (=> (and (begun s) (closed s)) (and (begun s) (closed s))))
+        (forall ((u Transition) (d Controller)) (=> (stands u d) (stands.1 u d)))
+        (or
+          (exists ((s Round) (u Transition) (d Controller))
+            (and (begun s) (vote s u d) (not (and (begun s) (vote s u d)))))
+          (exists ((s Round) (u Transition) (d Controller))
+            (and (begun s) (heard s u d) (not (and (begun s) (heard s u d)))))
+          (exists ((s Round)) (and (begun s) (decided s) (not (and (begun s) (decided s)))))
+          (exists ((s Round) (u Transition) (d Controller))
+            (and (begun s) (obeyed s u d) (not (and (begun s) (obeyed s u d)))))
+          (exists ((s Round) (u Transition) (d Controller))
+            (and (begun s) (noted s u d) (not (and (begun s) (noted s u d)))))
+          (exists ((s Round)) (and (begun s) (closed s) (not (and (begun s) (closed s)))))
+          (exists ((u Transition) (d Controller)) (and (stands.1 u d) (not (stands u d))))))))))
+(check-sat)
+(pop 1)
+
 ; 'hear' changes nothing, or makes something known for good
 (push 1)
 (echo "protocol.advances.hear")
@@ -1652,6 +2593,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; hear: a vote of the round has arrived
 (assert (vote r t c))
 ; heard after 'hear'
@@ -1695,6 +2639,9 @@
 (declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; give-up: the round is begun
 (assert (begun r))
 ; give-up: the round is not decided
@@ -1704,7 +2651,7 @@
   (or (decided s) (= s r)))
 ; abort-order after 'give-up'
 (define-fun abort-order.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (abort-order s u d) (and (= s r) (asked r u) (takes-part u d))))
+  (or (abort-order s u d) (and (= s r) (asked r u) (takes-part u d) (not (free u d)))))
 ; and what is to be shown does not hold
 (assert (not
   (and
@@ -1745,12 +2692,17 @@
 (declare-const k Coordinator)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; decided after 'restart'
 (define-fun decided.1 ((s Round)) Bool
   (or (decided s) (and (begun s) (= (coordinator-of s) k))))
 ; abort-order after 'restart'
 (define-fun abort-order.1 ((s Round) (u Transition) (d Controller)) Bool
-  (or (abort-order s u d) (and (asked s u) (takes-part u d) (not (decided s)) (= (coordinator-of s) k))))
+  (or
+    (abort-order s u d)
+    (and (asked s u) (takes-part u d) (not (free u d)) (not (decided s)) (= (coordinator-of s) k))))
 ; and what is to be shown does not hold
 (assert (not
   (and
@@ -1793,6 +2745,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; apply: the order to commit has arrived
 (assert (commit-order r t c))
 ; apply: it is promised
@@ -1847,6 +2802,73 @@
 (check-sat)
 (pop 1)
 
+; 'apply-free' changes nothing, or makes something known for good
+(push 1)
+(echo "protocol.advances.apply-free")
+(declare-const r Round)
+(declare-const t Transition)
+(declare-const c Controller)
+; given: the invariant
+(assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
+; apply-free: the order to commit has arrived
+(assert (commit-order r t c))
+; apply-free: the part is free of promise
+(assert (free t c))
+; apply-free: no order of the round has been obeyed
+(assert (not (obeyed r t c)))
+; marked after 'apply-free'
+(define-fun marked.1 ((q Place)) Bool
+  (or
+    (and (= (owner q) c) (or (output t q) (and (marked q) (not (input t q)) (not (clears t q)))))
+    (and (not (= (owner q) c)) (marked q))))
+; stands after 'apply-free'
+(define-fun stands.1 ((u Transition) (d Controller)) Bool
+  (and (stands u d) (not (and (= u t) (= d c)))))
+; obeyed after 'apply-free'
+(define-fun obeyed.1 ((s Round) (u Transition) (d Controller)) Bool
+  (or (obeyed s u d) (and (= s r) (= u t) (= d c))))
+; acknowledgement after 'apply-free'
+(define-fun acknowledgement.1 ((s Round) (u Transition) (d Controller)) Bool
+  (or (acknowledgement s u d) (and (= s r) (= u t) (= d c))))
+; and what is to be shown does not hold
+(assert (not
+  (and
+    (forall ((s Round) (u Transition)) (=> (asked s u) (asked s u)))
+    (forall ((s Round)) (=> (begun s) (begun s)))
+    (or
+      (and
+        (forall ((q Place)) (= (marked.1 q) (marked q)))
+        (forall ((u Transition) (d Controller)) (= (stands.1 u d) (stands u d)))
+        (forall ((s Round) (u Transition) (d Controller)) (= (obeyed.1 s u d) (obeyed s u d)))
+        (forall ((s Round) (u Transition) (d Controller)) (= (acknowledgement.1 s u d) (acknowledgement s u d))))
+      (and
+        (forall ((s Round) (u Transition) (d Controller))
+          (=> (and (begun s) (vote s u d)) (and (begun s) (vote s u d))))
+        (forall ((s Round) (u Transition) (d Controller))
+          (=> (and (begun s) (heard s u d)) (and (begun s) (heard s u d))))
+        (forall ((s Round)) (=> (and (begun s) (decided s)) (and (begun s) (decided s))))
+        (forall ((s Round) (u Transition) (d Controller))
+          (=> (and (begun s) (obeyed s u d)) (and (begun s) (obeyed.1 s u d))))
+        (forall ((s Round) (u Transition) (d Controller))
+          (=> (and (begun s) (noted s u d)) (and (begun s) (noted s u d))))
+        (forall ((s Round)) (=> (and (begun s) (closed s)) (and (begun s) (closed s))))
+        (or
+          (exists ((s Round) (u Transition) (d Controller))
+            (and (begun s) (vote s u d) (not (and (begun s) (vote s u d)))))
+          (exists ((s Round) (u Transition) (d Controller))
+            (and (begun s) (heard s u d) (not (and (begun s) (heard s u d)))))
+          (exists ((s Round)) (and (begun s) (decided s) (not (and (begun s) (decided s)))))
+          (exists ((s Round) (u Transition) (d Controller))
+            (and (begun s) (obeyed.1 s u d) (not (and (begun s) (obeyed s u d)))))
+          (exists ((s Round) (u Transition) (d Controller))
+            (and (begun s) (noted s u d) (not (and (begun s) (noted s u d)))))
+          (exists ((s Round)) (and (begun s) (closed s) (not (and (begun s) (closed s)))))))))))
+(check-sat)
+(pop 1)
+
 ; 'release' changes nothing, or makes something known for good
 (push 1)
 (echo "protocol.advances.release")
@@ -1855,6 +2877,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; release: the order to abort has arrived
 (assert (abort-order r t c))
 ; promised after 'release'
@@ -1909,6 +2934,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; note: an acknowledgement of the round has arrived
 (assert (acknowledgement r t c))
 ; noted after 'note'
@@ -1952,10 +2980,14 @@
 (declare-const r Round)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; close: the round is decided
 (assert (decided r))
-; close: all who were asked have obeyed
-(assert (forall ((u Transition) (d Controller)) (=> (and (asked r u) (takes-part u d)) (noted r u d))))
+; close: all who got an order have obeyed
+(assert (forall ((u Transition) (d Controller))
+  (=> (and (asked r u) (takes-part u d) (or (not (free u d)) (committed r u))) (noted r u d))))
 ; closed after 'close'
 (define-fun closed.1 ((s Round)) Bool
   (or (closed s) (= s r)))
@@ -1998,6 +3030,9 @@
 (declare-const c Controller)
 ; given: the invariant
 (assert invariant)
+; given: whoever is promised waits for no place that a free part fills whose vote stands (waits.promised)
+(assert (forall ((s Round) (u Transition) (v Transition) (d Controller))
+  (=> (and (promised s v d) (or (not (decided s)) (committed s v)) (stands u d)) (not (behind v u d)))))
 ; forget: a message says that the round is closed
 (assert (closed r))
 ; obeyed after 'forget'

@@ -280,8 +280,8 @@ def test_prove_tells_the_side_conditions_of_the_protocol_theorem_in_one_line(
 ) -> None:
     assert main(["prove", "catalogue:conceptual_one_robot"]) == 0
     told = capsys.readouterr().out
-    assert "  ✓  40 of 40  protocol " in told
-    assert "  ✓   6 of 6   side conditions  what that assumes of this split, as do ownership, O3" in told
+    assert "  ✓  51 of 51  protocol " in told
+    assert "  ✓   7 of 7   side conditions  what that assumes of this split, as do ownership, O3" in told
     code, data = as_json(capsys, "prove", "catalogue:conceptual_one_robot")
     side = [v for v in data["reports"][0]["verdicts"] if v["name"].startswith("protocol.side.")]
     assert code == 0

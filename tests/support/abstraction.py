@@ -6,7 +6,7 @@ another: it reads from the difference what must have happened, plays it, and com
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from support.finite_structures import Structure, Thing, Tuples, Values
@@ -14,14 +14,19 @@ from support.finite_structures import Structure, Thing, Tuples, Values
 from firable.decompose.protocol.parametric.invariant import INVARIANT
 from firable.decompose.protocol.parametric.script import Action
 from firable.decompose.protocol.parametric.system import MOVING, PROTOCOL
+from firable.executor.protocol.deciders import TOP, coordinator_at, coordinators
 from firable.nets.decomposition import Decomposition
+from firable.nets.net import SignalKind
 
 Instance = tuple[str, tuple[Thing, ...]]
 """An action with the values of its parameters."""
 
 
 def net_structure(decomposition: Decomposition, rounds: Sequence[Thing], *, signals: bool) -> Structure:
-    """The things and the fixed relations of a decomposition; nothing moves yet. Without signals, gates are free."""
+    """The things and the fixed relations of a decomposition; nothing moves yet. Without signals, gates are free.
+
+    Whose rounds they are has to be added (`of_coordinators`).
+    """
     net = decomposition.net
     rows = {row.name: row for row in decomposition.coordinated}
     homes = {t.name: s.name for s in decomposition.subnets for t in s.transitions if t.name in net.transition_index}
@@ -44,7 +49,16 @@ def net_structure(decomposition: Decomposition, rounds: Sequence[Thing], *, sign
         "inhibitive": arcs("inhibitive", wanted=False),
         "signal": frozenset((name,) for name in sensed),
         "clears": frozenset(key for key in cleared if key[1] in sensed),
+        "free": frozenset(decomposition.free),
+        "lasting": frozenset((s.name,) for s in net.signals if s.kind is SignalKind.COMPLETION),
+        "behind": frozenset(
+            (t.name, u.name, net.place(place).owner or "")
+            for t in net.transitions
+            for u in net.transitions
+            for place in {*t.inputs, *t.permissive} & {*u.outputs}
+        ),
     }
+    deciders = {row.name: coordinator_at(row.at) for row in decomposition.coordinated}
     some_home = decomposition.subnets[0].name
     return Structure(
         {
@@ -52,15 +66,24 @@ def net_structure(decomposition: Decomposition, rounds: Sequence[Thing], *, sign
             "Transition": tuple(t.name for t in net.transitions),
             "Controller": tuple(subnet.name for subnet in decomposition.subnets),
             "Round": tuple(rounds),
+            "Coordinator": coordinators(decomposition),
         },
         {
             "owner": dict(
                 [(p.name, p.owner or "") for p in net.places] + [(s.name, s.owner or "") for s in net.signals]
             ),
             "home": {t.name: homes.get(t.name, some_home) for t in net.transitions},
+            "decider": {t.name: deciders.get(t.name, TOP) for t in net.transitions},
+            "coordinator-of": {},
         },
         {**fixed, **{relation.name: frozenset() for relation in MOVING}},
     )
+
+
+def of_coordinators(structure: Structure, rounds: Mapping[Thing, str]) -> Structure:
+    """The structure with these rounds, each of the coordinator of this name."""
+    things = {**structure.things, "Round": tuple(rounds)}
+    return replace(structure, things=things, functions={**structure.functions, "coordinator-of": rounds})
 
 
 def broken(configuration: Structure) -> list[str]:

@@ -25,15 +25,22 @@ from firable.decompose.protocol.parametric.system import (
     abort_order,
     acknowledgement,
     asked,
+    asks,
     begun,
     c,
     closed_round,
     commit_order,
     committed,
     coordinated,
+    coordinator_of,
+    counts,
     decided,
+    decider,
     disturb,
+    enabled_at,
+    free,
     heard,
+    input_of,
     marked,
     noted,
     obeyed,
@@ -46,9 +53,11 @@ from firable.decompose.protocol.parametric.system import (
     request,
     s,
     shadow,
+    stands,
     t,
     takes_part,
     u,
+    underway,
     vote,
     writes,
 )
@@ -68,7 +77,7 @@ class Conjunct:
         return Definition(f"inv-{self.name}", (), closed(self.formula))
 
 
-_underway = committed(r, t) & ~obeyed(r, t, owner(p)) & writes(t, p)
+_moving = committed(r, t) & ~obeyed(r, t, owner(p)) & writes(t, p)
 """A committed transition has moved this place in the shadow, and its part is not yet applied."""
 
 INVARIANT: Final = (
@@ -79,35 +88,43 @@ INVARIANT: Final = (
     Conjunct("V3", "promises of different rounds at one controller do not disturb each other", (
         promised(r, t, c) & promised(s, u, c) & ~same(r, s) & same(owner(p), c)).implies(~disturb(t, u, p))),
     Conjunct("V4", "a committed part stays promised until it is applied", (
-        committed(r, t) & takes_part(t, c) & ~obeyed(r, t, c)).implies(promised(r, t, c))),
+        committed(r, t) & asks(t, c) & ~obeyed(r, t, c)).implies(promised(r, t, c))),
     Conjunct("V5", "a round commits one transition at most", (
         committed(r, t) & committed(r, u)).implies(same(t, u))),
     Conjunct("S1", "where a committed part is not yet applied, the shadow has moved the token", (
-        _underway).implies(shadow(p).iff(output_of(t, p)))),
+        _moving).implies(shadow(p).iff(output_of(t, p)))),
     Conjunct("S2", "everywhere else the subnets hold what the shadow holds", (
-        ~exists(r, t)(_underway)).implies(marked(p).iff(shadow(p)))),
-    Conjunct("asked", "what is asked for is coordinated, in a round that is begun", (
-        asked(r, t)).implies(begun(r) & coordinated(t))),
+        ~exists(r, t)(_moving)).implies(marked(p).iff(shadow(p)))),
+    Conjunct("F1", "while a vote stands, the part has its inputs full and its outputs empty in its subnet", (
+        stands(t, c) & same(owner(p), c)).implies(
+            input_of(t, p).implies(marked(p)) & output_of(t, p).implies(~marked(p)))),
+    Conjunct("F2", "a standing vote that counts holds in the central net", (
+        counts(t, c) & same(owner(p), c)).implies(enabled_at(shadow, t, p))),
+    Conjunct("F3", "a vote stands until the order is applied, one order at a time", (
+        underway(r, t, c)).implies(stands(t, c) & underway(s, t, c).implies(same(r, s)))),
+    Conjunct("stands", "votes stand of free parts alone", stands(t, c).implies(free(t, c))),
+    Conjunct("asked", "what is asked for is coordinated, in a round of who decides it that is begun", (
+        asked(r, t)).implies(begun(r) & coordinated(t) & same(coordinator_of(r), decider(t)))),
     Conjunct("decided", "a round that is decided was begun", decided(r).implies(begun(r))),
     Conjunct("committed", "what is committed was asked for, in a round that is decided", (
         committed(r, t)).implies(decided(r) & asked(r, t))),
-    Conjunct("request", "requests go to those who take part in what is asked for", (
-        request(r, t, c)).iff(asked(r, t) & takes_part(t, c))),
+    Conjunct("request", "requests go to those who have to promise a part of what is asked for", (
+        request(r, t, c)).iff(asked(r, t) & asks(t, c))),
     Conjunct("promised", "a promise was requested, is voted for, and no order of it has been obeyed", (
         promised(r, t, c)).implies(request(r, t, c) & vote(r, t, c) & ~obeyed(r, t, c))),
     Conjunct("heard", "what the coordinator has heard was voted", heard(r, t, c).implies(vote(r, t, c))),
     Conjunct("commit-order", "orders to commit are those of the committed transition, to all who take part", (
         commit_order(r, t, c)).iff(committed(r, t) & takes_part(t, c))),
-    Conjunct("abort-order", "orders to abort are those of whatever else was asked for in a decided round", (
-        abort_order(r, t, c)).iff(decided(r) & asked(r, t) & ~committed(r, t) & takes_part(t, c))),
+    Conjunct("abort-order", "orders to abort are those of whatever else had to be promised in a decided round", (
+        abort_order(r, t, c)).iff(decided(r) & asked(r, t) & ~committed(r, t) & asks(t, c))),
     Conjunct("obeyed", "orders are obeyed in rounds that are decided", obeyed(r, t, c).implies(decided(r))),
-    Conjunct("acknowledgement", "who takes part in what is asked for acknowledges what it has obeyed, and only that", (
-        acknowledgement(r, t, c)).iff(request(r, t, c) & obeyed(r, t, c))),
+    Conjunct("acknowledgement", "who was asked, or ordered to commit, acknowledges what it has obeyed, and only that", (
+        acknowledgement(r, t, c)).iff((request(r, t, c) | commit_order(r, t, c)) & obeyed(r, t, c))),
     Conjunct("noted", "what the coordinator notes was acknowledged", (
         noted(r, t, c)).implies(acknowledgement(r, t, c))),
     Conjunct("closed", "a closed round is begun and decided", closed_round(r).implies(begun(r) & decided(r))),
-    Conjunct("closed-obeyed", "in a closed round all have obeyed", (
-        closed_round(r) & asked(r, t) & takes_part(t, c)).implies(obeyed(r, t, c))),
+    Conjunct("closed-noted", "in a closed round all have acknowledged", (
+        closed_round(r) & asked(r, t) & takes_part(t, c) & (~free(t, c) | committed(r, t))).implies(noted(r, t, c))),
 )  # fmt: skip
 """The invariant; the order is the one of the documentation."""
 

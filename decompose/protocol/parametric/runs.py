@@ -10,6 +10,7 @@ happen, and that what is proved is not proved of nothing.
 A run stands as text, `promise r1 G a; fire l`: an action and the names for its parameters. Names of rounds are r1, r2;
 of coordinated transitions capital letters, of local ones small; of controllers a, b, c; of coordinators k1, k2. There
 are no other things but places, which are p1, p2 and so on, as many as asked for; a place that a step names is a signal.
+The parts that are free of promise are those of which a step says that they stand, or are applied as such.
 Rejected: a search for the actions, too; it takes minutes where this takes a tenth of a second, and the runs worth
 showing are known.
 """
@@ -38,6 +39,7 @@ from firable.decompose.protocol.parametric.logic import (
 from firable.decompose.protocol.parametric.script import Script
 from firable.decompose.protocol.parametric.system import (
     INITIAL,
+    TAKES_NONE_BACK,
     Controller,
     Coordinator,
     Place,
@@ -47,6 +49,7 @@ from firable.decompose.protocol.parametric.system import (
     central_enabled,
     clears,
     coordinated,
+    free,
     inhibitive_of,
     initially,
     input_of,
@@ -93,6 +96,10 @@ class _Stage:
     controllers: tuple[Variable, ...]
     rounds: tuple[Variable, ...]
     coordinators: tuple[Variable, ...]
+    free: frozenset[tuple[str, str]]
+    """The parts that are free of promise."""
+    cleared: frozenset[tuple[str, str]]
+    """Which transitions clear which signals, as far as steps say so; no others do."""
 
     @property
     def sorts(self) -> tuple[tuple[Sort, tuple[Variable, ...]], ...]:
@@ -186,7 +193,9 @@ def _stage(protocol: Protocol, steps: Sequence[Step], places: int, given: Sequen
         return tuple(sorted((v for v in found if v.sort == sort), key=lambda v: v.name))
 
     ordinary = tuple(Variable(f"p{i + 1}", Place) for i in range(places))
-    return _Stage(ordinary, of(Place), of(Transition), of(Controller), of(Round), of(Coordinator))
+    parts = frozenset((names[-2], names[-1]) for name, names in steps if name in {"stand", "apply-free"})
+    cleared = frozenset((names[-2], names[-1]) for name, names in steps if name == "sense-late")
+    return _Stage(ordinary, of(Place), of(Transition), of(Controller), of(Round), of(Coordinator), parts, cleared)
 
 
 def _named(protocol: Protocol, step: Step) -> Iterator[tuple[Variable, Variable]]:
@@ -210,7 +219,7 @@ def _course(protocol: Protocol, steps: Sequence[Step], names: dict[Variable, str
         action, values = protocol.action(step[0]), dict(_named(protocol, step))
         if action.fires:
             yield values[t].name
-        elif p in values:
+        elif p in values and shadow in {update.relation for update in action.updates}:
             yield names[values[p]]
 
 
@@ -232,7 +241,10 @@ def _script(
         script.add(formula, "given")
     *before, last = steps
     for step in before:
-        script.step(protocol.action(step[0]), {p: v.name for p, v in _named(protocol, step)})
+        action, names = protocol.action(step[0]), {p: v.name for p, v in _named(protocol, step)}
+        if action.fires and protocol.persistent:
+            script.add(TAKES_NONE_BACK, "net: votes of free parts are persistent", names)
+        script.step(action, names)
     names = {p: v.name for p, v in _named(protocol, last)}
     for demand in protocol.action(last[0]).demands:
         script.add(demand.formula, demand.words, names)
@@ -259,13 +271,17 @@ def _tidy(stage: _Stage) -> Iterator[Formula]:
     for transition in stage.transitions:
         is_coordinated = coordinated(transition)
         yield is_coordinated if transition.name.isupper() else ~is_coordinated
-        yield both([~clears(transition, place) for place in both_kinds])
+        for place in both_kinds:
+            cleared = (transition.name, place.name) in stage.cleared
+            yield clears(transition, place) if cleared else ~clears(transition, place)
         for moves in (input_of, output_of):
             yield any_of([moves(transition, place) for place in stage.places])
             yield both([~moves(transition, each) for each in stage.signals])
         for one, other in combinations(_ARCS, 2):
             yield both([~(one(transition, place) & other(transition, place)) for place in both_kinds])
         for controller in stage.controllers:
+            is_free = (transition.name, controller.name) in stage.free
+            yield free(transition, controller) if is_free else ~free(transition, controller)
             its = [reads(transition, place) & same(owner(place), controller) for place in both_kinds]
             yield takes_part(transition, controller).implies(any_of(its))
 

@@ -1,4 +1,4 @@
-"""What connects the theorem, which is about any net, with one decomposition: six conditions on names.
+"""What connects the theorem, which is about any net, with one decomposition: seven conditions on names.
 
 The theorem speaks of a part as what a transition has of places at a controller. A `Decomposition` lists subnets and a
 table; it may say something else, by a fault of the split or an edit by hand. So it is compared, name by name, with the
@@ -11,7 +11,11 @@ central net, in time linear in arcs and gates:
 - *strangers*: the subnets have no transition that is neither, and none stands for two;
 - *gates*: the external gates of the parts are those of the transition, each at the owner of its signal, and commands
   are completed and timed by the same signals (`signal`, `clears`);
-- *start*: a place is marked in its subnet as in the central net.
+- *start*: a place is marked in its subnet as in the central net;
+- *free*: the parts that are said to be free of promise are parts, nobody else at their controller takes or reads what
+  they take, or fills or reads what they fill, or reads a signal that they clear but who needs a place full that they
+  fill; and of signals they read completions alone, at 1, which fall by a command. That their votes are persistent, too,
+  is no comparison of names but a verdict of its own on each (`firable.decompose.splitting.persistence`).
 
 Nothing is asked of arbitration groups. Promises alone keep conflicting transitions apart, whichever rounds ask for
 them; groups decide who wins, which is fairness and not safety.
@@ -29,7 +33,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from firable.nets.decomposition import Decomposition
-from firable.nets.net import Net, Transition
+from firable.nets.net import Net, SignalKind, Transition
 from firable.nets.verdict import Status, Verdict, Witness
 
 
@@ -223,6 +227,41 @@ def _start(split: _Split) -> Iterator[_Problem]:
                 yield _Problem(place.name, f"{words}, other than in the central net")
 
 
+def _free(split: _Split) -> Iterator[_Problem]:
+    parts = {(row.name, part.controller) for row in split.decomposition.coordinated for part in row.parts}
+    kind = {signal.name: signal.kind for signal in split.net.signals}
+    at: dict[str, list[Transition]] = {}
+    for each in split.net.transitions:
+        owners = {split.owner_of.get(place) for arcs in _KINDS for place in _arcs(each, arcs)}
+        owners |= {split.net.signal(gate.signal).owner for gate in each.external}
+        for owner in owners - {None}:
+            at.setdefault(str(owner), []).append(each)
+    for name, controller in split.decomposition.free:
+        if (name, controller) not in parts or name not in split.net.transition_index:
+            yield _Problem(name, f"'{name}' has no part at '{controller}' to be free of promise")
+            continue
+        whole = split.net.transition(name)
+        takes, fills = (
+            {place for place in _arcs(whole, arcs) if split.owner_of.get(place) == controller}
+            for arcs in ("inputs", "outputs")
+        )
+        cleared = {signal for place in fills for signal in split.cleared_of[place]}
+        for gate in whole.external:
+            if split.net.signal(gate.signal).owner != controller:
+                continue
+            if not gate.wanted or kind[gate.signal] is not SignalKind.COMPLETION:
+                yield _Problem(name, f"'{name}' is free of promise at '{controller}', and reads '{gate.signal}'")
+        for other in at.get(controller, ()):
+            if other is whole:
+                continue
+            full, empty = {*other.inputs, *other.permissive}, {*other.outputs, *other.inhibitive}
+            read = {gate.signal for gate in other.external} & cleared
+            in_the_way = sorted(takes & full | fills & empty | (set() if fills & full else read))
+            if in_the_way:
+                words = f"'{name}' is free of promise at '{controller}', and '{other.name}' is at '{in_the_way[0]}'"
+                yield _Problem(name, words)
+
+
 CONDITIONS: Final[tuple[tuple[str, str, Callable[[_Split], Iterator[_Problem]]], ...]] = (
     ("owner", "each place stands in one subnet, that of its owner", _owner),
     ("parts", "each part has the arcs and gates of its transition at its controller, and no owner is left out", _parts),
@@ -230,5 +269,6 @@ CONDITIONS: Final[tuple[tuple[str, str, Callable[[_Split], Iterator[_Problem]]],
     ("strangers", "the subnets have no other transitions", _strangers),
     ("gates", "the parts have the external gates of the transition, each at the owner of its signal", _gates),
     ("start", "the subnets are marked as the central net", _start),
+    ("free", "parts that are free of promise disturb nobody, and read no signal that falls by itself", _free),
 )
 """What the theorem assumes of a decomposition. To add one: its function, and a row."""

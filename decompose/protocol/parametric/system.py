@@ -31,6 +31,13 @@ that is bad in every way (Lamport, Specifying Systems; Padon et al., Ivy, PLDI 2
 changes nothing here, and whatever it might do stays possible after its restart. A coordinator that crashes keeps what
 it has decided and gives up the rest of its rounds (`restart`).
 
+**Parts free of promise.** A part may be `free`: it is not asked in a round. Its controller votes whenever the part is
+enabled, and the vote `stands` until an order for it is applied; nothing is promised, and the decision is taken on the
+standing vote, if the last order to the part has been acknowledged: a vote from before that firing is used up. What is
+asked of such a part and its net is `FREE` and, of what fires, `TAKES_NONE_BACK`: that its yes is persistent. Between
+its decision and its order others at its controller go on, and see the marking from before it; `FREE` says that they do
+no more then than they may.
+
 **What fires when.** `shadow` is the marking of the central net: it fires at a commit and at each local firing, and has
 the signals of the images. All that is proved compares it with `marked`, what the controllers hold.
 
@@ -52,6 +59,8 @@ from firable.decompose.protocol.parametric.logic import (
     Term,
     Variable,
     both,
+    closed,
+    exists,
     forall,
     same,
 )
@@ -70,6 +79,7 @@ q, u, d, s = Variable("q", Place), Variable("u", Transition), Variable("d", Cont
 
 owner = Function("owner", Place, Controller)
 home = Function("home", Transition, Controller)
+decider = Function("decider", Transition, Coordinator)
 coordinator_of = Function("coordinator-of", Round, Coordinator)  # so no two rounds of theirs have one name
 coordinated = Relation("coordinated", (Transition,))
 input_of = Relation("input", (Transition, Place))
@@ -80,6 +90,10 @@ takes_part = Relation("takes-part", (Transition, Controller))
 clears = Relation("clears", (Transition, Place))  # a signal, because it completes a command that is sent then
 signal = Relation("signal", (Place,))
 initially = Relation("initially", (Place,))
+free = Relation("free", (Transition, Controller))  # the part needs no promise
+lasting = Relation("lasting", (Place,))  # a signal that falls by a command alone: a completion
+behind = Relation("behind", (Transition, Transition, Controller))
+"""The first needs a place of the controller full that the second fills."""
 
 writes = Definition("writes", (t, p), input_of(t, p) | output_of(t, p) | clears(t, p))
 reads = Definition("reads", (t, p), input_of(t, p) | output_of(t, p) | permissive_of(t, p) | inhibitive_of(t, p))
@@ -90,12 +104,38 @@ disturb = Definition(  # firing one could change what the other reads
 
 GATES_TAKE_PART: Final = "who owns a place that a coordinated transition moves or reads takes part in it (O3)"
 
+falsifies = Definition(  # firing one makes what the other needs at a place false
+    "falsifies-at",
+    (t, u, p),
+    ((input_of(t, p) | clears(t, p)) & (input_of(u, p) | permissive_of(u, p)))
+    | (output_of(t, p) & (output_of(u, p) | inhibitive_of(u, p))),
+)
+
+_beside = free(t, c) & same(owner(p), c) & ~same(t, u)
+"""Of a free part and a place of its controller: what another transition does there."""
+FREE: Final[tuple[tuple[str, Formula], ...]] = (
+    ("a part that is free of promise is one of a coordinated transition", (
+        closed(free(t, c).implies(coordinated(t) & takes_part(t, c))))),
+    ("no other transition takes an input of a free part, or reads it full", (
+        closed((_beside & input_of(t, p)).implies(~input_of(u, p) & ~permissive_of(u, p))))),
+    ("no other transition fills an output of a free part, or reads it empty", (
+        closed((_beside & output_of(t, p)).implies(~output_of(u, p) & ~inhibitive_of(u, p))))),
+    ("who reads a signal that a free part clears needs a place full that it fills", (
+        closed((_beside & clears(t, p) & reads(u, p)).implies(behind(u, t, c))))),
+    ("what a command clears is a signal", closed(clears(t, p).implies(signal(p)))),
+    ("of signals a free part reads such alone, at 1, as fall by a command", (
+        closed((free(t, c) & same(owner(p), c) & signal(p)).implies(
+            ~input_of(t, p) & ~output_of(t, p) & ~inhibitive_of(t, p) & permissive_of(t, p).implies(lasting(p)))))),
+)  # fmt: skip
+"""What is assumed of every part that is free of promise, and checked of each."""
+
 STATIC: Final[tuple[tuple[str, Formula], ...]] = (
     (GATES_TAKE_PART, forall(u, q)((coordinated(u) & touches(u, q)).implies(takes_part(u, owner(q))))),
     (
         "a local transition moves and reads places of its home alone",
         forall(u, q)((~coordinated(u) & touches(u, q)).implies(same(owner(q), home(u)))),
     ),
+    *FREE,
 )
 """What is assumed of every net and its split, and checked of each."""
 
@@ -114,6 +154,8 @@ closed_round = Relation("closed", (Round,), moves=True)
 # A controller: the parts that it has promised, and those whose order it has obeyed.
 promised = Relation("promised", (Round, Transition, Controller), moves=True)
 obeyed = Relation("obeyed", (Round, Transition, Controller), moves=True)
+stands = Relation("stands", (Transition, Controller), moves=True)
+"""The controller has voted yes on a free part, and has not applied an order for it since."""
 # Messages, once sent.
 request = Relation("request", (Round, Transition, Controller), moves=True)
 vote = Relation("vote", (Round, Transition, Controller), moves=True)
@@ -122,13 +164,13 @@ abort_order = Relation("abort-order", (Round, Transition, Controller), moves=Tru
 acknowledgement = Relation("acknowledgement", (Round, Transition, Controller), moves=True)
 
 MOVING: Final = (
-    *(marked, shadow, begun, asked, heard, decided, committed, noted, closed_round, promised, obeyed),
+    *(marked, shadow, begun, asked, heard, decided, committed, noted, closed_round, promised, obeyed, stands),
     *(request, vote, commit_order, abort_order, acknowledgement),
 )
 """All that steps change: a configuration is what these hold of."""
 
 
-def _enabled(tokens: Relation, of: Variable, at: Variable) -> Formula:
+def enabled_at(tokens: Relation, of: Variable, at: Variable) -> Formula:
     """Eq. (1)-(2) at one place: an input or permissive gate needs a token, an output or inhibitive gate none."""
     full = (input_of(of, at) | permissive_of(of, at)).implies(tokens(at))
     empty = (output_of(of, at) | inhibitive_of(of, at)).implies(~tokens(at))
@@ -136,9 +178,9 @@ def _enabled(tokens: Relation, of: Variable, at: Variable) -> Formula:
 
 
 part_enabled = Definition(  # Eq. (1)-(2) of a part, in the subnet of its controller
-    "part-enabled", (t, c), forall(q)(same(owner(q), c).implies(_enabled(marked, t, q)))
+    "part-enabled", (t, c), forall(q)(same(owner(q), c).implies(enabled_at(marked, t, q)))
 )
-central_enabled = Definition("central-enabled", (t,), forall(q)(_enabled(shadow, t, q)))
+central_enabled = Definition("central-enabled", (t,), forall(q)(enabled_at(shadow, t, q)))
 
 
 def _fired(tokens: Relation, of: Variable, at: Variable) -> Formula:
@@ -151,11 +193,20 @@ undisturbed = Definition(  # O1, of a part of round r and the promises given in 
     (r, t, c),
     forall(s, u, q)((promised(s, u, c) & ~same(s, r) & same(owner(q), c)).implies(~disturb(t, u, q))),
 )
-undisturbed_locally = Definition(  # O1, of a local transition and all promises
+undisturbed_locally = Definition(  # O1, of a local transition or a free part, and all promises
     "undisturbed-locally",
     (t, c),
     forall(s, u, q)((promised(s, u, c) & same(owner(q), c)).implies(~disturb(t, u, q))),
 )
+
+underway = Definition(  # the order to a free part is decided, and not yet applied
+    "underway", (r, t, c), committed(r, t) & free(t, c) & ~obeyed(r, t, c)
+)
+counts = Definition(  # a standing vote from after the last order was applied
+    "counts", (t, c), stands(t, c) & ~exists(s)(underway(s, t, c))
+)
+TAKES_NONE_BACK: Final = forall(u, d, q)((counts(u, d) & ~same(u, t) & same(owner(q), d)).implies(~falsifies(t, u, q)))
+"""What fires takes no standing vote of another transition back: persistence, at the moment of a firing (`theorem`)."""
 
 # --- What may happen
 #
@@ -203,19 +254,25 @@ def part_applied(of: Variable, at: Term) -> Update:
     return Update(marked, (q,), (own & _fired(marked, of, q)) | (~own & marked(q)))
 
 
-_stop_all = abort_order(s, u, d) | (asked(s, u) & takes_part(u, d) & ~decided(s) & same(coordinator_of(s), k))
+def asks(of: Variable, at: Variable) -> Formula:
+    """Who is asked in a round: who takes part and has to promise."""
+    return takes_part(of, at) & ~free(of, at)
+
+
+_stop_all = abort_order(s, u, d) | (asked(s, u) & asks(u, d) & ~decided(s) & same(coordinator_of(s), k))
 
 ASK: Final = Action(
     "ask",
     (r, t),
     (
-        Demand("the coordinator decides it", coordinated(t)),
+        Demand("it is coordinated", coordinated(t)),
+        Demand("the round is one of the coordinator that decides it", same(coordinator_of(r), decider(t))),
         Demand("the round is not decided", ~decided(r)),
     ),
     (
         adds(begun, r),
         adds(asked, r, t),
-        adds_where(request, same(s, r) & same(u, t) & takes_part(t, d)),
+        adds_where(request, same(s, r) & same(u, t) & asks(t, d)),
     ),
     "the coordinator asks for {t} in {r}",
 )
@@ -231,6 +288,17 @@ PROMISE: Final = Action(
     (adds(promised, r, t, c), adds(vote, r, t, c)),
     "{c} promises {t} in {r}, and votes yes",
 )
+STAND: Final = Action(
+    "stand",
+    (t, c),
+    (
+        Demand("the part is free of promise", free(t, c)),
+        Demand("the part is enabled in the subnet", part_enabled(t, c)),
+        Demand("no promise is disturbed (O1)", undisturbed_locally(t, c)),
+    ),
+    (adds(stands, t, c),),
+    "{c} votes yes on {t}, and promises nothing",
+)
 HEAR: Final = Action(
     "hear",
     (r, t, c),
@@ -244,13 +312,20 @@ DECIDE: Final = Action(
     (
         Demand("the round asks for it", asked(r, t)),
         Demand("the round is not decided", ~decided(r)),
-        Demand("all who take part have voted yes", forall(d)(takes_part(t, d).implies(heard(r, t, d)))),
+        Demand("all who have to promise have voted yes", forall(d)(asks(t, d).implies(heard(r, t, d)))),
+        Demand("the votes of free parts stand", forall(d)(free(t, d).implies(stands(t, d)))),
+        Demand(
+            "no earlier order of it to a free part is unacknowledged",
+            forall(s, d)(
+                (free(t, d) & committed(s, t) & same(coordinator_of(s), coordinator_of(r))).implies(noted(s, t, d))
+            ),
+        ),
     ),
     (
         adds(decided, r),
         adds(committed, r, t),
         adds_where(commit_order, same(s, r) & same(u, t) & takes_part(t, d)),
-        adds_where(abort_order, same(s, r) & asked(r, u) & ~same(u, t) & takes_part(u, d)),
+        adds_where(abort_order, same(s, r) & asked(r, u) & ~same(u, t) & asks(u, d)),
         shadow_fires(t),
     ),
     "the coordinator decides {t} in {r}: it fires",
@@ -265,7 +340,7 @@ GIVE_UP: Final = Action(
     ),
     (
         adds(decided, r),
-        adds_where(abort_order, same(s, r) & asked(r, u) & takes_part(u, d)),
+        adds_where(abort_order, same(s, r) & asked(r, u) & asks(u, d)),
     ),
     "the coordinator gives {r} up",
 )
@@ -294,6 +369,22 @@ APPLY: Final = Action(
     ),
     "the order for {t} in {r} arrives at {c}, which applies its part",
 )
+APPLY_FREE: Final = Action(
+    "apply-free",
+    (r, t, c),
+    (
+        Demand("the order to commit has arrived", commit_order(r, t, c)),
+        Demand("the part is free of promise", free(t, c)),
+        Demand("no order of the round has been obeyed", ~obeyed(r, t, c)),
+    ),
+    (
+        part_applied(t, c),
+        removes(stands, t, c),
+        adds(obeyed, r, t, c),
+        adds(acknowledgement, r, t, c),
+    ),
+    "the order for {t} in {r} arrives at {c}, which applies its part and is free to vote on it again",
+)
 RELEASE: Final = Action(
     "release",
     (r, t, c),
@@ -314,7 +405,8 @@ CLOSE: Final = Action(
     (
         Demand("the round is decided", decided(r)),
         Demand(
-            "all who were asked have obeyed", forall(u, d)((asked(r, u) & takes_part(u, d)).implies(noted(r, u, d)))
+            "all who got an order have obeyed",
+            forall(u, d)((asked(r, u) & takes_part(u, d) & (~free(u, d) | committed(r, u))).implies(noted(r, u, d))),
         ),
     ),
     (adds(closed_round, r),),
@@ -346,18 +438,39 @@ SENSE: Final = Action(
     (
         Demand("it is a signal", signal(p)),
         Demand("no promise reads or clears it", forall(s, u)(promised(s, u, owner(p)).implies(~touches(u, p)))),
+        Demand("it does not fall where only a command may clear it", ~(lasting(p) & marked(p))),
+        Demand(
+            "no free part that is decided and not yet applied clears it",
+            forall(s, u)(underway(s, u, owner(p)).implies(~clears(u, p))),
+        ),
     ),
     tuple(Update(tokens, (q,), (same(q, p) & ~tokens(q)) | (~same(q, p) & tokens(q))) for tokens in (marked, shadow)),
     "the signal {p} changes",
 )
+SENSE_LATE: Final = Action(
+    "sense-late",
+    (r, t, p),
+    (
+        Demand("it is a signal", signal(p)),
+        Demand("a free part that is decided and not yet applied clears it", underway(r, t, owner(p)) & clears(t, p)),
+    ),
+    (Update(marked, (q,), (same(q, p) & ~marked(q)) | (~same(q, p) & marked(q))),),
+    "the signal {p} changes, which the firing of {t} in {r} has cleared, and its order is still to clear",
+)
+"""The other case of `sense`, of a signal that the central net has cleared already."""
 
 
 @dataclass(frozen=True)
 class Protocol:
-    """A protocol: what it assumes of the net, and what may happen."""
+    """A protocol: what it assumes of the net, and what may happen.
+
+    With `persistent` it assumes, too, that the votes of parts that are free of promise are: of the markings that the
+    central net reaches, not of its arcs.
+    """
 
     static: tuple[tuple[str, Formula], ...]
     actions: tuple[Action, ...]
+    persistent: bool = True
 
     def action(self, name: str) -> Action:
         """The action of a name; `KeyError` where there is none."""
@@ -365,7 +478,11 @@ class Protocol:
 
 
 PROTOCOL: Final = Protocol(
-    STATIC, (ASK, PROMISE, HEAR, DECIDE, GIVE_UP, RESTART, APPLY, RELEASE, NOTE, CLOSE, FORGET, FIRE, SENSE)
+    STATIC,
+    (
+        *(ASK, PROMISE, STAND, HEAR, DECIDE, GIVE_UP, RESTART, APPLY, APPLY_FREE, RELEASE, NOTE, CLOSE, FORGET),
+        *(FIRE, SENSE, SENSE_LATE),
+    ),
 )
 """The protocol of the executor."""
 

@@ -8,6 +8,9 @@ is a run from the start on a small net at whose end something is wrong:
 - APART: every decided round is closed, and the controllers hold another marking than the central net;
 - STUCK: every round is closed, and a promise still stands, which nobody will ever release.
 
+With parts that are free of promise, what they assume of a net is taken away in the same manner, one condition after
+the other: a part that is taken for one and is none.
+
 Most of these are the folklore of distributed commit (Gray, Notes on data base operating systems, 1978; Bernstein,
 Hadzilacos, Goodman, 1987, chapter 7), told of tokens. The actions of each run are given here, and what they happen
 on is found (`runs`).
@@ -205,6 +208,17 @@ def _covering(disturbed: Formula) -> Callable[[Protocol], Protocol]:
     return _all(_instead("promise", "O1", promises(r, t, c)), _instead("fire", "O1", locally(t, home(t))))
 
 
+def _not_asked(*words: str) -> Callable[[Protocol], Protocol]:
+    """A protocol that does not ask of free parts what these words say."""
+
+    def change(protocol: Protocol) -> Protocol:
+        kept = tuple(its for its in protocol.static if not any(word in its[0] for word in words))
+        assert len(kept) == len(protocol.static) - len(words), f"{words} name no conditions"
+        return replace(protocol, static=kept)
+
+    return change
+
+
 def _gates_elsewhere_are_cached(protocol: Protocol) -> Protocol:
     moved = forall(u, q)((coordinated(u) & writes(u, q)).implies(takes_part(u, owner(q))))
     return replace(
@@ -229,6 +243,8 @@ _FORGOTTEN: Final = Action(
 
 _VOTES: Final = "ask r1 G; promise r1 G a; promise r1 G b; hear r1 G a; hear r1 G b"
 _APPLIED: Final = f"{_VOTES}; decide r1 G; apply r1 G a; apply r1 G b; note r1 G a; note r1 G b; close r1"
+_STANDING: Final = "ask r1 G; stand G a; stand G b"
+_USED: Final = f"{_STANDING}; decide r1 G; apply-free r1 G a; apply-free r1 G b; note r1 G a; note r1 G b; close r1"
 _G = Variable("G", Transition)
 
 WRONG: Final = (
@@ -437,5 +453,97 @@ WRONG: Final = (
         f"{_VOTES}; decide r1 G",
         2,
     ),
+    Wrong(
+        "votes-that-are-taken-back",
+        "O1, free",
+        "a part is free of promise though its vote is not persistent",
+        lambda protocol: replace(protocol, persistent=False),
+        ("persists.fire", "persists.decide"),
+        f"{_STANDING}; fire l; decide r1 G",
+        5,
+    ),
+    Wrong(
+        "inputs-of-free-parts-read-by-others",
+        "O1, free",
+        "a part is free of promise though others read what it will take, before the order comes",
+        _not_asked("takes an input of a free part"),
+        ("keeps.fire", "follows.fire"),
+        f"{_STANDING}; decide r1 G; fire l",
+        5,
+    ),
+    Wrong(
+        "outputs-of-free-parts-read-by-others",
+        "O1, free",
+        "a part is free of promise though others read what it will fill, before the order comes",
+        _not_asked("fills an output of a free part"),
+        ("keeps.fire", "follows.fire"),
+        f"{_STANDING}; decide r1 G; fire l",
+        5,
+    ),
+    Wrong(
+        "votes-while-a-promise-stands",
+        "O1, free",
+        "a controller votes on a free part that what it has promised will disturb",
+        without("stand", "O1"),
+        ("keeps.stand",),
+        "ask r1 H; promise r1 H a; promise r1 H b; hear r1 H a; hear r1 H b; decide r1 H; "
+        "ask r2 G; stand G a; stand G b; decide r2 G",
+        6,
+    ),
+    Wrong(
+        "free-parts-that-wait-for-sensors",
+        "O4, free",
+        "a part is free of promise though it reads a signal that may change before the order comes",
+        _not_asked("of signals a free part reads"),
+        ("keeps.sense",),
+        f"{_STANDING}; sense s1; decide r1 G",
+        4,
+    ),
+    Wrong(
+        "used-votes-counted-again",
+        "O5, free",
+        "a standing vote from before the last firing counts for the next one",
+        _without_update("apply-free", "stands"),
+        ("keeps.apply-free",),
+        f"{_USED}; ask r2 G; decide r2 G",
+        4,
+    ),
+    Wrong(
+        "votes-counted-before-the-order-is-obeyed",
+        "O5, free",
+        "a standing vote counts though the order that uses it up has not been acknowledged",
+        without("decide", "unacknowledged"),
+        ("keeps.decide", "follows.decide"),
+        f"{_STANDING}; decide r1 G; ask r2 G; decide r2 G",
+        4,
+    ),
+    Wrong(
+        "free-parts-applied-twice",
+        "O5, free",
+        "an order to a free part that arrives again is carried out again",
+        without("apply-free", "obeyed"),
+        ("keeps.apply-free",),
+        f"{_USED}; fire l; apply-free r1 G a",
+        4,
+        APART,
+    ),
+    Wrong(
+        "free-parts-not-waited-for",
+        "O5, free",
+        "a transition is decided though a free part has not voted",
+        without("decide", "stand"),
+        ("keeps.decide", "follows.decide"),
+        f"{_USED}; fire l; ask r2 G; stand G a; decide r2 G",
+        5,
+    ),
+    Wrong(
+        "decided-by-two-coordinators",
+        "O8, free",
+        "a transition of which parts are free is decided by two coordinators, neither knowing of the other's order",
+        without("ask", "decides it"),
+        ("keeps.ask",),
+        "ask r1 G; ask r2 G; stand G a; stand G b; decide r1 G; decide r2 G",
+        4,
+    ),
 )
-"""The wrong protocols, in the order of the obligations that they forget."""
+"""The wrong protocols, in the order of the obligations that they forget; last those with parts free of promise."""
