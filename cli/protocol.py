@@ -16,6 +16,7 @@ import click
 from firable.cli import text
 
 if TYPE_CHECKING:
+    from firable.analysis.evidence.document import Document
     from firable.decompose.protocol.building import ProtocolNet
     from firable.decompose.protocol.outages import Outage
     from firable.decompose.protocol.refuting import Refutation
@@ -79,7 +80,7 @@ def ask(
     """
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
-    from firable.decompose.protocol.outages import outage_verdict, outages
+    from firable.decompose.protocol.outages import inquests, outage_verdict
     from firable.decompose.protocol.refuting import readable, refute
     from firable.decompose.protocol.verdicts import protocol_verdicts
     from firable.decompose.protocol.wrong import wrong_protocols
@@ -90,7 +91,7 @@ def ask(
     verdicts: tuple[Verdict, ...] = ()
     protocols: dict[str, ProtocolNet] = {}
     files: dict[str, str | bytes] = {}
-    dead: list[Outage] = []
+    dead: list[tuple[Outage, Verdict]] = []
     refutations: list[Refutation] = []
     interrupted: tuple[Verdict, ...] = ()
     try:
@@ -102,16 +103,24 @@ def ask(
             begins("writing the evidence of it")
             files = found.evidence() if evidence else {}
         if asked.faults:
-            begins("exploring it while somebody is dead")
-            dead.extend(outages(decomposition, limits))
+            begins("asking what goes on while somebody is dead")
+            for inquest in inquests(decomposition, limits):
+                verdict, shown = inquest.sealed() if evidence else (outage_verdict(inquest.outage), {})
+                dead.append((inquest.outage, verdict))
+                files |= dict(_packed(file, document) for file, document in shown.items())
         for wrong in wrong_protocols(decomposition.net) if asked.wrong else ():
             begins(f"trying the wrong protocol {wrong.name}")
             refutations.append(readable(refute(wrong, decomposition, limits())))
     except KeyboardInterrupt:
         interrupted = (_interrupted(),)
-    verdicts += tuple(map(outage_verdict, dead)) + tuple(one.verdict for one in refutations) + interrupted
+    verdicts += tuple(verdict for _, verdict in dead) + tuple(one.verdict for one in refutations) + interrupted
     protocols |= {refutation.verdict.name: refutation.protocol for refutation in refutations}
-    return Answered(verdicts, protocols, files, tuple(dead), tuple(refutations))
+    return Answered(verdicts, protocols, files, tuple(outage for outage, _ in dead), tuple(refutations))
+
+
+def _packed(file: str, document: Document) -> tuple[str, bytes]:
+    data = document.to_bytes()
+    return (file if data.startswith(b"{") else f"{file}.gz"), data
 
 
 def _interrupted() -> Verdict:
@@ -124,7 +133,7 @@ def _interrupted() -> Verdict:
 def show(answered: Answered) -> None:
     """Print what was found of the protocol."""
     required = [v for v in answered.verdicts if v.name.partition(".")[0] in {"explored", "faults"}]
-    shown = [verdict for verdict in required if not verdict.name.startswith("faults.dead.")]
+    shown = [verdict for verdict in required if not verdict.name.startswith("faults.dead")]
     if shown:
         click.echo(f"\n{click.style('the protocol', bold=True)}")
         width = max(len(verdict.name) for verdict in shown)

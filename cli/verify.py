@@ -247,6 +247,8 @@ def _show(report: Report) -> None:
 def _show_bundle(report: Report) -> None:
     from firable.decompose.verification.explored import TITLES
     from firable.decompose.verification.machines import TITLE as MACHINES
+    from firable.decompose.verification.outages import PREFIX as DEAD
+    from firable.decompose.verification.outages import TITLE as WHILE_DEAD
     from firable.decompose.verification.protocol import TITLE
     from firable.decompose.verification.refinement import TITLE as REFINEMENT
     from firable.decompose.verification.restating import HEADS
@@ -258,6 +260,7 @@ def _show_bundle(report: Report) -> None:
         **HEADS,
         "protocol": TITLE,
         **TITLES,
+        DEAD: WHILE_DEAD,
         "o4": MACHINES,
         "refinement": REFINEMENT,
         "persistent": "of each vote it is shown whether it is persistent",
@@ -265,7 +268,8 @@ def _show_bundle(report: Report) -> None:
     families: dict[str, list[Verdict]] = {family: [] for family in titles}
     others: list[Verdict] = []
     for verdict in report.verdicts:
-        families.get(verdict.name.partition(".")[0], others).append(verdict)
+        family = DEAD if verdict.name.startswith(DEAD) else verdict.name.partition(".")[0]
+        families.get(family, others).append(verdict)
     click.echo(f"\n{click.style('obligations', bold=True)}, answered by {report.bundle['solver']}")
     for family, some in families.items():
         if some:

@@ -20,6 +20,7 @@ from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
 from firable.decompose.proofs.held_gates import held_gates
 from firable.decompose.proofs.proving import TIMEOUT_MS, prove
+from firable.decompose.protocol.outages import sealed_outages
 from firable.decompose.protocol.shown import proved_without_exploring
 from firable.decompose.refinement.sealing import Origin, sealed
 from firable.decompose.splitting.cut import split
@@ -73,12 +74,14 @@ def make_bundle(
     on_the_net = (replace(v, evidence=(*v.evidence, EVIDENCE)) if v.name in named else v for v in report.verdicts)
     families = ["explored"] * (protocol or faults) + ["faults"] * faults
     run, obligations = proved_without_exploring(decomposition, families, timeout_ms)
+    dead, last_rites = sealed_outages(decomposition, limits) if faults else ((), {})
     held, machines = tuple[Verdict, ...](), dict[str, str]()
     if plant:
         held, machines = held_gates(decomposition, parse_plant(plant)).sealed(plant, limits)
     refined, opened = sealed(report.net, origin, limits, timeout_ms) if origin else ((), {})
-    verdicts = (*on_the_net, *proof.verdicts, *run, *held, *voted, *refined)
-    files = {EVIDENCE: document.to_text(), **proof.files, **obligations, **machines, **shown, **opened}
+    verdicts = (*on_the_net, *proof.verdicts, *run, *dead, *held, *voted, *refined)
+    proofs = {**proof.files, **obligations, **last_rites}
+    files = {EVIDENCE: document.to_text(), **proofs, **machines, **shown, **opened}
     bundle = Bundle(decomposition, verdicts, files)
     if problems := unproved(bundle):
         lacking = {record.name: record.lacking for record in document.records if record.proved and record.lacking}

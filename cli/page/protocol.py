@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def is_of_protocol(verdict: Verdict) -> bool:
     """Whether the sections here tell what this verdict says."""
-    return verdict.name.startswith(("wrong.", "faults.dead."))
+    return verdict.name.startswith(("wrong.", "faults.dead"))
 
 
 def while_dead(report: Report) -> Markup | None:

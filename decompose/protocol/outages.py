@@ -6,51 +6,59 @@ whatever the central net may fire next can be fired next, so what stood still re
 of that.
 
 Whoever is *dead* never restarts. That is safe too, by the same exploration, since nobody has to restart in it. What the
-others can still do is asked of a net in which one of them may crash, of its configurations after the crash, which
-nothing leads out of. Each carries a marking of the central net, and the dead keep back only what the central net could
-still fire from there: a transition that fires once, at start-up, and has fired would not fire again anyway, nor what
-another choice has ruled out. A transition
+others can still do is told of each controller and of each coordinator. Every configuration after the crash carries a
+marking of the central net, and the dead keep back only what the central net could still fire from there: a transition
+that fires once, at start-up, and has fired would not fire again anyway, nor what another choice has ruled out. A
+transition
 
-- stands still *at once*, if none of these configurations fires it: it is local to who is dead, or nobody is left to
-  decide it;
-- stands still *at last*, if from some of them it never fires again, though from the central marking that this one
-  carries the central net could: as soon as it waits for something that nobody does any more. It may still finish what
-  was begun, such as a firing that was decided before the crash;
+- stands still *at once*, if nothing fires it after the crash: it is local to who is dead, or nobody is left to decide
+  it;
+- stands still *at last*, if from some configuration after the crash it never fires again, though from the central
+  marking that this one carries the central net could: as soon as it waits for something that nobody does any more. It
+  may still finish what was begun, such as a firing that was decided before the crash;
 - *goes on*, if it can fire again from each of them from where the central net could.
 
 The same is asked of the transitions that send commands to a machine, taken together, which is not the division of each:
 a machine that is switched on once and then used stands still if its use does, though nothing keeps back the switching
 on. It stands still if from some configuration none of them ever fires again, though the central net could fire one.
 
-What is looked at first is M0. Whoever crashes may do so at once, and whatever can fire at all can fire from there; so
-what does not fire where they are dead from the start is kept back, which a small exploration finds. Only for the others
-are configurations sought from which they never fire again, and the central net is explored only for those that are
-stuck from other markings than M0 alone.
+All of it is asked of the central net without what the dead hold up (`bereft`), of whose markings a table or a diagram
+is made. What is looked at first is M0. Whoever crashes may do so before anything has fired, and whatever can fire at
+all can fire from there; so what does not fire then is kept back. Only of the others is it asked from wherever somebody
+may die. Each answer is a property of that net, which a document of evidence shows (`Inquest.document`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Final
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.claims import Claim
+from firable.analysis.evidence.document import Document, Record
+from firable.analysis.evidence.meaning import property_claim, temporal_claim
+from firable.analysis.evidence.producing.claims import Certifier, LackingError
 from firable.analysis.goal import Limits
-from firable.analysis.question import listed
 from firable.analysis.spaces.reachability import Budget, explore
-from firable.decompose.protocol.completeness import CENTRAL_MARKINGS_MAX, carrying
-from firable.decompose.protocol.draft import coordinator_down, down
-from firable.decompose.protocol.exploring import Exploration, explore_protocol, space_of
+from firable.analysis.spaces.space import StateSpace
+from firable.analysis.spaces.symbolic import explore_symbolically
+from firable.analysis.temporal.queries import decide_temporal
+from firable.analysis.verdicts.properties import decide_property
+from firable.decompose.protocol.bereft import Bereft, deaths
+from firable.decompose.protocol.exploring import FIRST_MARKINGS, Exploration, explore_protocol
 from firable.decompose.protocol.parts import Parts
-from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL, Faults, Often
+from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL
+from firable.nets.bundle import file_stem
 from firable.nets.decomposition import Decomposition
-from firable.nets.formula import Holds
-from firable.nets.net import Marking, Net
+from firable.nets.net import Net, Property, TemporalProperty
 from firable.nets.verdict import Status, Verdict, Weight
-from firable.semantics.player import Player
 
 WHILE_FAULTS: Final = "while messages are lost and doubled, and controllers and coordinators crash and restart"
+METHOD: Final = "the central net, without what the dead hold up"
+EVIDENCE_SECONDS: Final = 60.0
 RESUMES: Final = "when faults have ceased, whatever the central net may fire next, the protocol can fire next"
 
 
@@ -102,66 +110,114 @@ def outages(decomposition: Decomposition, limits: Callable[[], Limits] = Limits)
 
     The limits are made anew for each.
     """
-    for subnet in decomposition.subnets:
-        yield _outage(decomposition, Outage(subnet.name), limits())
-    for coordinator in Parts(decomposition, PROTOCOL).deciders:
-        yield _outage(decomposition, Outage("", coordinator=coordinator), limits())
+    yield from (inquest.outage for inquest in inquests(decomposition, limits))
 
 
-def _outage(decomposition: Decomposition, dead: Outage, limits: Limits) -> Outage:
-    faults = Faults(restart=False, doomed=dead.name)
-    faults = replace(faults, crash=Often.ONCE) if dead.who else replace(faults, coordinator=Often.ONCE)
-    found = explore_protocol(decomposition, PROTOCOL, faults, limits=limits)
-    try:
-        found.space.require_complete()
-        return _divided(found, dead)
-    except (IncompleteGraph, BudgetExceeded) as error:
-        return replace(dead, bound=found.space.bound or str(error))
+def inquests(decomposition: Decomposition, limits: Callable[[], Limits] = Limits) -> Iterator[Inquest]:
+    """The same, each with what it rests on."""
+    yield from (Inquest(bereft, limits()) for bereft in deaths(Parts(decomposition, PROTOCOL)))
 
 
-def _divided(found: Exploration, dead: Outage) -> Outage:
-    space, algebra = found.space, found.space.algebra
-    is_down = down(dead.who) if dead.who else coordinator_down(dead.coordinator)
-    after = space.satisfying(Holds(is_down))
-    at_once, firable = list[str](), dict[str, Any]()
-    for t, by in found.protocol.firing.items():
-        where = algebra.disjunction(space.may_fire(i) for i in by)
-        if not space.count(where):
-            continue  # the central net does not fire it either
-        firable[t] = algebra.conjunction([after, where])
-        if not space.count(firable[t]):
-            at_once.append(t)
-    commanding = _commanding(found.protocol.parts.net, firable)
-    from_start = _firing_from_start(found, is_down)
-    kept_back, groups = set[tuple[str, ...]](), dict[tuple[str, ...], Any]()
-    stuck = cache(lambda t: algebra.conjunction([after, algebra.negation(space.backward(firable[t], after))]))
-    for some in dict.fromkeys([*((t,) for t in firable), *commanding.values()]):
-        if from_start.isdisjoint(some):
-            kept_back.add(some)
-        else:  # EF of one of them is the union of the EF of each
-            groups[some] = algebra.conjunction(stuck(t) for t in some)
-    kept_back |= _kept_back(found, groups)
-    at_last = tuple(t for t in firable if (t,) in kept_back and t not in at_once)
-    goes_on = tuple(t for t in firable if (t,) not in kept_back)
-    still = tuple(machine for machine, some in commanding.items() if some in kept_back)
-    running = tuple(machine for machine in commanding if machine not in still)
-    return replace(dead, at_once=tuple(at_once), at_last=at_last, goes_on=goes_on, still=still, running=running)
+def sealed_outages(
+    decomposition: Decomposition, limits: Limits | None = None
+) -> tuple[tuple[Verdict, ...], dict[str, str]]:
+    """The verdicts on all who can be dead as a bundle holds them, and the documents that show them."""
+    found = [inquest.sealed() for inquest in inquests(decomposition, lambda: limits or Limits())]
+    documents = {file: document.to_text() for _, some in found for file, document in some.items()}
+    return tuple(verdict for verdict, _ in found), documents
 
 
-def _firing_from_start(found: Exploration, is_down: str) -> set[str]:
-    """The transitions that can fire where somebody crashes before anything else happens."""
-    net = found.protocol.net
-    (crash,) = net.producers[net.place_index[is_down]]
-    start = Player(net).fire(net.initial_marking, (crash,))
-    places = tuple(replace(place, marked=bool(start >> i & 1)) for i, place in enumerate(net.places))
-    space = space_of(replace(found.protocol, net=replace(net, places=places)), found.limits)
-    space.require_complete()
-    fired = space.fired()
-    return {t for t, by in found.protocol.firing.items() if any(fired[i] for i in by)}
+@dataclass(frozen=True)
+class Inquest:
+    """What is asked of the net without who is dead, and the answers."""
+
+    bereft: Bereft
+    limits: Limits
+    answers: dict[str, tuple[Property | TemporalProperty, Verdict]] = field(default_factory=dict)
+
+    @cached_property
+    def space(self) -> StateSpace[Any]:
+        """The markings of the net; raises `BudgetExceeded` where neither a table nor a diagram holds them."""
+        net = self.bereft.net
+        graph = explore(net, budget=Budget(FIRST_MARKINGS), deadline=self.limits.deadline)
+        return graph if graph.complete else explore_symbolically(net, self.limits)
+
+    @cached_property
+    def outage(self) -> Outage:
+        """Who is dead, and what that keeps back; not known where the net is too large."""
+        dead = Outage(self.bereft.who, coordinator=self.bereft.coordinator)
+        try:
+            return self._divided(dead)
+        except (IncompleteGraph, BudgetExceeded) as error:
+            return replace(dead, bound=str(error))
+
+    def document(self, limits: Limits | None = None) -> Document:
+        """What shows the answers, each a record; one that nothing shows says why."""
+        limits = limits or Limits(Deadline.after(EVIDENCE_SECONDS))
+        net = replace(self.bereft.net, properties=tuple(of for of, _ in self.answers.values()))
+        certifier = Certifier(net, self.space.discipline, limits, self.space)
+        records = []
+        for name, (of, verdict) in self.answers.items():
+            claim = _claim(of, proved=verdict.holds)
+            record = Record(f"property.{name}", verdict.holds, ())
+            try:
+                records.append(replace(record, shown=((claim, certifier.certify(claim, verdict.witness)),)))
+            except LackingError as error:
+                records.append(replace(record, lacking=str(error)))
+        return Document(net, self.space.discipline, tuple(records))
+
+    def sealed(self) -> tuple[Verdict, dict[str, Document]]:
+        """The verdict, and what shows it, by the name of its file; a verdict that nothing shows is not known."""
+        told = outage_verdict(self.outage)
+        if not told.holds:
+            return told, {}
+        document = self.document()
+        if lacking := next((record.lacking for record in document.records if record.lacking), ""):
+            return outage_verdict(replace(self.outage, bound=f"no evidence: {lacking}")), {}
+        file = f"{file_stem(told.name)}.evidence.json"
+        return replace(told, evidence=(file,)), {file: document}
+
+    def _holds(self, of: Property | TemporalProperty) -> bool:
+        if isinstance(of, TemporalProperty):
+            verdict = decide_temporal(self.space, of)
+        else:
+            verdict = decide_property(self.space, of)
+        if verdict.status is Status.UNKNOWN:
+            raise IncompleteGraph(verdict.bound)
+        self.answers[of.name] = (of, verdict)
+        return verdict.holds
+
+    def _divided(self, dead: Outage) -> Outage:
+        bereft = self.bereft
+        firing = tuple(t.name for t in bereft.parts.transitions if self._holds(bereft.fires(t.name)))
+        free = {t for t in firing if t not in bereft.held_up and not self._holds(bereft.kept_from_start(t))}
+        goes_on = tuple(t for t in firing if t in free and self._holds(bereft.goes_on(f"transition.{t}", (t,))))
+        machines = commanding(bereft.parts.net, firing)
+        running = []
+        for machine, some in machines.items():
+            if len(some) == 1:
+                goes = some[0] in goes_on
+            else:  # where each is kept back from the start, all of them are together
+                goes = not free.isdisjoint(some) and self._holds(bereft.goes_on(f"machine.{machine}", some))
+            running += [machine] * goes
+        return replace(
+            dead,
+            at_once=tuple(t for t in firing if t in bereft.at_once),
+            at_last=tuple(t for t in firing if t not in bereft.at_once and t not in goes_on),
+            goes_on=goes_on,
+            still=tuple(machine for machine in machines if machine not in running),
+            running=tuple(running),
+        )
 
 
-def _commanding(net: Net, firing: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """For each machine that is sent commands, the transitions that can fire and send it one."""
+def _claim(of: Property | TemporalProperty, *, proved: bool) -> Claim:
+    if isinstance(of, TemporalProperty):
+        return temporal_claim(of.logic, of.formula, proved=proved)
+    return property_claim(of, proved=proved)
+
+
+def commanding(net: Net, firing: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """For each machine that is sent commands, the transitions of these that send it one."""
     found: dict[str, tuple[str, ...]] = {}
     for machine in dict.fromkeys(place.command.machine for place in net.places if place.command is not None):
         entered = {place.name for place in net.places if place.command and place.command.machine == machine}
@@ -171,50 +227,18 @@ def _commanding(net: Net, firing: Mapping[str, Any]) -> dict[str, tuple[str, ...
     return found
 
 
-def _kept_back(found: Exploration, stuck: Mapping[tuple[str, ...], Any]) -> set[tuple[str, ...]]:
-    """The groups of transitions that the dead keep back: stuck, all of a group, where the central net could fire one.
-
-    `stuck` gives for each group the configurations after the crash from which none of it ever fires again. Raises
-    `IncompleteGraph` where the central net has to be explored and is too large.
-    """
-    net, space, algebra = found.protocol.parts.net, found.space, found.space.algebra
-    open_ = {some: configurations for some, configurations in stuck.items() if space.count(configurations)}
-    kept_back = set[tuple[str, ...]]()
-
-    def look(marking: Marking, among: Sequence[tuple[str, ...]]) -> None:
-        inside = carrying(space, net, marking)
-        for some in among:
-            if space.count(algebra.conjunction([open_[some], inside])):
-                kept_back.add(some)
-                del open_[some]
-
-    look(net.initial_marking, tuple(open_))
-    if not open_:
-        return kept_back
-    central = explore(
-        net, budget=Budget(CENTRAL_MARKINGS_MAX, found.limits.memory_bytes), deadline=found.limits.deadline
-    )
-    central.require_complete()
-    fires = {t: central.may_fire(net.transition_index[t]) for some in open_ for t in some}
-    could = {some: central.backward(central.algebra.disjunction(fires[t] for t in some)) for some in open_}
-    for i in range(central.n_markings):
-        among = tuple(some for some in open_ if could[some][i])
-        if among:
-            look(central.marking(i), among)
-    return kept_back
-
-
 def outage_verdict(outage: Outage) -> Verdict:
     """As a verdict, for information: what stands still are its subjects."""
-    told = f"machines: {listed(outage.still) or 'none'} stand still, {listed(outage.running) or 'none'} go on"
+    at_once, still, running = (", ".join(some) or "none" for some in (outage.at_once, outage.still, outage.running))
+    coordinator = outage.coordinator.removeprefix("the ").replace(" ", ".", 1)
     return Verdict(
-        f"faults.dead.{outage.who or outage.coordinator.removeprefix('the ').replace(' ', '.')}",
+        f"faults.dead.{outage.who}" if outage.who else f"faults.dead-{coordinator}",
         Status.UNKNOWN if outage.bound else Status.PROVED,
         f"while {outage.name} is dead, these transitions stand still, at once or at last, where the central net could "
         "fire them again, and no others",
-        "protocol net, configurations after the crash",
+        METHOD,
         Weight.INFORMATION,
-        hint="" if outage.bound else told,
+        hint="" if outage.bound else f"at once: {at_once}; machines: {still} stand still, {running} go on",
         bound=outage.bound,
         subjects=(*outage.at_once, *outage.at_last),
     )

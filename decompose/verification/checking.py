@@ -7,8 +7,9 @@ them anew. So everything is derived a second time, by code that shares nothing w
 2. what must be proved is stated anew; each SMT-LIB 2 file must say exactly this, and a second solver answer `unsat`
    after every name (`restating`, `reading`, `obligations`);
 3. the theorem on the protocol must be the one that is published, and the second solver confirm it (`protocol`); where
-   the bundle speaks of the protocol of this very net, the net of that is made anew, too (`explored`); where it says of
-   which conceptual net and tasks its net is made, they are opened anew, and both nets related (`refinement`);
+   the bundle speaks of the protocol of this very net, the net of that is made anew, too (`explored`), and what is left
+   of the central net when somebody is dead (`outages`); where it says of which conceptual net and tasks its net is
+   made, they are opened anew, and both nets related (`refinement`);
 4. where the bundle names machines, the loop that they close is closed anew, and its document must show of it that they
    keep each gate that a vote relies on (`machines`); the verdicts on the central net must be those that its documents
    of evidence show (`documents`);
@@ -29,6 +30,7 @@ from firable.decompose.verification.documents import check_verdicts_on_the_net
 from firable.decompose.verification.explored import check_explored
 from firable.decompose.verification.machines import check_machines
 from firable.decompose.verification.obligations import check_obligations
+from firable.decompose.verification.outages import check_outages
 from firable.decompose.verification.protocol import check_protocol
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refinement import check_refinement
@@ -93,6 +95,7 @@ def _judge_all(
     check_protocol(examination, solver, answers, timeout_ms)
     begins("the protocol of this net")
     check_explored(examination, cut, solver, answers, timeout_ms)
+    check_outages(examination, cut, answers, timeout_ms)
     check_machines(examination, cut, answers, timeout_ms)
     begins("the refinement")
     check_refinement(examination, solver, answers, timeout_ms)

@@ -65,6 +65,18 @@ def check_verdicts_on_the_net(examination: Examination, answers: Answers, timeou
         raise NotShownError(f"'{file}' answers a question that no verdict asks", "evidence", file)
 
 
+def answers_in(examination: Examination, file: str) -> dict[str, bool]:
+    """What a document says of each of its questions, before anything is known of whether it shows that."""
+    try:
+        document = document_from_text(examination.text(file), file)
+    except InputError as error:
+        raise NotShownError(f"'{file}': {error.diagnostics[0].message}", "evidence", file) from None
+    found = {record.name: record.proved for record in document.records}
+    if len(found) < len(document.records):
+        raise NotShownError(f"'{file}' answers one question twice", "evidence", file)
+    return found
+
+
 def checked_document(
     examination: Examination, file: str, net: Net, answers: Answers, timeout_ms: int
 ) -> list[CheckedRecord]:

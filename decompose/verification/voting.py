@@ -182,10 +182,10 @@ class Voting:
     def coordinator_down(self, t: str) -> str:
         """The place that holds a token while the coordinator of a transition is down."""
         at = self.cut.decided_at[t]
-        return f"{COORDINATOR_DOWN}/{at}" if len(self._coordinators) > 1 and at != UNNAMED else COORDINATOR_DOWN
+        return f"{COORDINATOR_DOWN}/{at}" if len(self.coordinators) > 1 and at != UNNAMED else COORDINATOR_DOWN
 
     @cached_property
-    def _coordinators(self) -> set[str]:
+    def coordinators(self) -> set[str]:
         """The coordinators that decide something."""
         return {self.cut.decided_at[t] for t in self.parts}
 

@@ -74,7 +74,7 @@ def test_a_dead_cell_coordinator_stops_its_own_cell_and_nobody_else(dead: dict[s
 
 def test_the_name_of_a_coordinator_tells_it_from_the_controller(dead: dict[str, Outage]) -> None:
     assert dead["cell_a"].at_once == dead["cell_a"].at_last == ()  # it has no place
-    assert outage_verdict(dead[CELL_A]).name == "faults.dead.coordinator.cell_a"
+    assert outage_verdict(dead[CELL_A]).name == "faults.dead-coordinator.cell_a"
     assert outage_verdict(dead["cell_a"]).name == "faults.dead.cell_a"
     assert outage_text([dead[LINE]]).startswith("coordinator line dead\n")
 

@@ -143,11 +143,10 @@ def test_transition_that_still_fires_from_the_start_and_then_never_again_stands_
     assert by_name(waiting_later())["a"].at_last == ("t", "G")
 
 
-def test_central_net_that_is_too_large_leaves_open_what_only_its_markings_tell(monkeypatch: pytest.MonkeyPatch) -> None:
-    known = by_name(cell())
-    monkeypatch.setattr("firable.decompose.protocol.outages.CENTRAL_MARKINGS_MAX", 1)
-    assert by_name(cell()) == known
-    assert by_name(waiting_later())["a"].bound
+def test_a_diagram_says_what_a_table_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = [by_name(net) for net in (cell(), waiting_later())]
+    monkeypatch.setattr("firable.decompose.protocol.outages.FIRST_MARKINGS", 1)
+    assert [by_name(net) for net in (cell(), waiting_later())] == known
 
 
 def test_net_without_coordinated_transitions_has_no_coordinator_to_lose() -> None:
@@ -164,8 +163,9 @@ def test_any_faults_are_safe_and_everything_resumes(name: str) -> None:
     assert names[-4:] == ["faults.follows", "faults.agrees", "faults.orders-fit", "faults.resumes"]
 
 
-def test_outage_is_not_known_where_time_is_over() -> None:
-    found = list(outages(split(load_net("cell1")), lambda: Limits(Deadline.after(0.05))))
+def test_outage_is_not_known_where_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.decompose.protocol.outages.FIRST_MARKINGS", 1)
+    found = list(outages(split(load_net("cell1")), lambda: Limits(Deadline.after(0))))
     assert all(outage.bound for outage in found)
     verdict = outage_verdict(found[0])
     assert (verdict.status, verdict.weight) == (Status.UNKNOWN, Weight.INFORMATION)

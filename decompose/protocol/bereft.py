@@ -1,0 +1,147 @@
+"""The central net as it goes on when somebody has died, as a net of its own: what the dead hold up fires no more.
+
+What the others can still do after a crash is a question about the protocol, whose net has 1e33 configurations of a cell
+with forty markings. But of all configurations that carry one central marking some are the worst, and what they still
+fire is seen in the central net:
+
+- *A controller is dead.* The worst is where each group with a transition in which it takes part was asked for that, and
+  given up: the round waits for the acknowledgement of the dead for ever, and nothing of the group is decided any more.
+  Whatever else anybody has promised is released or applied, since its coordinator lives.
+- *A coordinator is dead.* It decides nothing any more, and what it was promised stays promised: of the parts that are
+  firable where it died, as many as do not disturb each other. What would disturb one of them fires no more (O1).
+
+Everything else can be brought to rest by steps that fire nothing, and is then fired as if nobody were dead. So the net
+here is the central one, the life of who dies, and the promises that a dead coordinator leaves:
+
+    not-begun ─begins──▶ alive ─dies──▶ dying ─is-dead──▶ dead        what the dead hold up fires while they are alive,
+    not-begun ─dies-at-once──▶ dead, early                            the rest then, and when they are dead
+    hold/t/c: while dying, c has promised its part of t
+
+Each question is a property of this net (`outages`), with evidence as any property. That what is found here is what the
+protocol does is argued in docs/protocol.md, and tests hold it to an exploration of the protocol's net.
+
+Rejected: to explore the protocol's net with somebody dead in it, which took the line of two cells a minute, and left no
+evidence but diagrams of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+from firable.decompose.protocol.parts import Part, Parts
+from firable.nets.formula import And, Firable, Holds, Or, format_formula
+from firable.nets.net import Net, Place, Property, PropertyKind, TemporalProperty, Transition
+from firable.nets.temporal import Logic, parse_temporal
+
+NOT_BEGUN: Final = "life/not-begun"
+ALIVE: Final = "life/alive"
+DYING: Final = "life/dying"
+DEAD: Final = "life/dead"
+EARLY: Final = "life/dead-at-once"
+
+
+@dataclass(frozen=True)
+class Bereft:
+    """A decomposition of which somebody dies: the controller `who`, or where that is empty the `coordinator`."""
+
+    parts: Parts
+    who: str
+    coordinator: str = ""
+
+    @cached_property
+    def held_up(self) -> frozenset[str]:
+        """The transitions that fire no more when the dead are dead, in the worst case."""
+        parts = self.parts
+        if not self.who:
+            return frozenset(t for t in parts.coordinated if parts.decider(t) == self.coordinator)
+        waiting = {t for t, its in parts.coordinated.items() if any(part.controller == self.who for part in its)}
+        groups = (group for group in parts.groups if not waiting.isdisjoint(group))
+        own = (part.whole for part in parts.local if part.controller == self.who)
+        return frozenset((*(t for group in groups for t in group), *own))
+
+    @cached_property
+    def at_once(self) -> frozenset[str]:
+        """The transitions that nobody but the dead could fire: local to the controller, or decided by the coordinator.
+
+        Of the others that are held up one may fire after the crash, if it was decided before, or not asked for with
+        what the dead take part in.
+        """
+        if not self.who:
+            return self.held_up
+        return frozenset(part.whole for part in self.parts.local if part.controller == self.who)
+
+    @cached_property
+    def left(self) -> tuple[Part, ...]:
+        """The parts of which a promise may be left by a dead coordinator, and keeps somebody from firing."""
+        if self.who:
+            return ()
+        disturbed = {other for part in self._going for other in self.parts.excluding(part)}
+        its = (part for t, some in self.parts.coordinated.items() if t in self.held_up for part in some)
+        return tuple(part for part in its if part in disturbed)
+
+    @cached_property
+    def _going(self) -> tuple[Part, ...]:
+        """The parts of what is not held up."""
+        every = (*self.parts.local, *(part for its in self.parts.coordinated.values() for part in its))
+        return tuple(part for part in every if part.whole not in self.held_up)
+
+    @cached_property
+    def net(self) -> Net:
+        """The net; its size is that of the central net, and of the parts that may stay promised."""
+        central = self.parts.net
+        held = {part: f"held/{part.whole}/{part.controller}" for part in self.left}
+        life = (Place(name, marked=name == NOT_BEGUN) for name in (NOT_BEGUN, ALIVE, DYING, DEAD, EARLY))
+        places = (*life, *map(Place, sorted(held.values())), *(Place(p.name, marked=p.marked) for p in central.places))
+        lives = (
+            Transition("life/begins", (NOT_BEGUN,), (ALIVE,)),
+            Transition("life/dies-at-once", (NOT_BEGUN,), (DEAD, EARLY)),
+            Transition("life/dies", (ALIVE,), (DYING,)),
+            Transition("life/is-dead", (DYING,), (DEAD,)),
+        )
+        holding = sorted((self._holding(part, held) for part in held), key=lambda t: t.name)
+        return Net(f"bereft-{central.name}", places, (*lives, *holding, *self._central(held)))
+
+    def _holding(self, part: Part, held: Mapping[Part, str]) -> Transition:
+        others = (held[other] for other in self.parts.excluding(part) if other in held)
+        full, empty = (DYING, *part.inputs, *part.permissive), (*part.outputs, *part.inhibitive, *others)
+        return Transition(f"hold/{part.whole}/{part.controller}", (), (held[part],), _sorted(full), _sorted(empty))
+
+    def _central(self, held: Mapping[Part, str]) -> Iterator[Transition]:
+        disturbed: dict[str, list[str]] = {}
+        for part in self._going if held else ():
+            disturbed.setdefault(part.whole, []).extend(held[o] for o in self.parts.excluding(part) if o in held)
+        for t in self.parts.transitions:
+            alive, away = ((ALIVE,), ()) if t.name in self.held_up else ((), (NOT_BEGUN, DYING))
+            empty = (*t.inhibitive, *away, *disturbed.get(t.name, ()))
+            yield Transition(t.name, t.inputs, t.outputs, _sorted((*t.permissive, *alive)), _sorted(empty))
+
+    # --- The questions
+
+    def fires(self, t: str) -> Property:
+        """The transition fires in some run of the central net."""
+        return Property(f"fires.{t}", PropertyKind.REACHABLE, Firable(t))
+
+    def kept_from_start(self, t: str) -> Property:
+        """Where somebody dies before anything has fired, the transition never fires."""
+        return Property(f"kept-from-start.{t}", PropertyKind.NEVER, And((Holds(EARLY), Firable(t))))
+
+    def goes_on(self, name: str, some: Sequence[str]) -> TemporalProperty:
+        """From wherever somebody dies and the central net could fire one of these, one of them can be fired."""
+        alive, dying, dead = (format_formula(Holds(place)) for place in (ALIVE, DYING, DEAD))
+        one = format_formula(Firable(some[0]) if len(some) == 1 else Or(tuple(map(Firable, some))))
+        never_again = f"E[{dying} U {dead} and not EF ({one})]"
+        text = f"AG (not EF ({alive} and ({one})) or AX (not {dying} or not {never_again}))"
+        return TemporalProperty(f"goes-on.{name}", Logic.CTL, parse_temporal(text))
+
+
+def deaths(parts: Parts) -> Iterator[Bereft]:
+    """Everybody who can be dead: each controller, then each coordinator."""
+    yield from (Bereft(parts, subnet.name) for subnet in parts.decomposition.subnets)
+    yield from (Bereft(parts, "", coordinator) for coordinator in parts.deciders)
+
+
+def _sorted(places: Iterable[str]) -> tuple[str, ...]:
+    return tuple(sorted(set(places)))

@@ -1,0 +1,253 @@
+"""What the dead keep back is what exploring the protocol finds; evidence shows it, and nothing else passes for it."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache, partial
+
+import pytest
+from support.bundle_mutants import evidence_mutants, verdict_mutants
+from support.explored_outages import explored_outages
+from support.layered_nets import cells_in_a_line
+from support.looping_nets import looping_net
+from support.owned_nets import owned_net
+
+from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
+from firable.analysis.evidence.document import Document, document_from_text
+from firable.decompose.protocol.bereft import Bereft, deaths
+from firable.decompose.protocol.outages import inquests, outages, sealed_outages
+from firable.decompose.protocol.parts import Parts
+from firable.decompose.protocol.variant import PROTOCOL
+from firable.decompose.protocol.wrong import example
+from firable.decompose.splitting.cut import split
+from firable.decompose.verification import documents
+from firable.decompose.verification.checked import Examination
+from firable.decompose.verification.outages import PREFIX, Wake, check_outages, wakes
+from firable.decompose.verification.recut import Cut
+from firable.decompose.verification.refusal import NotShownError
+from firable.decompose.verification.solvers import by_cvc5
+from firable.decompose.verification.voting import Voting
+from firable.nets.bundle import Bundle
+from firable.nets.catalogue import catalogue_net
+from firable.nets.diagnostics import InputError
+from firable.nets.interchange import net_digest
+from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.verdict import Status, Verdict, Weight
+
+TIMEOUT_MS = 10_000
+
+
+def gated(a: str = "a", together: str = "G") -> Net:
+    """`a` goes round by itself, and what it does together with `b` reads the loop: a promise of that keeps it still."""
+    marked = {f"{a}.up": True, f"{a}.down": False, f"{a}.p": True, f"{a}.q": False, "b.r": True, "b.s": False}
+    places = tuple(Place(name, name.partition(".")[0], marked=token) for name, token in marked.items())
+    transitions = (
+        Transition("turn", (f"{a}.up",), (f"{a}.down",)),
+        Transition("back", (f"{a}.down",), (f"{a}.up",)),
+        Transition(together, (f"{a}.p", "b.r"), (f"{a}.q", "b.s"), permissive=(f"{a}.up",)),
+        Transition("H", (f"{a}.q", "b.s"), (f"{a}.p", "b.r")),
+    )
+    return Net("gated", places, transitions, controllers=(Controller(a), Controller("b")))
+
+
+@cache
+def bundled(make: Callable[[], Net]) -> Bundle:
+    """What a bundle holds of who is dead, and nothing else."""
+    decomposition = split(make())
+    verdicts, files = sealed_outages(decomposition)
+    return Bundle(decomposition, verdicts, files)
+
+
+@pytest.fixture(autouse=True)
+def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the checker says of one document is found once, and the solver is not asked again."""
+    records: dict[str, tuple[CheckedRecord, ...]] = {}
+
+    def checker(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
+        text = document.to_text()
+        if text not in records:
+            records[text] = tuple(check_document(document, timeout_ms=timeout_ms))
+        return iter(records[text])
+
+    monkeypatch.setattr(documents, "check_document", checker)
+    monkeypatch.setattr(documents, "obligations", lambda *_: ())
+
+
+def examined(bundle: Bundle) -> Examination:
+    examination = Examination(bundle)
+    check_outages(examination, Cut(bundle.net), by_cvc5, TIMEOUT_MS)
+    return examination
+
+
+def refused(make: Callable[[], Bundle]) -> bool:
+    """Whether a bundle is refused, or not all of it is shown, or something in it is left to nobody."""
+    try:
+        bundle = make()
+        examination = examined(bundle)
+    except (NotShownError, ValueError):
+        return True
+    others = {verdict.name for verdict in bundle.verdicts} ^ set(examination.checked)
+    unshown = [one for one in examination.checked.values() if not one.shown and one.verdict.holds]
+    return bool(others or unshown or set(bundle.evidence) - examination.used)
+
+
+# --------------------------------------------------------------------------------------------------------------------
+# What is found is right
+
+
+@pytest.mark.parametrize("seed", [1, 3, 5, 8])
+def test_what_the_dead_keep_back_is_what_exploring_the_protocol_finds_where_loops_are_read(seed: int) -> None:
+    decomposition = split(looping_net(seed))
+    assert list(outages(decomposition)) == list(explored_outages(decomposition))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_the_dead_keep_back_is_what_exploring_the_protocol_finds(seed: int) -> None:
+    decomposition = split(owned_net(seed))
+    assert list(outages(decomposition)) == list(explored_outages(decomposition))
+
+
+def test_a_promise_that_nobody_takes_back_keeps_still_what_it_reads() -> None:
+    dead = {outage.name: outage for outage in outages(split(gated()))}
+    assert dead["the coordinator"].at_once == ("G", "H")
+    assert dead["the coordinator"].at_last == ("turn", "back")
+    assert dead["b"].goes_on == ("turn", "back")
+
+
+def test_without_the_promises_that_are_left_too_much_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Bereft, "left", ())
+    assert {outage.name: outage for outage in outages(split(gated()))}["the coordinator"].goes_on == ("turn", "back")
+    decomposition = split(gated())
+    verdicts, files = sealed_outages(decomposition)
+    assert refused(lambda: Bundle(decomposition, verdicts, files))
+
+
+@pytest.mark.parametrize("name", ["conceptual_one_robot", "one_robot", "two_robots_separate", "two_cells"])
+def test_of_everybody_in_the_cells_of_the_catalogue_it_is_known(name: str) -> None:
+    assert [outage.name for outage in outages(split(catalogue_net(name))) if outage.bound] == []
+
+
+# --------------------------------------------------------------------------------------------------------------------
+# It is shown, and nothing else is
+
+
+@pytest.mark.parametrize("make", [gated, cells_in_a_line, partial(example, "shuttle")])
+def test_the_verdicts_on_who_is_dead_are_shown(make: Callable[[], Net]) -> None:
+    bundle = bundled(make)
+    checked = examined(bundle).checked
+    assert set(checked) == {verdict.name for verdict in bundle.verdicts}
+    assert all(one.shown for one in checked.values())
+    assert {verdict.status for verdict in bundle.verdicts} == {Status.PROVED}
+
+
+def both(net: Net) -> Iterator[tuple[Bereft, Wake]]:
+    here = {one.who or one.coordinator: one for one in deaths(Parts(split(net), PROTOCOL))}
+    there = {one.told: one for one in wakes(Voting(Cut(net), faults=True))}
+    assert set(here) == set(there)
+    yield from ((here[name], there[name]) for name in here)
+
+
+@pytest.mark.parametrize("make", [looping_net, owned_net])
+def test_both_texts_make_the_same_net_of_random_nets(make: Callable[[int], Net]) -> None:
+    left = 0
+    for net in (cells_in_a_line(), *map(make, range(40))):
+        for here, there in both(net):
+            left += len(here.left)
+            assert net_digest(here.net) == net_digest(there.net)
+    assert left or make is owned_net
+
+
+def test_every_single_change_of_a_verdict_on_who_is_dead_is_refused() -> None:
+    for make in (gated, partial(example, "shuttle")):
+        bundle = bundled(make)
+        assert not refused(partial(replace, bundle))
+        mutants = [(how, made) for how, made in verdict_mutants(bundle) if how.startswith("verdict")]
+        mutants += [(f"{v.name} {how}", made) for v in bundle.verdicts for how, made in more(bundle, v)]
+        assert len(mutants) > 50
+        assert [how for how, made in mutants if not refused(made)] == []
+
+
+def more(bundle: Bundle, verdict: Verdict) -> Iterator[tuple[str, Callable[[], Bundle]]]:
+    changes = (
+        ("one less stands still", replace(verdict, subjects=verdict.subjects[1:])),
+        ("one more stands still", replace(verdict, subjects=(*verdict.subjects, "turn"))),
+        ("machines", replace(verdict, hint=verdict.hint.replace("stand still", "go on"))),
+        ("method", replace(verdict, method="by hand")),
+        ("weight", replace(verdict, weight=Weight.WARNING)),
+    )
+    for how, changed in changes:
+        if changed != verdict:
+            verdicts = tuple(changed if v is verdict else v for v in bundle.verdicts)
+            yield how, partial(replace, bundle, verdicts=verdicts)
+
+
+def test_evidence_on_who_is_dead_that_is_missing_or_exchanged_is_refused() -> None:
+    bundle = bundled(gated)
+    mutants = [(how, make) for how, make in evidence_mutants(bundle) if not how.startswith("another")]
+    assert len(mutants) > 10
+    assert [how for how, make in mutants if not refused(make)] == []
+
+
+def test_every_change_of_an_answer_is_refused() -> None:
+    bundle, count = bundled(gated), 0
+    for file, text in bundle.evidence.items():
+        document = document_from_text(text, file)
+        for changed in other_answers(document):
+            count += 1
+            mutant = replace(bundle, evidence={**bundle.evidence, file: changed.to_text()})
+            assert refused(partial(replace, mutant)), changed.to_text()[:400]
+    assert count > 60
+
+
+def other_answers(document: Document) -> Iterator[Document]:
+    """One record left out, doubled, exchanged with the next, turned round, or without what shows it."""
+    records = document.records
+    for i, record in enumerate(records):
+        before, after = records[:i], records[i + 1 :]
+        yield replace(document, records=(*before, *after))
+        yield replace(document, records=(*before, record, record, *after))
+        yield replace(document, records=(*before, replace(record, proved=not record.proved), *after))
+        if after:
+            yield replace(document, records=(*before, after[0], record, *after[1:]))
+            yield replace(document, records=(*before, replace(record, shown=after[0].shown), *after))
+    properties = document.net.properties
+    for i in range(len(properties)):
+        net = replace(document.net, properties=(*properties[:i], *properties[i + 1 :]))
+        yield replace(document, net=net, records=(*records[:i], *records[i + 1 :]))
+
+
+def test_an_answer_without_evidence_is_only_claimed_and_such_a_verdict_is_not_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    bundle = bundled(gated)
+    file, text = next(iter(bundle.evidence.items()))
+    document = document_from_text(text, file)
+    bare = replace(document, records=(replace(document.records[0], shown=(), lacking="no time"), *document.records[1:]))
+    checked = examined(replace(bundle, evidence={**bundle.evidence, file: bare.to_text()})).checked
+    assert [one.only_claimed for one in checked.values() if not one.shown] == ["only claimed: no time"]
+    monkeypatch.setattr("firable.decompose.protocol.outages.Inquest.document", lambda *_: bare)
+    verdict, files = next(iter(inquests(split(gated())))).sealed()
+    assert (verdict.status, verdict.bound, files) == (Status.UNKNOWN, "no evidence: no time", {})
+
+
+def test_a_verdict_on_who_is_dead_may_be_left_open_and_says_nothing_else() -> None:
+    bundle = bundled(gated)
+    first, *others = bundle.verdicts
+    rest = {file: text for file, text in bundle.evidence.items() if file != first.evidence[0]}
+    doubted = replace(first, status=Status.UNKNOWN, evidence=(), subjects=(), hint="", bound="no time")
+    checked = examined(replace(bundle, verdicts=(doubted, *others), evidence=rest)).checked
+    assert [name for name, one in checked.items() if not one.shown] == [first.name]
+    for changed in (replace(doubted, hint="all goes on"), replace(doubted, subjects=first.subjects)):
+        mutant = replace(bundle, verdicts=(changed, *others), evidence=rest)
+        assert refused(partial(replace, mutant))
+
+
+def test_a_controller_of_any_name_is_told_from_the_coordinator() -> None:
+    found = bundled(partial(gated, "coordinator")).verdicts
+    assert [verdict.name for verdict in found] == [f"{PREFIX}.coordinator", f"{PREFIX}.b", f"{PREFIX}-coordinator"]
+
+
+def test_a_transition_that_bears_a_name_of_the_net_that_is_left_is_refused() -> None:
+    with pytest.raises(InputError, match="F2001"):
+        sealed_outages(split(gated(together="life/dies")))
+    with pytest.raises(NotShownError):
+        examined(Bundle(split(gated(together="life/dies")), bundled(gated).verdicts, bundled(gated).evidence))
