@@ -69,6 +69,8 @@ def show_bound(report: Report) -> None:
     text.heading(report.net, report.input)
     done = report.run
     click.echo(f"  {done['state']} after {done['seconds']:,.0f} s on the machines of {done['binding']}")
+    if done["message"]:
+        click.echo(f"  {done['message']}")
     click.echo(
         f"  {text.counted(sum(done['firings'].values()), 'firing')}, {text.counted(done['commands'], 'command')} to "
         f"machines, {text.counted(done['messages'], 'message')} between coordinator and controllers"

@@ -55,6 +55,7 @@ devices:
     safe: {{{output}: false}}
     channels:
       M: {{{out}, taken: {taken}, done: {done}, failed: {failed}}}
+{emergency}
 signals:
   M.held: {{device: D, read: {sensor}, on_loss: hold}}
   M.zero: {{device: D, read: {sensor}, on_loss: 0}}
@@ -143,6 +144,8 @@ class Bench:
     needed: str = "0"
     start_s: float = PATIENCE_S
     timeout_s: float = 0.5
+    button: bool = False
+    """Whether the binding has the button of the machine as its emergency stop."""
     driver: BoundDriver = field(init=False)
     heard: Heard = field(init=False)
 
@@ -164,6 +167,7 @@ class Bench:
             needed=self.needed,
             start_s=self.start_s,
             timeout_s=self.timeout_s,
+            emergency=f"emergency_stop: {{button: {{device: D, read: {points['button']}}}}}" if self.button else "",
             **(points | codes),
         )
         self.driver = bound_driver(parse_binding(text), self.net)

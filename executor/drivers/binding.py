@@ -106,6 +106,18 @@ class SignalDocument(_Model):
     force: bool = False
 
 
+class EmergencyDocument(_Model):
+    """A contact that is closed, 1, as long as nobody presses the button; anything else stops the machines at once.
+
+    It is for all controllers, or for those that are named; each looks at it for itself.
+    """
+
+    device: Name
+    read: Name
+    invert: bool = False
+    controllers: tuple[Name, ...] | None = None
+
+
 class CommandDocument(_Model):
     """What the command of a place writes, and the channel by which it goes."""
 
@@ -126,6 +138,7 @@ class BindingDocument(_Model):
     cell: Name
     description: str = ""
     devices: dict[Name, DeviceDocument]
+    emergency_stop: dict[Name, EmergencyDocument] = {}
     signals: dict[Name, Annotated[SignalDocument | None, BeforeValidator(_signal)]] = {}
     commands: dict[Name, CommandDocument] = {}
 
@@ -141,11 +154,12 @@ SHAPE: Final = Shape(
             (("devices", "*", "heartbeat"), HeartbeatDocument),
             (("devices", "*", "alive"), AliveDocument),
             (("devices", "*", "channels", "*"), ChannelDocument),
+            (("emergency_stop", "*"), EmergencyDocument),
             (("signals", "*"), SignalDocument),
             (("commands", "*"), CommandDocument),
         )
     },
-    {"devices": "device", "signals": "signal", "commands": "place"},
+    {"devices": "device", "emergency_stop": "contact", "signals": "signal", "commands": "place"},
 )
 
 
@@ -164,27 +178,64 @@ class Binding:
         return _problem(self.source, self.tree, code, path, message, hint)
 
     def watching(self) -> Binding:
-        """The binding for who only looks: without safe outputs and heartbeats, which are another's to write."""
-        devices = {
-            name: device.model_copy(update={"safe": {}, "heartbeat": None})
-            for name, device in self.document.devices.items()
+        """The binding for who only looks: without safe outputs and heartbeats, which are another's to write.
+
+        Contacts of the emergency stop stop nothing, and are shown as signals are.
+        """
+        document = self.document
+        devices = {name: _looked_at(device) for name, device in document.devices.items()}
+        contacts = {
+            shown_as(name): SignalDocument(device=one.device, read=one.read, invert=one.invert, on_loss="hold")
+            for name, one in document.emergency_stop.items()
         }
-        return replace(self, document=self.document.model_copy(update={"devices": devices}))
+        update = {"devices": devices, "emergency_stop": {}, "signals": {**document.signals, **contacts}}
+        return replace(self, document=document.model_copy(update=update))
 
     def without(self, devices: Collection[str]) -> Binding:
         """The binding without some devices, as if nothing was bound to them."""
         bound = {**self.document.signals, **self.document.commands}
-        return self.serving({name for name, one in bound.items() if one is None or one.device not in devices})
+        kept = self.serving({name for name, one in bound.items() if one is None or one.device not in devices})
+        document = kept.document
+        contacts = {name: one for name, one in document.emergency_stop.items() if one.device not in devices}
+        needed = {name: one for name, one in document.devices.items() if name not in devices}
+        return replace(kept, document=document.model_copy(update={"devices": needed, "emergency_stop": contacts}))
 
-    def serving(self, names: Collection[str]) -> Binding:
-        """What the binding says of these signals and places, and the devices that they need."""
+    def serving(self, names: Collection[str], controllers: Collection[str] | None = None) -> Binding:
+        """What the binding says of these signals and places, and the devices that they need.
+
+        Of the emergency stop, what is for one of these controllers. A device that is needed for that alone is only
+        looked at: its safe outputs and its heartbeat are for the host whose machines it has.
+        """
         document = self.document
+        contacts = {
+            name: one
+            for name, one in document.emergency_stop.items()
+            if controllers is None or one.controllers is None or not set(controllers).isdisjoint(one.controllers)
+        }
         signals = {name: signal for name, signal in document.signals.items() if name in names}
         commands = {name: command for name, command in document.commands.items() if name in names}
         needed = {one.device for one in (*signals.values(), *commands.values()) if one is not None}
-        devices = {name: device for name, device in document.devices.items() if name in needed}
-        own = document.model_copy(update={"devices": devices, "signals": signals, "commands": commands})
-        return replace(self, document=own)
+        watched = {one.device for one in contacts.values()} - needed
+        devices = {
+            name: device if name in needed else _looked_at(device)
+            for name, device in document.devices.items()
+            if name in needed | watched
+        }
+        update = {"devices": devices, "emergency_stop": contacts, "signals": signals, "commands": commands}
+        return replace(self, document=document.model_copy(update=update))
+
+
+def shown_as(contact: str) -> str:
+    """How a contact of the emergency stop is called among the readings of a driver.
+
+    >>> shown_as("door")
+    'emergency stop door'
+    """
+    return f"emergency stop {contact}"
+
+
+def _looked_at(device: DeviceDocument) -> DeviceDocument:
+    return device.model_copy(update={"safe": {}, "heartbeat": None})
 
 
 def read_binding(path: Path | str) -> Binding:
@@ -261,6 +312,9 @@ class _Reading:
                         "F5101", ("devices", name, "channels", channel),
                         f"'{channel}' takes commands in one way", "write `number: ADDRESS` or `command: ADDRESS`",
                     )  # fmt: skip
+        for name, contact in self.document.emergency_stop.items():
+            if self.device(("emergency_stop", name), contact.device):
+                self.contact(name, contact)
         for signal, bound in self.document.signals.items():
             if bound is not None and self.device(("signals", signal), bound.device):
                 self.point(bound.device, ("signals", signal, "read"), bound.read, Use.READ)
@@ -278,6 +332,13 @@ class _Reading:
                 self.problem("F5101", ("commands", place, "channel"), message, hint)
             for point in command.write:
                 self.point(command.device, ("commands", place, "write", point), point, Use.WRITE)
+
+    def contact(self, name: str, contact: EmergencyDocument) -> None:
+        self.point(contact.device, ("emergency_stop", name, "read"), contact.read, Use.READ)
+        if self.kinds[contact.device].through_broker and self.document.devices[contact.device].alive is None:
+            message = f"whether '{contact.device}' is there is not to be seen through its broker"
+            hint = "give the device `alive: {read: ADDRESS, within_s: SECONDS}`, so that its loss stops the machines"
+            self.problem("F5101", ("emergency_stop", name, "device"), message, hint)
 
     def device(self, path: TreePath, name: str) -> bool:
         if name in self.document.devices:

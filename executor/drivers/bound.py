@@ -16,6 +16,7 @@ from firable.executor.drivers.channels import Channel, Outcome, Said
 from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.device import Point, Value, Writes, as_bit
 from firable.executor.drivers.driver import Answer, Clock, Listener, Quality, Reading
+from firable.executor.drivers.emergency import Contacts
 from firable.executor.drivers.fitting import misfits
 from firable.executor.drivers.image import Change, Image
 from firable.executor.drivers.keeping import Kept, ended, uninterrupted
@@ -35,7 +36,9 @@ def bound_driver(binding: Binding, net: Net, part: Net | None = None) -> BoundDr
     completions = {signal.name for signal in served.signals if signal.kind is SignalKind.COMPLETION}
     answered = frozenset(place.name for place in net.places if place.completion is not None)
     names = {*served.signal_index, *served.place_index}
-    return BoundDriver(binding if part is None else binding.serving(names), completions, answered)
+    if part is not None:
+        binding = binding.serving(names, [controller.name for controller in part.controllers])
+    return BoundDriver(binding, completions, answered)
 
 
 class BoundDriver:
@@ -50,9 +53,15 @@ class BoundDriver:
         self.completing: dict[str, str] = {}
         """The completion of each place that has been commanded or asked about."""
         self.devices = {name: _Device(self, name) for name in document.devices}
+        self.contacts = [device.contacts for device in self.devices.values()]
         self.clock: Clock | None = None
         self.listener: Listener | None = None
         self.is_stopped = False
+
+    @property
+    def may_move(self) -> bool:
+        """Whether every contact of the emergency stop is closed; before that no machine is commanded."""
+        return all(contacts.are_closed for contacts in self.contacts)
 
     @property
     def at_rest(self) -> bool:
@@ -141,6 +150,13 @@ class BoundDriver:
             for device in self.devices.values():
                 device.stop()
 
+    def emergency_stop(self, reason: str) -> None:
+        """Drive the safe outputs now, and only then tell of it."""
+        if not self.is_stopped:
+            self.stop()
+            if self.listener is not None:
+                self.listener.emergency_stop(reason)
+
     def close(self) -> None:
         """Nothing: what comes into a real cell is not for its driver to say."""
 
@@ -163,7 +179,11 @@ class _Device:
         self.document = binding.document.devices[name]
         bound = {signal: one for signal, one in binding.document.signals.items() if one is not None}
         signals: dict[str, SignalDocument] = {signal: one for signal, one in bound.items() if one.device == name}
-        self.image = Image(signals)
+        contacts = {key: one for key, one in binding.document.emergency_stop.items() if one.device == name}
+        self.contacts = Contacts(contacts)
+        self.image = Image({**signals, **self.contacts.signals()})
+        self.told = signals.keys()
+        """What the image holds for the net; the rest is for the emergency stop."""
         self.sensed = [signal for signal in signals if signal in driver.completions.shown]
         """Signals from which completions are formed; the others are told as they are."""
         commands = {place: one for place, one in binding.document.commands.items() if one.device == name}
@@ -194,11 +214,14 @@ class _Device:
     async def run(self) -> None:
         """Keep the device connected."""
         self._alarm(self.document.start_s, "not reached since the start")
+        loop = asyncio.get_running_loop()
+        begun = loop.call_later(self.document.start_s, self._must_move) if self.contacts.contacts else None
         try:
             await self.kept.run()
         finally:
-            if self.alarm is not None:
-                self.alarm.cancel()
+            for alarm in (self.alarm, begun):
+                if alarm is not None:
+                    alarm.cancel()
 
     def send(self, command: CommandDocument, place: Place, entry: int) -> None:
         """Send a command by its channel."""
@@ -225,8 +248,16 @@ class _Device:
 
     def read(self, batch: Sequence[tuple[Point, Value]]) -> None:
         """Values have come."""
+        opened = self.contacts.opened(batch) if self.contacts.contacts else ""
+        if opened:  # before anything else
+            self._emergency(opened)
         now = self.driver.clock.now_seconds() if self.driver.clock is not None else 0.0
         changes, faults = self.image.take(batch, now)
+        if not opened and not self.contacts.are_closed:
+            self.contacts.read(self.image.readings)
+            if self.driver.may_move:  # what was sent before that has waited for it
+                for device in self.driver.devices.values():
+                    device.kept.awake.set()
         self._tell(changes, faults)
         for point, value in batch:
             for channel, key in self.replies.get(point, ()):
@@ -250,6 +281,8 @@ class _Device:
         """There is no connection, or none any more."""
         if self.is_ready.is_set():
             self.is_ready.clear()
+            if self.contacts.contacts:
+                self._emergency(self.contacts.lost(why))
             self._alarm(self.document.grace_s, why)
         if why != self.noted and not self.driver.is_stopped:
             self.noted = why
@@ -260,6 +293,8 @@ class _Device:
         self.writing = None
         if self.forced:
             return self.forced[0]  # until it is confirmed
+        if not self.driver.may_move:
+            return None
         for channel in self.channels.values():
             if (some := channel.next_writes()) is not None:
                 self.writing = channel
@@ -285,6 +320,14 @@ class _Device:
         if self.driver.listener is not None and not self.driver.is_stopped:
             self.driver.listener.driver_fault(self.name, message)
 
+    def _emergency(self, reason: str) -> None:
+        self.driver.emergency_stop(f"{self.name}: {reason}")
+
+    def _must_move(self) -> None:
+        if not self.contacts.are_closed:
+            open_ones = " and ".join(f"'{name}'" for name in sorted(self.contacts.open_ones))
+            self._emergency(f"{open_ones} was not read within {self.document.start_s:g} s")
+
     def _alarm(self, after_s: float, why: str) -> None:
         if self.alarm is not None:
             self.alarm.cancel()
@@ -305,7 +348,7 @@ class _Device:
                 self.driver.formed(signal, self.driver.completions.shows(signal, shows))
         if self.driver.listener is not None and not self.driver.is_stopped:
             for change in changes:
-                if change.signal not in self.sensed:
+                if change.signal in self.told and change.signal not in self.sensed:
                     self.driver.listener.signal(change.signal, change.value, None)
         if faults:
             several = f"{faults[0]} and {len(faults) - 1} more" if len(faults) > 1 else faults[0]

@@ -410,6 +410,73 @@ class DriverConformance:
 
         self.bench(test)
 
+    def test_nothing_is_commanded_before_the_contact_of_the_emergency_stop_was_read_as_closed(self) -> None:
+        """Who presses it before the start stops the start."""
+
+        async def test(b: Bench) -> None:
+            b.machine.show("button", value=False)
+            b.driver.send(b.place("move"), 1)
+            async with b.running():
+                await until(lambda: b.heard.emergencies, "the emergency stop")
+                await until(lambda: b.machine.outputs, "the safe outputs")
+                b.machine.show("button", value=True)
+                await until(b.driver.devices["D"].kept.stopped.is_set, "the stop is over")
+            assert b.heard.emergencies == ["D: 'button' is open"]
+            assert b.machine.orders == []
+            while not b.machine.orders:  # a start may come before everybody knows that it is closed again
+                b.begin()
+                b.driver.send(b.place("move"), 1)
+                async with b.running():
+                    await until(lambda: b.machine.orders or b.heard.emergencies, "a start")
+            assert b.heard.emergencies == []
+
+        self.bench(test, button=True)
+
+    def test_an_open_contact_of_the_emergency_stop_stops_the_machines_and_closing_it_starts_none(self) -> None:
+        """It drives the safe outputs by itself, tells of it, and commands nothing any more."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("move"), 1)
+                await until(lambda: b.machine.orders, "the command arrives")
+                b.machine.show("button", value=False)
+                await until(lambda: b.heard.emergencies, "the emergency stop")
+                assert b.driver.is_stopped
+                b.machine.show("button", value=True)
+                b.driver.send(b.place("halt"), 1)
+                await until(lambda: len(b.machine.outputs) == 2, "the safe outputs")
+            assert b.heard.emergencies == ["D: 'button' is open"]
+            assert b.machine.events[-1] == "output"
+            assert len(b.machine.orders) == 1
+
+        self.bench(test, button=True)
+
+    def test_a_contact_of_the_emergency_stop_that_cannot_be_read_is_open(self) -> None:
+        """Nobody could press it: there is no time of grace."""
+
+        async def lost(b: Bench) -> None:
+            async with b.connected():
+                await b.far.end.cut()
+                await until(lambda: b.heard.emergencies, "the emergency stop")
+            assert "D: 'button' cannot be read: " in b.heard.emergencies[0]
+
+        async def garbled(b: Bench) -> None:
+            async with b.connected():
+                b.far.end.faults.garbage = True
+                b.machine.show("button", value=True)
+                await until(lambda: b.heard.emergencies, "the emergency stop")
+                b.far.end.faults.garbage = False
+
+        async def never_reached(b: Bench) -> None:
+            await b.far.end.cut()
+            async with b.running():
+                await until(lambda: b.heard.emergencies, "the emergency stop")
+            assert "was not read within 0.05 s" in b.heard.emergencies[0]
+
+        self.bench(lost, button=True)
+        self.bench(garbled, button=True)
+        self.bench(never_reached, button=True, start_s=0.05)
+
     def test_the_watchdog_of_the_device_acts_when_the_driver_freezes(self) -> None:
         """A process that hangs cannot stop its machines; the device misses its heartbeat and does."""
 

@@ -86,6 +86,11 @@ class DeviceKind(Protocol):
         """The model of its own keys in a binding."""
         ...
 
+    @property
+    def through_broker(self) -> bool:
+        """Whether a connection leads to who stands for the device, and says nothing of the device itself."""
+        ...
+
     def point_problem(self, point: Point, use: Use) -> str:
         """What is wrong with an address for a use, as a sentence without its end; empty where nothing is."""
         ...

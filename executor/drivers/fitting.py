@@ -23,6 +23,12 @@ def _misfits(binding: Binding, net: Net) -> Iterator[Diagnostic]:
     if document.cell != net.name:
         message = f"this binding is for the cell '{document.cell}', and the net is '{net.name}'"
         yield binding.problem("F5101", ("cell",), message, "name the cell, when you have looked at all that is bound")
+    controllers = [controller.name for controller in net.controllers]
+    for name, contact in document.emergency_stop.items():
+        for unknown in (one for one in contact.controllers or () if one not in controllers):
+            hint = did_you_mean(unknown, controllers) + f"it has {', '.join(controllers)}; or leave it out, for all"
+            message = f"the net has no controller '{unknown}'"
+            yield binding.problem("F5101", ("emergency_stop", name, "controllers"), message, hint)
     signals = {signal.name: signal for signal in net.signals if signal.kind is not SignalKind.TIMER}
     for name in document.signals:
         if name not in signals:

@@ -167,6 +167,9 @@ class Kept:
         try:
             self.is_connected = True
             await self._first_of(self._serve(connection), self._watch())
+        except _FAILURES as error:
+            self.served.lost(str(error) or "no answer in time")  # before the goodbye, which may take its time
+            raise
         finally:
             self.is_connected = False
             await connection.close()

@@ -223,6 +223,7 @@ class ModbusTcp(_Modbus):
     """Modbus in a network."""
 
     options: type[Options] = TcpOptions
+    through_broker = False
 
     def load(self) -> None:
         """Import what is needed."""
@@ -243,6 +244,7 @@ class ModbusRtu(_Modbus):
     """Modbus on a serial line."""
 
     options: type[Options] = RtuOptions
+    through_broker = False
 
     def load(self) -> None:
         """Import what is needed."""

@@ -93,6 +93,7 @@ class Mqtt:
     """Devices behind an MQTT broker."""
 
     options: type[Options] = MqttOptions
+    through_broker = True
 
     def point_problem(self, point: Point, use: Use) -> str:
         """What is wrong with a topic."""

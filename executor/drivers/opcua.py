@@ -150,6 +150,7 @@ class OpcUa:
     """OPC UA servers."""
 
     options: type[Options] = OpcUaOptions
+    through_broker = False
 
     def point_problem(self, point: Point, use: Use) -> str:
         """What is wrong with a node id; what may be written only the server knows."""

@@ -205,6 +205,7 @@ class SerialLine:
     """Devices that speak lines of text."""
 
     options: type[Options] = SerialOptions
+    through_broker = False
 
     def point_problem(self, point: Point, use: Use) -> str:
         """What is wrong with a name."""

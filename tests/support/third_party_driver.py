@@ -96,6 +96,7 @@ class MemoryKind:
     """The kind; every address is one, but those that begin with a question mark."""
 
     options: type[Options] = MemoryOptions
+    through_broker = False
 
     def point_problem(self, point: Point, use: Use) -> str:
         return f"a question is no point to {use}" if point.startswith("?") else ""

@@ -15,7 +15,7 @@ from typing import Final
 from firable.executor.drivers.device import Point, Value, as_number
 from firable.executor.drivers.far_side.end import FarEnd
 
-ROLES: Final = ("sensor", "closed", "beat", "tripped", "output", "taken", "done", "failed")
+ROLES: Final = ("sensor", "closed", "button", "beat", "tripped", "output", "taken", "done", "failed")
 """What an end must have a point for; besides `number` and `code`, or `command`."""
 
 
@@ -28,7 +28,7 @@ class Order:
 
 
 class Machine:
-    """A machine with one channel, two sensors, an output and a watchdog."""
+    """A machine with one channel, two sensors, a button for the emergency stop, an output and a watchdog."""
 
     def __init__(self, end: FarEnd, points: Mapping[str, Point]) -> None:
         self.end = end
@@ -56,6 +56,7 @@ class Machine:
             self.show(role, 0)
         for role in ("sensor", "closed", "tripped"):
             self.show(role, value=False)
+        self.show("button", value=True)
 
     async def stop(self) -> None:
         """End."""

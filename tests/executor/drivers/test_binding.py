@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from firable.decompose.splitting.cut import split
 from firable.executor.drivers import kinds
 from firable.executor.drivers.binding import parse_binding, read_binding
-from firable.executor.drivers.bound import bound_driver
+from firable.executor.drivers.bound import BoundDriver, bound_driver
 from firable.executor.drivers.far_side.ends import ends_of
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
@@ -171,6 +172,48 @@ def test_what_refers_to_nothing_is_refused(old: str, new: str, place: str) -> No
 )
 def test_a_binding_that_does_not_fit_the_net_is_refused(old: str, new: str, place: str) -> None:
     assert ("F5101", place) in refusal(edited(old, new), fit=True)
+
+
+STOP = "emergency_stop:\n  door: {device: plc, read: discrete 3}\nsignals:"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "found"),
+    [
+        ("device: plc", "device: plx", ("F5101", "14: device")),
+        ("discrete 3", "coil x", ("F5102", "14: read")),
+        ("read: discrete 3", "read: discrete 3, on_loss: hold", ("F1008", "14: door")),
+        ("read: discrete 3", "read: discrete 3, controllers: [M, N]", ("F5101", "14: controllers")),
+        ("{device: plc, read: discrete 3}", "{device: cloud, read: stop}", ("F5101", "17: device")),
+    ],
+)
+def test_a_contact_of_the_emergency_stop_that_would_stop_nothing_is_refused(
+    old: str, new: str, found: tuple[str, str]
+) -> None:
+    stop = STOP.replace(old, new)
+    if "cloud" in new:  # whose broker is there, and says nothing of the device
+        stop = stop.replace("emergency_stop:", "  cloud:\n    driver: mqtt\n    host: broker\nemergency_stop:")
+    assert found in refusal(edited("signals:", stop), fit=found == ("F5101", "14: controllers"))
+
+
+def test_a_host_looks_at_the_contacts_of_its_controllers_and_writes_nothing_to_a_device_of_others() -> None:
+    (part,) = split(NET).subnets
+    far = "  far:\n    driver: modbus-tcp\n    host: 10.0.0.2\n    safe: {coil 9: false}\nemergency_stop:"
+    door = STOP.replace("device: plc", "device: far").replace("emergency_stop:", far)
+    driver = bound_driver(parse_binding(edited("signals:", door)), NET, part)
+    assert set(driver.readings()) == {"M.there", "emergency stop door"}
+    assert (driver.devices["plc"].document.safe, driver.devices["far"].document.safe) == ({"coil 1": "false"}, {})
+    others = NET.controllers[0].name
+    binding = parse_binding(edited("signals:", door.replace("discrete 3", "discrete 3, controllers: [N]")))
+    assert set(binding.serving({"M.there"}, [others]).document.devices) == {"plc"}
+    assert set(binding.serving({"M.there"}, ["N"]).document.devices) == {"plc", "far"}
+
+
+def test_who_only_looks_sees_the_contacts_and_is_stopped_by_none() -> None:
+    watching = parse_binding(edited("signals:", STOP)).watching()
+    driver = BoundDriver(watching, (), frozenset())
+    assert set(driver.readings()) == {"M.there", "emergency stop door"}
+    assert driver.may_move
 
 
 def test_the_binding_of_the_catalogue_fits_its_net_and_can_be_served() -> None:

@@ -10,6 +10,7 @@ from firable.executor.drivers.far_side.modbus_server import ModbusRtuEnd, Modbus
 POINTS = {
     "sensor": "discrete 0",
     "closed": "discrete 1",
+    "button": "discrete 2",
     "tripped": "discrete 5",
     "output": "coil 3",
     "beat": "holding 0",

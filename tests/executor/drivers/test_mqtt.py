@@ -10,6 +10,9 @@ from firable.executor.drivers.conformance import DriverConformance
 from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.mqtt_device import MqttEnd, mosquitto
 
+ALIVE = "alive: {read: cell/M/button,within_s: 600}"
+"""What a broker's device needs for an emergency stop; here it does not change."""
+
 
 @pytest.mark.skipif(mosquitto() is None, reason="needs the broker mosquitto, which is not installed")
 class TestMqtt(DriverConformance):
@@ -19,4 +22,4 @@ class TestMqtt(DriverConformance):
         end = MqttEnd({points[role] for role in ("output", "beat", "command")})
         await end.relay.open(0)  # takes its port
         await end.relay.close()
-        yield Far(end, f"driver: mqtt, host: 127.0.0.1, port: {end.port}", points)
+        yield Far(end, f"driver: mqtt, host: 127.0.0.1, port: {end.port}, {ALIVE}", points)

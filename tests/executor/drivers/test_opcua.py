@@ -13,7 +13,7 @@ from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
 
 POINTS = {role: f"ns=2;s=M.{role}" for role in (*ROLES, "number", "code")}
-BITS = {"sensor", "closed", "tripped", "output"}
+BITS = {"sensor", "closed", "button", "tripped", "output"}
 
 
 @pytest.fixture(scope="module")

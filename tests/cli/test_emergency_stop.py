@@ -1,0 +1,157 @@
+"""The emergency stop that is wired: a contact opens, and the machines stand, whatever has become of the coordinator."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from support.link_rigs import free_port
+
+from firable.cli.main import main
+from firable.executor.drivers.far_side.machine import Machine
+from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
+from firable.semantics.trace import Noted, read_trace
+
+NET = """\
+firable: 1
+cell: cell
+controllers:
+  a: {start: free, inputs: key, places: {free: , lamp: {send: {machine: A, command: OPEN}}}}
+  b: {start: idle, places: {idle: , has: }}
+transitions:
+  hand: {from: [a.free, b.idle], to: [a.lamp, b.has], if: a.key}
+  back: {from: [a.lamp, b.has], to: [a.free, b.idle], unless: a.key}
+"""
+POINTS = {
+    "sensor": "discrete 0",
+    "closed": "discrete 1",
+    "button": "discrete 2",
+    "tripped": "discrete 5",
+    "output": "coil 3",
+    "beat": "holding 0",
+    "code": "holding 10",
+    "number": "holding 11",
+    "taken": "input 10",
+    "done": "input 11",
+    "failed": "input 12",
+}
+BINDING = """\
+firable_bind: 1
+cell: cell
+devices:
+  plc:
+    driver: modbus-tcp
+    host: 127.0.0.1
+    port: {port}
+    safe: {{coil 3: false}}
+    channels: {{A: {{number: holding 11, taken: input 10}}}}
+emergency_stop:
+  button: {{device: plc, read: discrete 2}}
+signals:
+  a.key: {{device: plc, read: discrete 0, on_loss: hold}}
+commands:
+  a.lamp: {{device: plc, channel: A, write: {{holding 10: 1}}}}
+"""
+
+
+class Lamp:
+    """A machine behind Modbus TCP, in a thread of its own."""
+
+    def __init__(self) -> None:
+        self.loop = asyncio.new_event_loop()
+        self.thread = threading.Thread(target=self.loop.run_forever)
+        self.thread.start()
+        self.end = ModbusTcpEnd()
+        self.machine = Machine(self.end, POINTS)
+        self.run(self.machine.start())
+
+    def run(self, work: object) -> None:
+        assert asyncio.iscoroutine(work)
+        asyncio.run_coroutine_threadsafe(work, self.loop).result(20)
+
+    def show(self, role: str, *, value: bool) -> None:
+        self.loop.call_soon_threadsafe(lambda: self.machine.show(role, value))
+
+    def close(self) -> None:
+        self.run(self.machine.stop())
+        self.loop.call_soon_threadsafe(self.loop.stop)
+        self.thread.join()
+        self.loop.close()
+
+
+@pytest.fixture
+def lamp() -> Iterator[Lamp]:
+    made = Lamp()
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> str:
+    folder = tmp_path_factory.mktemp("bundle")
+    (folder / "cell.firable.yaml").write_text(NET)
+    assert main(["bundle", str(folder / "cell.firable.yaml"), "-o", str(folder / "cell.bundle")]) == 0
+    return str(folder / "cell.bundle")
+
+
+def started(*arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "firable.cli", "run", *arguments]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+def until(condition: Callable[[], object], what: str) -> None:
+    end = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < end, what
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("coordinator", ["in the same process", "frozen", "killed"])
+def test_open_contact_stops_the_machines_of_its_controller_and_the_run_stays_stopped(
+    coordinator: str, bundle: str, lamp: Lamp, tmp_path: Path
+) -> None:
+    bind, trace, journal = tmp_path / "cell.bind.yaml", tmp_path / "trace", tmp_path / "journal"
+    bind.write_text(BINDING.format(port=lamp.end.port))
+    mine = [bundle, "--bind", str(bind), "--journal", str(journal)]
+    at = f"tcp/127.0.0.1:{free_port()}"
+    if coordinator != "in the same process":
+        mine += ["--controller", "a", "--join", at]
+    processes = [started(*mine, "--trace", str(trace))]
+    try:
+        if coordinator != "in the same process":
+            processes.append(started(bundle, "--controller", "b", "--coordinator", "--listen", at, "--dry-run", "0"))
+        until(lambda: lamp.machine.outputs == [False], "the start")
+        lamp.show("sensor", value=True)
+        until(lambda: lamp.machine.orders, "a command that both controllers had to agree on")
+        if coordinator == "frozen":
+            os.kill(processes[1].pid, signal.SIGSTOP)
+        elif coordinator == "killed":
+            processes[1].kill()
+        lamp.show("button", value=False)
+        until(lambda: len(lamp.machine.outputs) == 2, "the safe outputs")
+        lamp.show("button", value=True)
+        said, _ = processes[0].communicate(timeout=60)
+        assert processes[0].returncode in {0, 3}, said
+        assert "emergency stop: plc: 'button' is open" in said
+        assert (lamp.machine.outputs, len(lamp.machine.orders)) == ([False, False], 1)
+        notes = [event for event in read_trace(trace).events if isinstance(event, Noted)]
+        assert [note.data["reason"] for note in notes if note.note == "emergency stop"] == ["plc: 'button' is open"]
+        # Started again with the button pressed it ends at once.
+        lamp.show("button", value=False)
+        again = started(*mine)
+        processes.append(again)
+        said, _ = again.communicate(timeout=60)
+        assert "emergency stop: plc: 'button' is open" in said
+        assert len(lamp.machine.orders) == 1
+    finally:
+        for process in processes:
+            process.kill()
+            process.communicate()
