@@ -29,6 +29,7 @@ from dataclasses import dataclass
 from firable.executor.protocol.commands import PREFIX, Stage
 from firable.executor.protocol.deciders import closed_key
 from firable.executor.protocol.messages import EPOCH_BITS, Stored
+from firable.executor.protocol.stored_word import pieces, stored_word
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -99,7 +100,7 @@ class _Moving:
         self.shown: set[str] = set()
         for subnet in old.subnets:
             player, kept = TokenPlayer.of(subnet), controllers.get(subnet.name, {})
-            word = int(str(kept["word"]), 16) if "word" in kept else subnet.initial_marking
+            word = stored_word(kept, subnet.initial_marking)
             held += subnet.names(player.marking(word))
             self.shown |= {signal.name for signal in subnet.signals if word & player.signal_bit(signal.name)}
         order = old.net.place_index
@@ -145,7 +146,7 @@ class _Moving:
             word |= sum(player.signal_bit(s.name) for s in subnet.signals if s.name in self.shown)
             kept: dict[str, Stored] = {
                 "epoch": epoch,
-                "word": f"{word:x}",
+                **pieces(word),
                 **none_open,
             }
             for key, value in self._records(subnet):

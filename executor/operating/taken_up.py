@@ -21,6 +21,7 @@ from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.operating.recorder import KEY, LineStream, Recorder, TraceFile, size_bytes_of
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Stored
+from firable.executor.protocol.stored_word import stored_word
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -120,7 +121,6 @@ def _joint(decomposition: Decomposition, journal: Journal) -> Marking:
     """The marking that the controllers have kept, where no trace tells it: after a takeover."""
     held: list[str] = []
     for subnet in decomposition.subnets:
-        word = journal.kept(subnet.name).get("word")
-        marking = subnet.initial_marking if word is None else TokenPlayer.of(subnet).marking(int(str(word), 16))
-        held += subnet.names(marking)
+        word = stored_word(journal.kept(subnet.name), subnet.initial_marking)
+        held += subnet.names(TokenPlayer.of(subnet).marking(word))
     return decomposition.net.marking(held)

@@ -29,6 +29,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 from typing import Final
 
 from firable.executor.protocol.messages import Effect, Keep, ProtocolError, Sending, Stored
@@ -166,17 +167,19 @@ class Commands:
 
     def _key(self, place: str) -> str:
         completion = self.subnet.place(place).completion
-        return _signal_key(completion) if completion is not None else _place_key(place)
+        return _place_key(place) if completion is None else _signal_key(completion)
 
     def _kept(self, key: str) -> Keep:
         command = self.newest[key]
         return Keep(key, (command.place, command.entry, command.stage.value))
 
 
+@cache
 def _signal_key(completion: str) -> str:
     return f"{PREFIX}signal/{completion}"
 
 
+@cache
 def _place_key(place: str) -> str:
     return f"{PREFIX}place/{place}"
 

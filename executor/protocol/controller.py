@@ -18,9 +18,9 @@ clocks that agree; here a lost decision is repeated until acknowledged, and unti
 
 What is kept in stable storage, and the fault that would show if it were not:
 
-- `word`, the marking and the completion signals in the image, whenever a firing, a promise or a completion has changed
-  it: a token would be back where it was, and fire its transition, and send its command, a second time; or a completion
-  that was told once would be awaited for ever.
+- `word`, the marking and the completion signals in the image, in pieces (`stored_word`), whenever a firing, a promise
+  or a completion has changed it: a token would be back where it was, and fire its transition, and send its command, a
+  second time; or a completion that was told once would be awaited for ever.
 - `promise/<round>`, the parts promised in a round that is not decided: the commit may be under way, and what the part
   needs would be gone when it comes. `word` holds the values of the signals that the promise reads, which stay in the
   image until it ends. A vote that promises nothing is not kept: given again, it may be another, and an undecided round
@@ -70,6 +70,7 @@ from firable.executor.protocol.messages import (
     Vote,
     VoteRequest,
 )
+from firable.executor.protocol.stored_word import changed_pieces, stored_word
 from firable.executor.protocol.timers import Timers
 from firable.executor.protocol.token_player import Arbiter, Compiled, TokenPlayer, Word
 from firable.nets.decomposition import Decomposition
@@ -125,7 +126,8 @@ class LocalController:
         self.enabled = EnabledSet([(c.needs, c.forbids) for c in self.transitions])
         self.rows = {t: part_of[c.name] for t, c in enumerate(self.transitions) if c.name in part_of}
         """The coordinated transition of each part, by the index of the part."""
-        self.part_mask = sum(1 << t for t in self.rows)
+        self.local_mask = sum(1 << t for t in range(len(self.transitions)) if t not in self.rows)
+        """The transitions that it fires by itself."""
         self.arbiter = Arbiter(self.subnet, (group for group in decomposition.groups if group.controller == name))
         self.kept_turns = self.arbiter.turns
         self.word = self.subnet.initial_marking
@@ -213,21 +215,21 @@ class LocalController:
         """
         if entry is not None and entry != self.commands.entry(signal):
             return []
-        if self.player.signal_bit(signal) & self._locked_reads():
+        if self.promises and self.player.signal_bit(signal) & self._locked_reads():
             self.latched[signal] = value
             return []
-        return list(self._take(signal, value))
+        return self._take(signal, value)
 
     def sent(self, place: str, entry: int) -> list[Effect]:
         """Take the driver's word that it has the command of a place."""
         effects = list(self.commands.sent(place, entry))
-        if self.unsent:
-            self._mark_unsent()
+        if effects:
+            self.unsent &= ~(1 << self.subnet.place_index[place])
         return effects
 
     def tick(self, now_seconds: float) -> list[Effect]:
         """Take what the clock shows: set the timers whose time is over; a controller that is held times nothing."""
-        if self.held:
+        if self.held or not self.timers.running:
             return []
         effects: list[Effect] = []
         for place in self.timers.over(now_seconds, self.word):
@@ -236,13 +238,13 @@ class LocalController:
 
     def deadline(self) -> float | None:
         """When it has to be told the time next; minus infinity for at once, None while nothing is timed."""
-        return None if self.held else self.timers.deadline(self.word)
+        return self.timers.deadline(self.word) if self.timers.running and not self.held else None
 
     def fire(self) -> list[Effect]:
         """Fire one local transition, if one is enabled and disturbs no promise; no effect means that none is."""
         if self.held:
             return []
-        enabled = self.enabled.at(self.word) & ~self.part_mask
+        enabled = self.enabled.at(self.word) & self.local_mask
         if not enabled:
             return []
         found = self.arbiter.following(enabled, self._is_free) if self._is_bound() else self.arbiter.following(enabled)
@@ -279,7 +281,7 @@ class LocalController:
         for above in self.above.values():
             above.readiness = Readiness((self.epoch << EPOCH_BITS) - 1, frozenset())
             above.told = above.readiness.sequence
-        self.word = self.kept_word = int(str(kept.get("word", f"{self.word:x}")), 16)
+        self.word = self.kept_word = stored_word(kept, self.word)
         self.commands = Commands(self.subnet, kept)
         self._mark_unsent()
         for key, value in kept.items():
@@ -355,19 +357,21 @@ class LocalController:
                     yield from self._end(promised)
                 yield from self._release()
 
-    def _fire(self, transition: Compiled) -> Iterator[Effect]:
+    def _fire(self, transition: Compiled) -> list[Effect]:
         before = self.word
         self.word = transition.fire(before)
-        yield from self._keep_word()
-        for place in self.player.entered(transition.name):
-            for signal in self.subnet.place(place).cleared:
+        effects: list[Effect] = [*self._keep_word()]
+        for name in self.player.entered(transition.name):
+            place = self.subnet.place(name)
+            for signal in place.cleared:
                 self.latched.pop(signal, None)  # a value from before the command
                 if before & self.player.signal_bit(signal):
-                    yield Taken(signal, value=False)
-            self.timers.enter(place)
-            yield from self.commands.enter(place, held=self.held)
-            if self.subnet.place(place).completion is None:
-                self.unsent |= 1 << self.subnet.place_index[place]
+                    effects.append(Taken(signal, value=False))
+            self.timers.enter(name)
+            effects += self.commands.enter(name, held=self.held)
+            if place.completion is None:
+                self.unsent |= 1 << self.subnet.place_index[name]
+        return effects
 
     def _release(self) -> Iterator[Effect]:
         """Take in the signals that changed while a promise read them."""
@@ -378,18 +382,20 @@ class LocalController:
                 if timed is None or self.timers.waits(timed.name, self.word):  # it may have come in time after all
                     yield from self._take(signal, value)
 
-    def _take(self, signal: str, value: bool) -> Iterator[Effect]:
+    def _take(self, signal: str, value: bool) -> list[Effect]:
+        effects: list[Effect] = []
         bit = self.player.signal_bit(signal)
         # What a sensor shows first after a restart is told even if it is nothing new: the image may be newer than what
         # was kept of it, and who follows the trace saw the newer one.
         if bool(self.word & bit) != value or bit & self.untold:
             self.word = self.word | bit if value else self.word & ~bit
             self.untold &= ~bit
-            yield Taken(signal, value)
+            effects.append(Taken(signal, value))
             if self.subnet.signals[self.subnet.signal_index[signal]].kind is SignalKind.COMPLETION:
-                yield from self._keep_word()
+                effects += self._keep_word()
         if value:
-            yield from self.commands.completed(signal)
+            effects += self.commands.completed(signal)
+        return effects
 
     def _promise(self, names: Iterable[str]) -> Promise:
         promised = frozenset(names)
@@ -398,8 +404,8 @@ class LocalController:
 
     def _keep_word(self) -> Iterator[Effect]:
         if self.word != self.kept_word:
+            yield from changed_pieces(self.kept_word, self.word)
             self.kept_word = self.word
-            yield Keep("word", f"{self.word:x}")
 
     def _is_enabled(self, transition: Compiled) -> bool:
         """Enabled by what is known.

@@ -25,26 +25,29 @@ class EnabledSet:
     """
 
     def __init__(self, conditions: Sequence[tuple[Word, Word]]) -> None:
-        self._conditions = [(1 << t, needs, forbids) for t, (needs, forbids) in enumerate(conditions)]
         self._readers: dict[int, list[tuple[int, Word, Word]]] = {}
-        for condition in self._conditions:
-            _, needs, forbids = condition
+        """For each bit, who reads it: the own bit in the mask, the bits that are read, and those of them to be set.
+
+        A condition that wants a bit both ways wants one more, which no word has.
+        """
+        self._word = 0
+        self._mask = 0
+        for t, (needs, forbids) in enumerate(conditions):
+            condition = (1 << t, needs | forbids, needs if not needs & forbids else -1)
             for bit in bits(needs | forbids):
                 self._readers.setdefault(bit, []).append(condition)
-        self._word = 0
-        self._mask = sum(own for own, needs, _ in self._conditions if not needs)
+            if not needs:
+                self._mask |= 1 << t
 
     def at(self, word: Word) -> int:
         """The mask of those enabled at a word; time linear in those that read a bit that has changed."""
         changed = self._word ^ word
         if changed:
-            mask = self._mask
+            mask, readers = self._mask, self._readers
             for bit in bits(changed):
-                for own, needs, forbids in self._readers.get(bit, ()):
-                    if word & needs == needs and not word & forbids:
-                        mask |= own
-                    else:
-                        mask &= ~own
+                for own, read, needs in readers.get(bit, ()):
+                    if (word & read == needs) is not (mask & own != 0):
+                        mask ^= own
             self._word, self._mask = word, mask
         return self._mask
 
@@ -55,7 +58,21 @@ def bits(mask: int) -> Iterator[int]:
     >>> list(bits(0b1010))
     [1, 3]
     """
+    at = -1
     while mask:
-        low = mask & -mask
-        yield low.bit_length() - 1
-        mask ^= low
+        skipped = (mask & -mask).bit_length()
+        at += skipped
+        yield at
+        mask >>= skipped  # after the first, neighbours are found in a few digits, however wide the mask was
+
+
+def bits_behind(mask: int, last: int) -> Iterator[int]:
+    """The positions of the bits that are set, from the first one behind `last`, and then those up to it.
+
+    >>> list(bits_behind(0b110101, 2))
+    [4, 5, 0, 2]
+    """
+    first = last + 1
+    for at in bits(mask >> first):
+        yield first + at
+    yield from bits(mask & (1 << first) - 1)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
-from firable.executor.protocol.enabled import bits
+from firable.executor.protocol.enabled import bits, bits_behind
 from firable.nets.decomposition import ArbitrationGroup
 from firable.nets.net import Marking, Net
 from firable.semantics.arbitration import Arbitration, Group, Turns
@@ -39,6 +39,8 @@ class Compiled:
     clears: Word
     openable: bool
     """Whether some valuation of the signals opens its external gates."""
+    drops: Word
+    """What it takes and clears."""
 
     @property
     def writes(self) -> Word:
@@ -60,7 +62,7 @@ class Compiled:
 
     def fire(self, word: Word) -> Word:
         """Eq. (3)-(4), and the completions and timers of the places entered cleared."""
-        return word & ~(self.takes | self.clears) | self.puts
+        return (word | self.drops) ^ self.drops | self.puts  # no complement, which is slow where words are wide
 
     def disturbs(self, writes: Word, reads: Word) -> bool:
         """Whether firing could change what another reads, or reads what another will write (O1)."""
@@ -86,14 +88,16 @@ class TokenPlayer:
             opening = sum({signal_bit[gate.signal] for gate in transition.external if gate.wanted})
             closing = sum({signal_bit[gate.signal] for gate in transition.external if not gate.wanted})
             cleared = {signal for place in transition.outputs for signal in net.place(place).cleared}
+            clears = sum(signal_bit[name] for name in cleared)
             compiled[transition.name] = Compiled(
                 transition.name,
                 needs=masks.inputs | masks.permissive | opening,
                 forbids=masks.outputs | masks.inhibitive | closing,
                 takes=masks.inputs,
                 puts=masks.outputs,
-                clears=sum(signal_bit[name] for name in cleared),
+                clears=clears,
                 openable=transition.openable,
+                drops=masks.inputs | clears,
             )
         return cls(net, compiled, (1 << len(net.places)) - 1)
 
@@ -103,7 +107,11 @@ class TokenPlayer:
 
     def signal_bit(self, signal: str) -> Word:
         """The bit of a signal; `KeyError` where there is none."""
-        return 1 << len(self.net.places) + self.net.signal_index[signal]
+        return self._signal_bits[signal]
+
+    @cached_property
+    def _signal_bits(self) -> dict[str, Word]:
+        return {signal.name: 1 << len(self.net.places) + j for j, signal in enumerate(self.net.signals)}
 
     def entered(self, transition: str) -> tuple[str, ...]:
         """The places with a command that a firing of the transition enters, in the order of the net."""
@@ -154,12 +162,10 @@ class Arbiter:
 
         It is the first behind the last winner that its arbiter grants; only its own rivals are looked at.
         """
-        behind = enabled >> self.last + 1 << self.last + 1
-        for part in (behind, enabled ^ behind):
-            for t in bits(part):
-                if is_free(t) and self._is_granted(t, enabled, is_free):
-                    self.last = t
-                    return t
+        for t in bits_behind(enabled, self.last):
+            if is_free(t) and self._is_granted(t, enabled, is_free):
+                self.last = t
+                return t
         return None
 
     def _is_granted(self, t: int, enabled: int, is_free: Callable[[int], bool]) -> bool:
@@ -167,6 +173,8 @@ class Arbiter:
         if component < 0:
             return True
         rivals = enabled & self.rivals[component]
+        if rivals == 1 << t:
+            return True
         candidates = frozenset(u for u in bits(rivals) if u == t or is_free(u))
         if len(candidates) == 1:
             return True

@@ -43,7 +43,7 @@ Kind = tuple[str, str, str]
 
 _CONTROLLER: Final = frozenset(
     {
-        *("name", "subnet", "player", "parts", "transitions", "enabled", "rows", "part_mask", "arbiter", "kept_turns"),
+        *("name", "subnet", "player", "parts", "transitions", "enabled", "rows", "local_mask", "arbiter", "kept_turns"),
         *("word", "kept_word", "promises", "closed", "coordinators", "above", "latched", "commands", "timers"),
         *("unsent", "untold", "held", "epoch"),
     }

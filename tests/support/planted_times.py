@@ -127,12 +127,12 @@ class AsksForNoTime(LocalController):
 class LeavesTimersSet(LocalController):
     """A token enters, and its timer is not cleared."""
 
-    def _fire(self, transition: Compiled) -> Iterator[Effect]:
+    def _fire(self, transition: Compiled) -> list[Effect]:
         timers = sum(self.player.signal_bit(name) for name in self.timers.signals)
         before = self.word & timers
-        effects = list(super()._fire(transition))
+        effects = super()._fire(transition)
         self.word |= before
-        yield from effects
+        return effects
 
 
 class TakesTimersBlindly(LocalController):
