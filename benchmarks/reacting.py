@@ -1,18 +1,36 @@
 """How long it takes from a change of a signal to the command that follows from it.
 
 The net is the smallest that reacts: a token goes from one place to another when a signal comes, and back when it goes,
-and each place sends a command. In this process the yardstick is an echo between two tasks of asyncio; over Modbus TCP
-it is a loop that polls by pymodbus and writes when it sees a change, at the same pace, against such a server. These are
-times by the clock, because reacting is waiting; the noise floor is the yardstick against itself, measured in turn with
-the rest, and no ratio below it means anything.
+and each place sends a command. It is measured three ways, each beside the least that does the same, in turn with it:
+
+- over a socket of loopback: a plant, in a process of its own, sends a byte and waits for one. The yardstick is an echo
+  server of asyncio; with the executor, the byte is a signal of the net and the answer its command;
+- within the process: the driver changes the signal and waits for the command. The yardstick is an echo between two
+  tasks of asyncio by queues, in which no byte is moved and the kernel is not asked: a harder one than the socket;
+- over Modbus TCP: the plant is a server of pymodbus in a process of its own, which takes the time from what it shows
+  to what it is written. The yardstick is a loop that polls by pymodbus and writes when it sees a change, at the same
+  pace: as fast as the answers come, and each millisecond, where both wait for the poll most of the time.
+
+Times are by the clock, because reacting is waiting. The noise floor is the yardstick against itself, measured in turn
+with the rest, and no difference below it means anything.
+
+    python benchmarks/reacting.py echo PORT COUNT      a plant at a socket
+    python benchmarks/reacting.py modbus COUNT         a plant as a Modbus server; it prints its port first
 """
 
 from __future__ import annotations
 
 import asyncio
+import json
 import random
+import socket
+import subprocess
+import sys
 import time
-from collections.abc import Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
+from functools import partial
+from pathlib import Path
 from statistics import median, quantiles
 from typing import Final
 
@@ -24,7 +42,6 @@ from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.device import Point, Value
 from firable.executor.drivers.driver import Answer, Clock, Driver, Listener, Reading
 from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
-from firable.executor.drivers.keeping import ended
 from firable.executor.operating.execution import Execution
 from firable.executor.operating.recorder import Recorder
 from firable.nets.net import Place
@@ -32,8 +49,11 @@ from firable.nets.text import parse_net
 
 REACTIONS: Final = 2_000
 OVER_MODBUS: Final = 500
+FIRST: Final = 20
+"""So many reactions are not counted: connecting, and what is done once."""
 EVERY_S: Final = 0.001
-GOALS: Final = {"simulated driver": 2.0, "driver over Modbus TCP": 1.2}
+IN_PROCESS_MAX, OVER_MODBUS_MAX = 2.0, 1.2
+"""The goals, for the medians."""
 
 NET: Final = parse_net(
     """
@@ -102,10 +122,10 @@ class PingPong:
 
     def send(self, place: Place, entry: int) -> None:
         """Take the time."""
+        self.times.append(time.perf_counter() - self.sent)
         self.last = (place.name, entry)
         if self.listener is not None:
             self.listener.taken(place.name, entry)
-        self.times.append(time.perf_counter() - self.sent)
         self.came.set()
 
     async def ask(self, place: Place, entry: int) -> Answer:
@@ -127,14 +147,14 @@ def execution_with(driver: Driver) -> Execution:
     return Execution(split(NET), driver, Recorder(NET, "", None), overdue_seconds=60.0)
 
 
-async def simulated(count: int) -> list[float]:
+async def within(count: int) -> list[float]:
     """The reactions of the executor to signals in this process, in seconds."""
     driver = PingPong(count)
     await execution_with(driver).main()
-    return driver.times
+    return driver.times[FIRST:]
 
 
-async def echo(count: int) -> list[float]:
+async def echo_within(count: int) -> list[float]:
     """The same between two tasks and two queues, which is the least that asyncio can do."""
     there: asyncio.Queue[int] = asyncio.Queue()
     back: asyncio.Queue[int] = asyncio.Queue()
@@ -151,106 +171,225 @@ async def echo(count: int) -> list[float]:
         await back.get()
         times.append(time.perf_counter() - start)
     task.cancel()
-    return times
+    return times[FIRST:]
 
 
-class Reacted:
-    """A Modbus server that shows a change and takes the time until something is written for it."""
-
-    def __init__(self) -> None:
-        self.end = ModbusTcpEnd()
-        self.came = asyncio.Event()
-
-    def written(self, point: Point, value: Value) -> None:
-        """A client has written the number of a command, which is taken."""
-        if point == "holding 1" and value:
-            self.end.show("input 1", value)
-            self.came.set()
-
-    async def measured(self, count: int) -> list[float]:
-        """The times from a change to what is written, of changes at any moment of the poll."""
-        times = []
-        moments = random.Random(0)
-        for i in range(count):
-            await asyncio.sleep(5 * EVERY_S + moments.uniform(0, 2 * EVERY_S))
-            self.came.clear()
-            start = time.perf_counter()
-            self.end.show("input 0", (i + 1) % 2)
-            await self.came.wait()
-            times.append(time.perf_counter() - start)
-        return times
+# Over a socket
 
 
-async def over_modbus(count: int) -> list[float]:
-    """The reactions of the executor over Modbus TCP."""
-    reacted = Reacted()
-    await reacted.end.start(reacted.written)
-    driver = bound_driver(parse_binding(BINDING.format(port=reacted.end.port, every=EVERY_S)), NET)
+class Echo(asyncio.Protocol):
+    """The yardstick: what comes goes back."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """The plant is there."""
+        assert isinstance(transport, asyncio.Transport)
+        self.transport = transport
+
+    def data_received(self, data: bytes) -> None:
+        """Answer."""
+        self.transport.write(data)
+
+
+class SocketDriver(PingPong, asyncio.Protocol):
+    """A driver to which a byte is a signal and a command a byte."""
+
+    transport: asyncio.Transport | None = None
+
+    async def run(self, clock: Clock, listener: Listener) -> None:
+        """Serve until cancelled."""
+        del clock
+        self.listener = listener
+        await asyncio.get_running_loop().create_future()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """The plant is there."""
+        assert isinstance(transport, asyncio.Transport)
+        self.transport = transport
+
+    def data_received(self, data: bytes) -> None:
+        """The signal."""
+        if self.listener is not None:
+            self.listener.signal("m.s", data == b"1", None)
+
+    def send(self, place: Place, entry: int) -> None:
+        """The command."""
+        self.last = (place.name, entry)
+        if self.transport is not None and self.listener is not None:
+            self.transport.write(b"!")
+            self.listener.taken(place.name, entry)
+
+
+async def served(protocol: asyncio.Protocol, count: int) -> list[float]:
+    """The times that a plant takes which talks to a protocol of this loop."""
+    server = await asyncio.get_running_loop().create_server(lambda: protocol, "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    async with server, plant("echo", str(port), str(count)) as lines:
+        times: list[float] = json.loads(await lines.readline())
+    return times[FIRST:]
+
+
+async def over_socket(count: int) -> list[float]:
+    """The reactions of the executor to a byte."""
+    driver = SocketDriver(count)
     running = asyncio.create_task(execution_with(driver).main())
-    await driver.devices["plc"].is_ready.wait()
-    times = await reacted.measured(count)
+    times = await served(driver, count)
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
-    await reacted.end.stop()
     return times
 
 
-async def bare_modbus(count: int) -> list[float]:
+async def echo_over_socket(count: int) -> list[float]:
+    """The answers of an echo server."""
+    return await served(Echo(), count)
+
+
+def byte_by_byte(port: int, count: int) -> list[float]:
+    """Send a byte, wait for one, and again."""
+    times = []
+    with socket.create_connection(("127.0.0.1", port)) as connection:
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for i in range(count):
+            start = time.perf_counter()
+            connection.sendall(b"1" if i % 2 == 0 else b"0")
+            connection.recv(16)
+            times.append(time.perf_counter() - start)
+    return times
+
+
+# Over Modbus
+
+
+async def over_modbus(every_s: float, count: int) -> list[float]:
+    """The reactions of the executor over Modbus TCP."""
+
+    async def serve(port: int) -> None:
+        driver = bound_driver(parse_binding(BINDING.format(port=port, every=every_s)), NET)
+        await execution_with(driver).main()
+
+    return await at_server(serve, count)
+
+
+async def bare_modbus(every_s: float, count: int) -> list[float]:
     """The reactions of a loop over a bare client of pymodbus."""
     from pymodbus.client import AsyncModbusTcpClient
 
-    reacted = Reacted()
-    await reacted.end.start(reacted.written)
-    client = AsyncModbusTcpClient("127.0.0.1", port=reacted.end.port, retries=0)
-    await client.connect()
-
-    async def polling() -> None:
+    async def poll(port: int) -> None:
+        client = AsyncModbusTcpClient("127.0.0.1", port=port, retries=0)
+        await client.connect()
         loop = asyncio.get_running_loop()
         shown, number, due = 0, 0, 0.0
-        while True:
-            await asyncio.sleep(max(0.0, due - loop.time()))
-            due = loop.time() + EVERY_S
-            answer = await client.read_input_registers(0, count=2)
-            if answer.registers[0] != shown:
-                shown, number = answer.registers[0], number % 65_535 + 1
-                await client.write_registers(0, [shown, number])
+        try:
+            while True:
+                await asyncio.sleep(max(0.0, due - loop.time()))
+                due = loop.time() + every_s
+                answer = await client.read_input_registers(0, count=2)
+                if answer.registers[0] != shown:
+                    shown, number = answer.registers[0], number % 65_535 + 1
+                    await client.write_registers(0, [shown, number])
+        finally:
+            client.close()
 
-    task = asyncio.create_task(polling())
-    times = await reacted.measured(count)
-    await ended([task])
-    client.close()
-    await reacted.end.stop()
+    return await at_server(poll, count)
+
+
+async def at_server(client: Callable[[int], Awaitable[None]], count: int) -> list[float]:
+    """The times that a Modbus server takes to which a client reacts."""
+    async with plant("modbus", str(count)) as lines:
+        running = asyncio.ensure_future(client(int(await lines.readline())))
+        times: list[float] = json.loads(await lines.readline())
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
     return times
 
 
+async def modbus_plant(count: int) -> None:
+    """Serve, and take the time from what is shown to what is written for it, at any moment of the poll."""
+    end, came, times = ModbusTcpEnd(), asyncio.Event(), []
+
+    def written(point: Point, value: Value) -> None:
+        if point == "holding 1" and value:
+            end.show("input 1", value)  # the number of a command, which is taken
+            came.set()
+
+    await end.start(written)
+    print(end.port, flush=True)
+    moments = random.Random(0)
+    for i in range(FIRST + count):
+        await asyncio.sleep(0.002 + moments.uniform(0, 0.004))
+        came.clear()
+        start = time.perf_counter()
+        end.show("input 0", (i + 1) % 2)
+        await came.wait()
+        times.append(time.perf_counter() - start)
+    print(json.dumps(times[FIRST:]), flush=True)
+    await asyncio.get_running_loop().create_future()  # a client whose connection ends would say so
+
+
+# Plants are processes of their own
+
+
+@asynccontextmanager
+async def plant(*arguments: str) -> AsyncIterator[asyncio.StreamReader]:
+    """A plant, and what it prints; it ends when it is not listened to any more."""
+    command = (sys.executable, str(Path(__file__).resolve()), *arguments)
+    pipe = subprocess.PIPE
+    process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe, limit=1 << 24)
+    assert process.stdout is not None
+    try:
+        async with asyncio.timeout(300):
+            yield process.stdout
+    finally:
+        process.kill()
+        await process.wait()
+
+
+Way = Callable[[int], Awaitable[list[float]]]
+
+COMPARED: Final[tuple[tuple[str, Way, str, Way, int, float], ...]] = (
+    ("echo server of asyncio", echo_over_socket, "executor at a socket", over_socket, REACTIONS, IN_PROCESS_MAX),
+    ("echo between two tasks", echo_within, "executor, driver in the process", within, REACTIONS, IN_PROCESS_MAX),
+    *(
+        (
+            f"loop of pymodbus, {pace}",
+            partial(bare_modbus, every_s),
+            f"executor over Modbus TCP, {pace}",
+            partial(over_modbus, every_s),
+            OVER_MODBUS,
+            OVER_MODBUS_MAX,
+        )
+        for every_s, pace in ((0.0, "polled without a pause"), (EVERY_S, f"polled each {EVERY_S * 1e3:g} ms"))
+    ),
+)
+
+
 def tables(repeat: int) -> list[Table]:
-    """Reactions in this process and over Modbus, each beside its yardstick and the noise floor."""
+    """Reactions each way, beside its yardstick and the noise floor."""
     rows: list[tuple[str, ...]] = []
-    for yardstick_name, yardstick, name, work, count in (
-        ("echo of asyncio", echo, "simulated driver", simulated, REACTIONS),
-        ("loop of pymodbus", bare_modbus, "driver over Modbus TCP", over_modbus, OVER_MODBUS),
-    ):
+    for yardstick_name, yardstick, name, work, count, goal in COMPARED:
         bare: list[list[float]] = []
         again: list[list[float]] = []
         ours: list[list[float]] = []
         for _ in range(repeat):
-            bare.append(asyncio.run(yardstick(count)))
-            ours.append(asyncio.run(work(count)))
-            again.append(asyncio.run(yardstick(count)))
+            bare.append(asyncio.run(_times(yardstick, count)))
+            ours.append(asyncio.run(_times(work, count)))
+            again.append(asyncio.run(_times(yardstick, count)))
         best, second, own = min(bare, key=median), min(again, key=median), min(ours, key=median)
         rows.append(_row(yardstick_name, best, best, "the yardstick"))
         rows.append(_row(f"{yardstick_name}, again: the noise floor", second, best, ""))
-        ratio = median(own) / median(best)
-        rows.append(_row(name, own, best, against(GOALS[name], ratio)))
+        rows.append(_row(name, own, best, against(goal, median(own) / median(best))))
     return [
         Table(
             "From a change of a signal to its command",
-            f"By the clock, in microseconds, the run with the least median of {repeat}; over Modbus with a poll each "
-            f"{EVERY_S * 1e3:g} ms, at whose start the change may come at any time.",
+            f"By the clock, in microseconds, of each the run with the least median of {repeat}; by a plant in another "
+            "process, except between two tasks.",
             ("what", "p50", "p99", "p50, times the yardstick", "p99, times the yardstick", "goal for p50"),
             tuple(rows),
         )
     ]
+
+
+async def _times(way: Way, count: int) -> list[float]:
+    return await way(count)
 
 
 def _row(name: str, times: list[float], yardstick: list[float], goal: str) -> tuple[str, ...]:
@@ -263,3 +402,11 @@ def _row(name: str, times: list[float], yardstick: list[float], goal: str) -> tu
         f"{p99 / bare:.2f}",
         goal,
     )
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["echo", port, count]:
+            print(json.dumps(byte_by_byte(int(port), int(count))))
+        case ["modbus", count]:
+            asyncio.run(modbus_plant(int(count)))
