@@ -168,10 +168,14 @@ def _show_refutation(refutation: Refutation) -> None:
 
 
 def _show_run(refutation: Refutation) -> None:
-    left_out = 0 if refutation.small is None else max(0, len(refutation.events) - EVENTS_SHOWN)
+    from firable.decompose.protocol.directed import numbered
+
+    lines = list(numbered(refutation.lines))
+    left_out = 0 if refutation.small is None else max(0, len(lines) - EVENTS_SHOWN)
     if left_out:
         click.echo(f"      ... {left_out} events, then")
-    for k, event in enumerate(refutation.events[left_out:], start=left_out + 1):
-        click.echo(f"      {k:>3}. {event}")
+    width = max((len(numbers) for numbers, _ in lines[left_out:]), default=0)
+    for numbers, words in lines[left_out:]:
+        click.echo(f"      {numbers:>{max(3, width)}}. {words}")
     if refutation.sentence:
         click.echo(f"      {refutation.sentence}")

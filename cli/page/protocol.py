@@ -72,7 +72,10 @@ def _refutation(refutation: Refutation) -> Markup:
 def _run(refutation: Refutation) -> Markup | None:
     if refutation.witness is None:
         return None
-    return together(swimlanes(refutation.protocol, refutation.witness), tag("p", refutation.sentence, cls="outcome"))
+    return together(
+        swimlanes(refutation.protocol, refutation.witness, refutation.folded),
+        tag("p", refutation.sentence, cls="outcome"),
+    )
 
 
 def _example(small: Refutation | None) -> Markup | None:

@@ -8,11 +8,13 @@ told by the last event, or by the sentence below the run. The step record beside
 
 Rejected: owners for the places of the protocol's net. They would say where a message lies, not who acts, and a promise
 would push the tokens of the cell out of sight. Of a long run the end tells what goes wrong; the head is folded away.
+Where rounds that nothing disturbs are told as one line, that line is a row: its lanes show what all its events moved.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from firable.cli.page.markup import Markup, tag, together
@@ -21,6 +23,7 @@ from firable.nets.verdict import Witness
 
 if TYPE_CHECKING:
     from firable.decompose.protocol.building import ProtocolNet
+    from firable.decompose.protocol.directed import Line
 
 TOLD_MAX: Final = 40
 """How many events a run may have and stand there whole."""
@@ -30,14 +33,14 @@ _COORDINATOR: Final = "the coordinator"
 _NOBODY: Final = "on the way"
 
 
-def swimlanes(protocol: ProtocolNet, witness: Witness) -> Markup | None:
-    """A run of a protocol as markup; None where it is none of this protocol's net."""
+def swimlanes(protocol: ProtocolNet, witness: Witness, lines: Sequence[Line] = ()) -> Markup | None:
+    """A run of a protocol as markup, told in `lines` where there are any; None for a run of another net."""
     steps = played(protocol.net, witness)
     if steps is None:
         return None
     lanes = _lanes(protocol, steps)
-    n = len(witness.firings)
-    rows = [_row(protocol, step, lanes) for step in steps]
+    rows = list(_rows(protocol, steps, lines, lanes))
+    n = len(rows) - len(witness.cycle)
     if witness.cycle:
         rows.insert(n, across("and then for ever again", lanes))
     hidden = 0 if len(rows) <= TOLD_MAX else len(rows) - TAIL
@@ -88,12 +91,27 @@ def _changes(protocol: ProtocolNet, step: Step) -> list[tuple[str, Markup]]:
     return found
 
 
-def _row(protocol: ProtocolNet, step: Step, lanes: Sequence[str]) -> Markup:
+def _rows(
+    protocol: ProtocolNet, steps: Sequence[Step], lines: Sequence[Line], lanes: Sequence[str]
+) -> Iterator[Markup]:
+    """A row for each line, and for each event that no line tells."""
+    i = 0
+    for line in lines:
+        some = steps[i : i + line.events]
+        i += line.events
+        if line.leaps:
+            yield _row(protocol, replace(some[-1], before=some[0].before), lanes, f"{some[0].number}-", line.text)
+        else:
+            yield from (_row(protocol, step, lanes) for step in some)
+    yield from (_row(protocol, step, lanes) for step in steps[i:])
+
+
+def _row(protocol: ProtocolNet, step: Step, lanes: Sequence[str], since: str = "", text: str = "") -> Markup:
     cells: dict[str, list[Markup]] = {lane: [] for lane in lanes}
-    cells[_actor(protocol, step)].append(tag("span", str(protocol.steps[step.fired[0]])))
+    cells[_actor(protocol, step)].append(tag("span", text or str(protocol.steps[step.fired[0]])))
     for lane, written in _changes(protocol, step):
         cells[lane].append(written)
-    head = tag("th", tag("span", f"{step.number}", cls="number"), scope="row")
+    head = tag("th", tag("span", f"{since}{step.number}", cls="number"), scope="row")
     return tag("tr", head, *(tag("td", cells[lane], data_of=lane) for lane in lanes))
 
 

@@ -4,11 +4,16 @@ import pytest
 from support.reference import load_net
 
 from firable.analysis.goal import Limits
+from firable.decompose.protocol.building import protocol_net
+from firable.decompose.protocol.directed import Search, directed, numbered
 from firable.decompose.protocol.draft import ASTRAY
 from firable.decompose.protocol.exploring import explore_protocol
-from firable.decompose.protocol.refuting import EVENTS_READ, Refutation, readable, refute
+from firable.decompose.protocol.refuting import LINES_READ, Refutation, is_true_here, readable, refute
 from firable.decompose.protocol.variant import Variant
 from firable.decompose.protocol.wrong import WRONG, WrongProtocol, example
+from firable.decompose.splitting.cut import split
+from firable.nets.catalogue import catalogue_net
+from firable.nets.formula import Holds
 from firable.nets.verdict import Status, Weight
 from firable.semantics.player import Player
 
@@ -85,12 +90,72 @@ def test_cell_without_internal_gates_cannot_go_wrong_by_cached_ones() -> None:
     assert (found.status, found.events, found.sentence) == (Status.PROVED, (), "")
 
 
-@pytest.mark.parametrize("name", ["old-votes", "orders-twice", "missing-vote", "forgotten-promises"])
-def test_wrong_protocols_are_refuted_on_the_whole_cell_too(name: str) -> None:
-    """By a walk: a search for a shortest run would end with the memory."""
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [
+        ("cached-votes", 15),
+        ("old-votes", 18),
+        ("unlocked-conflicts", 21),
+        ("orders-twice", 14),
+        ("missing-vote", 5),
+        ("forgotten-promises", 14),
+    ],
+)
+def test_run_of_the_whole_cell_is_told_in_a_few_lines_and_played_event_for_event(name: str, lines: int) -> None:
     found = refute(BY_NAME[name], load_net("cell1"), Limits())
     assert found.status is Status.VIOLATED
-    assert found.events
+    assert found.witness is not None
+    assert len(found.lines) == lines < len(found.events) == sum(line.events for line in found.lines)
+    net = found.protocol.net
+    player, marking = Player(net), net.initial_marking
+    for (step,) in found.witness.firings:
+        marking = player.fire(marking, [net.transition_index[step]])
+    assert net.names(marking) == found.witness.marking
+    assert found.sentence
+    assert readable(found) is found
+    numbers = [number for number, _ in numbered(found.lines)]
+    assert numbers[-1].rpartition("-")[2] == str(len(found.events))
+
+
+def test_unlocked_conflict_gives_the_robot_of_the_cell_a_second_task() -> None:
+    """Both it and G6 have the yes of the robot; while it unloads, the others give theirs."""
+    found = refute(BY_NAME["unlocked-conflicts"], catalogue_net("one_robot"), Limits())
+    told = [line.text for line in found.lines]
+    assert told[-1] == "G2 is decided, though in the central net robot.free is empty"
+    yes = told.index("robot is asked for its vote on G2, and its yes arrives")
+    assert yes < told.index("G6 is fired, undisturbed") < told.index("G7 is fired, undisturbed")
+
+
+@pytest.mark.parametrize("name", ["cached-gates", "unlocked-reads"])
+def test_what_the_cell_has_nothing_of_cannot_be_left_out_of_its_protocol(name: str) -> None:
+    found = refute(BY_NAME[name], load_net("cell1"), Limits())
+    assert (found.status, found.lines) == (Status.PROVED, ())
+    assert "inductive invariant" in found.method
+    assert is_true_here(split(load_net("cell1")), BY_NAME[name].variant)
+    assert not is_true_here(split(example(BY_NAME[name].example)), BY_NAME[name].variant)
+
+
+@pytest.mark.parametrize("wrong", WRONG, ids=named)
+def test_only_what_leaves_something_out_of_the_parts_may_be_the_true_protocol(wrong: WrongProtocol) -> None:
+    by_parts = wrong.name in {"cached-gates", "unlocked-reads", "unlocked-conflicts", "conflicts-decided-below"}
+    assert is_true_here(split(example("shuttle")), wrong.variant) is by_parts
+    assert not is_true_here(split(example(wrong.example)), wrong.variant)
+
+
+def test_steps_that_cannot_follow_each_other_are_no_leap() -> None:
+    protocol = protocol_net(split(example("shuttle")), BY_NAME["missing-vote"].variant)
+    search = Search(protocol, Holds(ASTRAY), Limits())
+    assert search.leap("x", ["ask/hand_over", "ask/hand_over"], "asked twice") is None
+    assert search.leap("x", ["ask/nothing"], "no step") is None
+    leap = search.leap("x", ["ask/hand_over", "give-up/hand_over"], "in vain")
+    assert leap is not None
+    assert leap.transition.inputs == leap.transition.permissive == ()
+    assert set(leap.transition.outputs) == {"asked/hand_over", "decided/hand_over"}
+
+
+def test_true_protocol_has_no_run_that_goes_wrong_in_any_focus() -> None:
+    protocol = protocol_net(split(load_net("cell1")))
+    assert directed(protocol, Holds(ASTRAY), Limits()) is None
 
 
 def test_two_robots_cannot_go_wrong_by_cached_votes() -> None:
@@ -108,4 +173,4 @@ def test_where_the_cell_has_no_run_that_can_be_read_the_small_example_has_one() 
     assert found.small is not None
     assert (len(found.small.events), found.small.protocol.parts.net.name) == (2, "doors")
     assert readable(found.small) is found.small
-    assert all(len(refute(wrong).events) <= EVENTS_READ for wrong in WRONG)
+    assert all(len(refute(wrong).lines) <= LINES_READ for wrong in WRONG)
