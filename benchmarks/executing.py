@@ -26,7 +26,7 @@ from firable.nets.net import Controller, Net, Place, Transition
 
 FIRINGS: Final = 20_000
 GROUP: Final = 64
-"""So many firings share a sync, as in `executor/operating/execution.py`."""
+"""So many firings share a sync, about as in `executor/operating/acts.py`."""
 GOAL: Final = 10_000
 MANY: Final = 10_000_000
 

@@ -28,11 +28,10 @@ import zenoh
 from measuring import Table, against
 
 from firable.executor.drivers.dry_run import DryRunDriver
-from firable.executor.journal.journal import MemoryJournal
 from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.links.zenoh_link import ZenohLink
 from firable.executor.operating.host import Host
-from firable.executor.operating.host_trace import HostTrace
+from firable.executor.operating.recorder import Recorder
 from firable.nets.bundle import Bundle, read_bundle, write_bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Controller, Net, Place, Transition
@@ -45,18 +44,18 @@ PAYLOAD: Final = b"x" * 150
 """As long as a vote."""
 
 
-class Firings(HostTrace):
+class Firings(Recorder):
     """A trace that keeps nothing but when transitions fired."""
 
     def __init__(self, net: Net, wanted: int) -> None:
-        super().__init__(net, (), None, {})
+        super().__init__(net, "", None, None, (COORDINATOR,))
         self.wanted = wanted
         self.at: list[float] = []
         self.enough = asyncio.Event()
 
-    def fired(self, transition: str, number: int | None) -> None:
+    def fired(self, at_seconds: float, transition: str, number: int | None = None) -> None:
         """Remember when."""
-        super().fired(transition, number)
+        super().fired(at_seconds, transition, number)
         self.at.append(time.perf_counter())
         if len(self.at) > self.wanted:
             self.enough.set()
@@ -71,11 +70,11 @@ def ring() -> Net:
     return Net("ring", places, (Transition("go", a, b), Transition("back", b, a)), controllers=controllers)
 
 
-def host(of: Decomposition, names: tuple[str, ...], trace: HostTrace, *, listen: str = "", join: str = "") -> Host:
+def host(of: Decomposition, names: tuple[str, ...], trace: Recorder, *, listen: str = "", join: str = "") -> Host:
     """A host of the ring, without machines and journal."""
     greeting = Greeting("ring", names)
     link = ZenohLink(greeting, listen=[listen] if listen else [], join=[join] if join else [], lease_seconds=10.0)
-    return Host(of, names, DryRunDriver([], 0.0), link, trace, MemoryJournal())
+    return Host(of, DryRunDriver([], 0.0), trace, machines=names, link=link)
 
 
 def session(*, listen: str = "", join: str = "") -> zenoh.Session:
@@ -182,4 +181,4 @@ if __name__ == "__main__":
         echo(own, address)
     else:
         cell = read_bundle(path).decomposition
-        asyncio.run(host(cell, (own,), HostTrace(cell.net, (), None, {}), join=address).main())
+        asyncio.run(host(cell, (own,), Recorder(cell.net, "", None, None, (own,)), join=address).main())

@@ -42,7 +42,7 @@ from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.device import Point, Value
 from firable.executor.drivers.driver import Answer, Clock, Driver, Listener, Reading
 from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
-from firable.executor.operating.execution import Execution
+from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.nets.net import Place
 from firable.nets.text import parse_net
@@ -142,9 +142,9 @@ class PingPong:
         """Nothing to close."""
 
 
-def execution_with(driver: Driver) -> Execution:
+def execution_with(driver: Driver) -> Host:
     """The net, run with a driver."""
-    return Execution(split(NET), driver, Recorder(NET, "", None), overdue_seconds=60.0)
+    return Host(split(NET), driver, Recorder(NET, "", None), overdue_seconds=60.0)
 
 
 async def within(count: int) -> list[float]:

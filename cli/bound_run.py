@@ -11,10 +11,10 @@ from firable.cli.report import Report
 from firable.cli.watched import machines_verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
     from firable.executor import Answer, Operator, PlantModel, RunReport, Watch
-    from firable.executor.operating.control import Endpoint
+    from firable.executor.operating.service import Service
     from firable.nets.bundle import Bundle
     from firable.nets.verdict import Verdict
 
@@ -31,8 +31,7 @@ def run_bound_of(
     resume: bool,
     plant: PlantModel | None,
     watch: Watch,
-    endpoint: Endpoint | None,
-    served: Callable[[str], None] | None,
+    service: Service | None,
 ) -> Report:
     """Run until the operator stops it or nothing can go on, and report how it ended."""
     from firable.executor.drivers.binding import read_binding
@@ -49,8 +48,7 @@ def run_bound_of(
         said=said,
         plant=plant,
         watch=watch,
-        endpoint=endpoint,
-        served=served,
+        service=service,
     )
     known = report.to_json()
     kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages", "divergence")
@@ -82,9 +80,9 @@ def show_bound(report: Report) -> None:
         click.echo(f"  trace {file}")
 
 
-def _told(machine: str, sentence: str) -> None:
+def _told(_kind: str, sentence: str) -> None:
     """One line of what becomes of a link, as it happens."""
-    click.echo(f"  {machine}: {sentence}", err=True)
+    click.echo(f"  {sentence}", err=True)
 
 
 def _verdict(report: RunReport, bind: str) -> Verdict:

@@ -17,7 +17,7 @@ from firable.nets.source import printable
 if TYPE_CHECKING:
     from firable.executor.drivers.driver import Driver
     from firable.executor.links.link import Link
-    from firable.executor.operating.host import Host
+    from firable.executor.operating.service import Service
     from firable.executor.operating.situation import Situation
     from firable.executor.protocol.commands import Answer
     from firable.nets.bundle import Bundle
@@ -146,6 +146,7 @@ def run_host_of(
     options: HostOptions,
     trace: str | None,
     said: Mapping[str, Answer],
+    service: Service | None,
 ) -> Report:
     """Run this host until it is stopped or fails, and report how it ended."""
     from firable.executor.operating.hosting import machines_of, run_host
@@ -155,8 +156,7 @@ def run_host_of(
     link, warnings = _link(bundle, machines, options)
     for warning in warnings:
         text.show_diagnostic(warning)
-    hosts: list[Host] = []
-    situation = run_host(
+    report = run_host(
         bundle,
         machines,
         driver,
@@ -166,24 +166,15 @@ def run_host_of(
         resume=options.resume,
         said=said,
         tell=_told,
-        started=hosts.append,
+        service=service,
     )
-    (host,) = hosts
     return Report(
         "run",
         path,
         bundle.net,
-        (_verdict(situation, machines),),
+        (_verdict(report.situation, machines),),
         files=(trace,) if trace else (),
-        run={
-            "state": situation.state.value,
-            "message": situation.message,
-            "marking": list(situation.marking),
-            "blocked": [str(blocked) for blocked in situation.blocked],
-            "machines": list(machines),
-            "messages": host.messages,
-            "repeats": host.repeats,
-        },
+        run=report.to_json(),
     )
 
 

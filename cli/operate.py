@@ -5,13 +5,14 @@ from __future__ import annotations
 import ssl
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
 if TYPE_CHECKING:
-    from firable.executor.operating.control import Endpoint
+    from firable.executor.operating.service import Service
     from firable.nets.diagnostics import InputError
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -30,8 +31,11 @@ class ServeOptions:
     serve_tls: tuple[str, str] | None = None
     operators: str | None = None
 
-    def endpoint(self) -> Endpoint | None:
-        """The endpoint, or None; raises `InputError` F5060, F5062, and F1017 for a token that cannot be kept."""
+    def service(self) -> Service | None:
+        """The endpoint, whose address and token are told when it is there, or None.
+
+        Raises `InputError` F5060, F5062, and F1017 for a token that cannot be kept.
+        """
         if self.serve is None:
             if self.token_file or self.serve_tls or self.operators:
                 raise click.UsageError("say with --serve where an operator may act from elsewhere")
@@ -39,13 +43,14 @@ class ServeOptions:
         if self.operators is not None and self.serve_tls is None:
             raise click.UsageError("--operators is of TLS: name --serve-tls, too")
         from firable.executor.operating.control import Endpoint, new_token, tls_context
+        from firable.executor.operating.service import Service
 
         host, _, port = self.serve.rpartition(":")
         if not host or not port.isdecimal() or int(port) > 65535:
             raise click.UsageError(f"--serve {self.serve}: write ADDRESS:PORT, such as 127.0.0.1:8080")
         tls = None if self.serve_tls is None else tls_context(*self.serve_tls, self.operators)
         token = new_token() if self.token_file is None else _token_kept(Path(self.token_file))
-        return Endpoint(host.strip("[]"), int(port), token, tls)
+        return Service(Endpoint(host.strip("[]"), int(port), token, tls), partial(_tell_served, token, self.token_file))
 
 
 def serve_options(command: F) -> F:
@@ -117,6 +122,11 @@ def _told(answer: dict[str, Any]) -> str:
         lines.insert(0, f"fired {answer['fired']}" if answer["fired"] else "nothing is enabled")
     lines.append(f"  tokens on {', '.join(answer['marking'])}")
     return "\n".join([*lines, *(f"  {blocked}" for blocked in answer["blocked"])])
+
+
+def _tell_served(token: str, token_file: str | None, address: str) -> None:
+    who = f"the token in {token_file}" if token_file is not None else f"the token {token}"
+    click.echo(f"operate this run at {address} with {who}", err=True)
 
 
 def _token_kept(path: Path) -> str:

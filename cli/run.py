@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,10 +108,10 @@ def run(
         options.refuse_alone()
 
     served = ServeOptions(serve, token_file, serve_tls, operators)
-    if serve is not None and _SPEEDS[speed] is None and options.bind is None:
+    if serve is not None and _SPEEDS[speed] is None and options.bind is None and not options.is_one_of_several:
         raise click.UsageError("in virtual time a run is over before anybody acts: with --serve, name --speed 1 or 10")
-    if serve is not None and options.is_one_of_several:
-        raise click.UsageError("--serve is of a run of the whole cell, and not of one host among others")
+    if options.is_one_of_several and (plant is not None or watch == "stop" or step):
+        raise click.UsageError("--plant, --watch and --step are of a whole run, and not of one host among others")
 
     def make() -> Report:
         from firable.cli.stepping import stepping
@@ -120,13 +119,12 @@ def run(
         from firable.executor import run as run_bundle
 
         loaded = load(bundle, trust)
+        service = served.service()
         if options.is_one_of_several:
             if trace is not None:
                 _refuse_to_overwrite(trace, bundle, *filter(None, (options.bind, options.journal)))
             said = _said(loaded.net, say, options.journal)
-            return run_host_of(bundle, loaded, options, trace, said)
-        endpoint = served.endpoint()
-        told = None if endpoint is None else partial(_tell_served, endpoint.token, token_file)
+            return run_host_of(bundle, loaded, options, trace, said, service)
         if options.bind is not None:
             if trace is not None:
                 _refuse_to_overwrite(trace, bundle, options.bind, *_files_beside(options.journal))
@@ -141,8 +139,7 @@ def run(
                 resume=options.resume,
                 plant=None if plant is None else read_plant(_plant_file(loaded, plant)),
                 watch=Watch(watch),
-                endpoint=endpoint,
-                served=told,
+                service=service,
             )
         plant_file = _plant_file(loaded, plant)
         model = read_plant(plant_file)
@@ -159,8 +156,7 @@ def run(
             resume=options.resume,
             said=_said(loaded.net, say, options.journal),
             watch=Watch(watch),
-            endpoint=endpoint,
-            served=told,
+            service=service,
             operator=stepping(_SPEEDS[speed], to_stderr=format_ == "json") if step else None,
         )
         return Report(
@@ -173,11 +169,6 @@ def run(
         )
 
     return answer("run", format_, make, _show)
-
-
-def _tell_served(token: str, token_file: str | None, address: str) -> None:
-    who = f"the token in {token_file}" if token_file is not None else f"the token {token}"
-    click.echo(f"operate this run at {address} with {who}", err=True)
 
 
 def _files_beside(journal: str | None) -> tuple[str, ...]:

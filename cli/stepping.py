@@ -18,7 +18,7 @@ from typing import Protocol
 
 import click
 
-from firable.executor import Execution, Operator
+from firable.executor import Host, Operator
 from firable.executor.operating.restart import uncertain
 
 _PROMPT = "  [Enter] next, [r] run on, [e] stop at the end of the cycle, [s] stop now: "
@@ -105,58 +105,58 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
             if line.strip().lower() in {"", "r", "e", "s"}:
                 return line.strip().lower()
 
-    async def stepped(execution: Execution) -> bool:
+    async def stepped(host: Host) -> bool:
         """Fire one transition, waiting until one is enabled; False where none ever will be."""
-        while (fired := await execution.step()) is None:
-            if execution.at_rest:
+        while (fired := await host.step()) is None:
+            if host.at_rest:
                 return False
             await asyncio.sleep(_POLL_SECONDS)
-        description = execution.net.transition(fired).description
-        click.echo(f"{execution.now_seconds():8.1f} s  {fired}  {description}", err=to_stderr)
+        description = host.net.transition(fired).description
+        click.echo(f"{host.now_seconds():8.1f} s  {fired}  {description}", err=to_stderr)
         return True
 
-    async def paused_again(execution: Execution, typed: _Typed) -> bool:
+    async def paused_again(host: Host, typed: _Typed) -> bool:
         """Let the run go on until something is typed, which pauses it; False where it goes on to its end."""
-        execution.resume()
+        host.resume()
         if speed is None:
             return False
         click.echo("  running on; Enter pauses", err=to_stderr)
-        while not execution.at_rest:
+        while not host.at_rest:
             if typed.unasked():
-                execution.pause()
+                host.pause()
                 return True
             await asyncio.sleep(_POLL_SECONDS)
         return False
 
-    async def taken_up(execution: Execution, typed: _Typed) -> bool:
+    async def taken_up(host: Host, typed: _Typed) -> bool:
         """After a restart: say what became of the commands, and go on only if the operator wants it and it can be."""
-        while (found := execution.taking_up) is not None:
+        while (found := host.taking_up) is not None:
             if not found.is_final:
                 await asyncio.sleep(_POLL_SECONDS)
                 continue
-            for line in execution.situation().message.split("; "):
+            for line in host.situation().message.split("; "):
                 click.echo(f"  {line}", err=to_stderr)
-            if uncertain(execution) or await key(typed, _TAKE_UP) == "s":
+            if uncertain(host) or await key(typed, _TAKE_UP) == "s":
                 return False
-            execution.resume()
+            host.resume()
         return True
 
-    async def operate(execution: Execution) -> None:
+    async def operate(host: Host) -> None:
         typed: _Typed = (_TypedAtPrompt if speed is None else _TypedMeanwhile)(to_stderr=to_stderr)
-        if not await taken_up(execution, typed):
-            execution.stop()
+        if not await taken_up(host, typed):
+            host.stop()
             return
-        execution.pause()
-        while await stepped(execution):
+        host.pause()
+        while await stepped(host):
             match await key(typed):
                 case "s":
-                    execution.stop()
+                    host.stop()
                     return
                 case "e":
-                    execution.stop(at_end_of_cycle=True)
+                    host.stop(at_end_of_cycle=True)
                     break
-                case "r" if not await paused_again(execution, typed):
+                case "r" if not await paused_again(host, typed):
                     return
-        execution.resume()
+        host.resume()
 
     return operate

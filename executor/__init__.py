@@ -3,7 +3,7 @@
 What a program imports from here: `load` reads a bundle that may run, `read_plant` the file of a simulated cell, and
 `run` carries workpieces through it and returns a `RunReport`, whose `Situation` has a `State` and says with `Blocked`
 what waits for what. `execute` runs a decomposition that need not be proved, for simulation and tests. An `Operator`
-beside the run is given its `Execution`, with the controls pause, step, resume and stop; an `Answer` says what became
+beside the run is given its `Host`, with the controls pause, step, resume and stop; an `Answer` says what became
 of a command, of a run that is taken up from its journal; `StuckSensor`, `NeverCompletes` and `Drops` disturb the cell.
 Other machines than simulated ones are reached by a `Driver`.
 
@@ -17,7 +17,7 @@ imports `semantics` and `nets` and nothing that proves.
 
 from firable.executor.cell.plant import Disturbance, Drops, NeverCompletes, StuckSensor
 from firable.executor.drivers.driver import Driver
-from firable.executor.operating.execution import Execution
+from firable.executor.operating.host import Host
 from firable.executor.operating.running import Operator, RunReport, Watch, execute, load, run
 from firable.executor.operating.situation import Blocked, Situation, State
 from firable.executor.protocol.commands import Answer
@@ -29,7 +29,7 @@ __all__ = [
     "Disturbance",
     "Driver",
     "Drops",
-    "Execution",
+    "Host",
     "NeverCompletes",
     "Operator",
     "PlantModel",

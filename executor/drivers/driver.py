@@ -24,14 +24,14 @@ that can only be polled do so inside, behind this protocol. Real machines are re
 
 from __future__ import annotations
 
-from collections.abc import Mapping, MutableSequence
+from collections.abc import Iterable, Mapping, MutableSequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, TypeVar
 
 from firable.executor.protocol.commands import Answer as Answer
 from firable.executor.protocol.messages import Effect, Sending
-from firable.nets.net import Net, Place
+from firable.nets.net import Place
 
 Leaving = TypeVar("Leaving", bound=Effect)
 
@@ -143,14 +143,14 @@ class Driver(Protocol):
         ...
 
 
-def withdraw(driver: Driver, net: Net, transition: str, leaving: MutableSequence[Leaving]) -> list[str]:
-    """Give up the commands that a firing leaves behind: a machine must not move by them later, by no token.
+def withdraw(driver: Driver, places: Iterable[Place], leaving: MutableSequence[Leaving]) -> list[str]:
+    """Give up the commands of places whose token has left: a machine must not move by them later, by no token.
 
     They are with the driver, or still among what is `leaving` the process behind the journal, and are taken out there.
     One that its machine has is not given up. Returns the places of those that never reached the driver.
     """
     never: list[str] = []
-    for place in map(net.place, net.transition(transition).inputs):
+    for place in places:
         if place.command is not None:
             waiting = [one for one in leaving if isinstance(one, Sending) and one.place == place.name]
             for one in waiting:

@@ -47,7 +47,7 @@ class Operated(Protocol):
         """Let nothing fire any more."""
         ...
 
-    def resume(self) -> None:
+    def resume(self) -> object:
         """Let transitions fire again."""
         ...
 
@@ -139,7 +139,7 @@ def application(run: Operated, endpoint: Endpoint, figures: Callable[[], bytes])
     async def metrics(_: web.Request) -> web.Response:
         return web.Response(body=figures(), headers={"Content-Type": METRICS_CONTENT_TYPE})
 
-    def commanding(command: str, act: Callable[[], None]) -> Callable[[web.Request], Awaitable[web.Response]]:
+    def commanding(command: str, act: Callable[[], object]) -> Callable[[web.Request], Awaitable[web.Response]]:
         async def handler(request: web.Request) -> web.Response:
             run.commanded(command, who(request))
             act()

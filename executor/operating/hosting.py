@@ -7,19 +7,17 @@ signed it; at connection the hosts compare what they hold.
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from firable.executor.drivers.driver import Driver
-from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.link import Greeting, Link
 from firable.executor.operating.host import Host, Told
-from firable.executor.operating.host_trace import TRACE, HostTrace
+from firable.executor.operating.service import Service, figures_for, run_to_the_end
 from firable.executor.operating.situation import Situation
-from firable.executor.operating.uncut import ended_by_signals
+from firable.executor.operating.taken_up import opened
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import TOP, controller_of, coordinator_at, coordinators
 from firable.nets.bundle import Bundle
@@ -50,6 +48,30 @@ class SerialLine:
     port: str
     baud: int = 115_200
     lease_seconds: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class HostReport:
+    """How a host ended, and what it had to say and to repeat; `never_met` are machines that were never reached."""
+
+    situation: Situation
+    machines: tuple[str, ...]
+    messages: int
+    repeats: int
+    never_met: tuple[str, ...]
+
+    def to_json(self) -> dict[str, object]:
+        """The report as JSON data."""
+        return {
+            "state": self.situation.state.value,
+            "message": self.situation.message,
+            "marking": list(self.situation.marking),
+            "blocked": [str(blocked) for blocked in self.situation.blocked],
+            "machines": list(self.machines),
+            "messages": self.messages,
+            "repeats": self.repeats,
+            "never_met": list(self.never_met),
+        }
 
 
 def machines_of(net: Net, controllers: Sequence[str], *, coordinator: bool) -> tuple[str, ...]:
@@ -122,54 +144,28 @@ def run_host(
     said: Mapping[str, Answer] | None = None,
     overdue_seconds: float = 120.0,
     tell: Told | None = None,
-    started: Callable[[Host], None] | None = None,
-) -> Situation:
-    """Run a host until it is stopped (Ctrl-C, SIGTERM) or fails; `resume` ends the hold after a restart by itself.
+    service: Service | None = None,
+) -> HostReport:
+    """Run a host until it is stopped (Ctrl-C, SIGTERM, an operator) or fails.
 
-    `said` is what an operator says of commands, by place, where no machine can tell what became of them.
-
-    Raises `InputError` as link, journal and trace do.
+    `resume` ends the hold after a restart by itself; `said` is what an operator says of commands, by place, where no
+    machine can tell what became of them. Raises `InputError` as link, journal and trace do.
     """
-    journal = _journal(bundle, machines, journal_path)
-    try:
-        trace = HostTrace(bundle.net, machines, trace_path, journal.kept(TRACE))
+    with opened(bundle.decomposition, bundle.digest, journal_path, trace_path, machines=machines) as files:
+        figures = figures_for(bundle.net, service, machines)
         host = Host(
             bundle.decomposition,
-            machines,
             driver,
-            link,
-            trace,
-            journal,
+            files.recorder,
+            machines=machines,
+            link=link,
+            journal=files.journal,
+            begin_seconds=files.begin_seconds,
             overdue_seconds=overdue_seconds,
+            resume=resume,
             said=said,
             tell=tell,
+            figures=figures,
         )
-        if started is not None:
-            started(host)
-        return asyncio.run(_terminable(host, resume=resume))
-    finally:
-        journal.close()
-
-
-def _journal(bundle: Bundle, machines: tuple[str, ...], path: Path | str | None) -> Journal:
-    if path is None:
-        return MemoryJournal()
-    from firable.executor.journal.sqlite_journal import SqliteJournal
-
-    return SqliteJournal(path, bundle.digest, machines)
-
-
-async def _terminable(host: Host, *, resume: bool) -> Situation:
-    resuming = asyncio.create_task(_resume(host)) if resume else None
-    try:
-        with ended_by_signals():
-            return await host.main()
-    finally:
-        if resuming is not None:
-            resuming.cancel()
-
-
-async def _resume(host: Host) -> None:
-    """End the hold as soon as every question has its answer, unless the host is stopped before."""
-    while not host.stopping and not host.resume():
-        await asyncio.sleep(0.1)
+        situation = run_to_the_end(host, service, figures)
+    return HostReport(situation, machines, host.acts.messages, host.acts.repeats, host.peers.never_met)

@@ -11,13 +11,14 @@ count into each other.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Final
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Metric, Summary, generate_latest
 
 from firable.executor.protocol.messages import Decision, Message, Vote
 from firable.nets.net import Net
+from firable.semantics.joining import APPLIED
 from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged
 
 CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
@@ -38,10 +39,12 @@ class _WithoutBirthdays:
 
 
 class Metrics:
-    """The figures of one run of a net."""
+    """The figures of one run of a net, or of one host with these machines, which knows of no other places."""
 
-    def __init__(self, net: Net) -> None:
+    def __init__(self, net: Net, machines: Collection[str] = ()) -> None:
         self.net = net
+        self.machines = machines
+        self.here = {place.name for place in net.places if not machines or place.owner in machines}
         self.registry = registry = CollectorRegistry()
         self.firings = Counter("firable_firings", "Firings of a transition", ["transition"], registry=registry)
         self.cycles = Histogram(
@@ -87,7 +90,7 @@ class Metrics:
         """For each completion signal, when the command that it completes was sent, and of which place."""
         self.decided: dict[str, set[int]] = {}
         """The rounds that are decided and not closed; each has a decision for every participant."""
-        for place in net.places:
+        for place in (place for place in net.places if place.name in self.here):
             self.marked.labels(place.name).set(place.marked)
             if place.marked:
                 self.since[place.name] = 0.0
@@ -97,9 +100,11 @@ class Metrics:
     def seen(self, event: Event) -> None:
         """Count an event of the trace."""
         match event:
-            case Fired(at, transitions):
+            case Fired(at, transitions, number):
                 for name in transitions:
                     self._fired(at, name)
+                    if number is None or not self.machines:
+                        self._moved(at, name, self.here)
             case SignalChanged(at, name, value):
                 self.signals.labels(name).inc()
                 if value and name in self.sent_at:
@@ -109,6 +114,8 @@ class Metrics:
                 self.commands.labels(*self._labels(place)).inc()
                 if (completion := self.net.place(place).completion) is not None:
                     self.sent_at[completion] = at, place
+            case Noted(at, note, {"controller": str(controller), "transition": str(name)}) if note == APPLIED:
+                self._moved(at, name, {place.name for place in self.net.places if place.owner == controller})
             case Noted(_, note):
                 if note in ("fault", "divergence"):
                     self.faults.labels(note).inc()
@@ -140,12 +147,14 @@ class Metrics:
         if (before := self.fired_at.get(name)) is not None:
             self.cycles.labels(name).observe(at_seconds - before)
         self.fired_at[name] = at_seconds
+
+    def _moved(self, at_seconds: float, name: str, places: Collection[str]) -> None:
         transition = self.net.transition(name)
-        for place in transition.inputs:
+        for place in (place for place in transition.inputs if place in places):
             self.marked.labels(place).set(0)
             if (since := self.since.pop(place, None)) is not None:
                 self.held.labels(place).observe(at_seconds - since)
-        for place in transition.outputs:
+        for place in (place for place in transition.outputs if place in places):
             self.marked.labels(place).set(1)
             self.since[place] = at_seconds
 

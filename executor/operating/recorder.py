@@ -1,16 +1,17 @@
-"""The recorder: writes the trace of a run as it goes, and keeps the joint marking that the trace shows.
+"""The recorder: writes the trace of a host as it goes, and keeps the joint marking that the trace of a whole run shows.
 
-Firings, signals, commands and notes are written in the order in which they took effect: a coordinated firing at the
-coordinator's decision, a local one where it occurs. That order is a trace of the central net (SEMANTICS O1-O5), so the
-recorder plays it along and is where a running executor is asked for its marking. It is flushed whenever the
-run waits, so that who follows the file sees what has happened; a line that a killed run leaves half written is no line
-of the trace.
+Firings, votes, signals, commands and notes are written in the order in which they took effect: a coordinated firing at
+the coordinator's decision, a local one where it occurs. Of a whole run that order is a trace of the central net
+(SEMANTICS O1-O5), so the recorder plays it along and is where a running executor is asked for its marking. Of one host
+among others it is what the machines there did, with the rounds by which the traces of all hosts join
+(`firable.semantics.joining`).
 
 A line is written to its file only once what it tells is durable, or a trace could show what a restart has forgotten.
 Then a process that is killed between the two leaves a trace without its last lines. So the journal keeps, with each
 group of acts, the lines of that group and where in the file they begin: a restart cuts the file there and writes them
-again, and the trace goes on as if nothing had happened. The last line is not kept: it stands there until the run is
-taken up again.
+again, and the trace goes on as if nothing had happened. What is told beside what is kept, a sensor that opened no gate,
+is flushed without a sync and cut off by a crash: drivers tell it anew. The last line is not kept: it stands there until
+the run is taken up again.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
 from firable.nets.source import printable
+from firable.semantics.joining import APPLIED, VOTED
 from firable.semantics.trace import CommandSent, End, Event, Fired, Header, Noted, SignalChanged
 
 
@@ -85,6 +87,8 @@ class TraceFile:
             raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
 
 
+TRACE: Final = "\ntrace"
+"""The name under which the journal keeps the trace; no machine has it."""
 KEY: Final = "trace"
 """Under which the journal keeps what a restart needs to go on with a trace."""
 
@@ -92,10 +96,21 @@ KEY: Final = "trace"
 class Recorder:
     """The trace so far, its marking and its counts, which are of this process.
 
-    `kept` is what `keeping` gave the journal before a restart; the stream then stands at `size_bytes_of(kept)`.
+    `kept` is what `keep` gave the journal before a restart; the stream then stands at `size_bytes_of(kept)`. `machines`
+    are those of a host among others, and `began` is when its trace was begun, in seconds since 1970.
     """
 
-    def __init__(self, net: Net, digest: str, stream: LineStream | None, kept: Stored | None = None) -> None:
+    def __init__(
+        self,
+        net: Net,
+        digest: str,
+        stream: LineStream | None,
+        kept: Stored | None = None,
+        machines: tuple[str, ...] = (),
+        began: float = 0.0,
+    ) -> None:
+        self.machines = machines
+        self.began = float(str(kept.get("began", began))) if isinstance(kept, Mapping) else began
         self.player = TokenPlayer.of(net)
         self.word = net.initial_marking
         openable = [c for c in self.player.transitions.values() if c.openable]
@@ -108,8 +123,7 @@ class Recorder:
         """Of the stream without the lines that are not written yet."""
         self.at_seconds = 0.0
         self.unwritten: list[str] = []
-        self.waiting = 0
-        """How many events were recorded since the last flush."""
+        self.is_ended = False
         self.observers: list[Callable[[Event], None]] = []
         """Who is shown each event as it is recorded."""
         if isinstance(kept, Mapping):
@@ -120,35 +134,45 @@ class Recorder:
                 self.unwritten = str(kept["lines"]).splitlines(keepends=True)
             self.note(self.at_seconds, "restarted")
         else:
-            self._write(Header(net.name, digest, signals=True, commands=True))
+            self._write(Header(net.name, digest, signals=True, commands=True, machines=machines, began=self.began))
 
     @property
     def is_deadlock(self) -> bool:
         """Whether no transition is firable and openable, as `situation.is_deadlock` says, without looking at each."""
         return not self._firable.at(self.word & self.player.places)
 
-    @property
-    def keeping(self) -> list[Keep]:
+    def keep(self) -> list[Keep]:
         """What the journal keeps, together with the acts that the unwritten lines tell."""
-        lines = "".join(self.unwritten)
         now: dict[str, Stored] = {
             "at": repr(self.at_seconds),
             "word": f"{self.word:x}",
             "size_bytes": self.size_bytes,
-            "lines": lines,
+            "lines": "".join(self.unwritten),
         }
-        return [Keep(KEY, now)]
+        return [Keep(KEY, now | {"began": repr(self.began)} if self.machines else now)]
 
     @property
     def marking(self) -> Marking:
         """The joint marking."""
         return self.player.marking(self.word)
 
-    def fired(self, at_seconds: float, transition: str) -> None:
-        """A transition of the central net has fired."""
-        self.word = self.player.transitions[transition].fire(self.word)
+    def fired(self, at_seconds: float, transition: str, number: int | None = None) -> None:
+        """A transition has fired, by the decision of a round or in its controller alone."""
+        if not self.machines:
+            self.word = self.player.transitions[transition].fire(self.word)
         self.firings[transition] += 1
-        self._write(Fired(at_seconds, (transition,)))
+        self._write(Fired(at_seconds, (transition,), number))
+
+    def voted(self, at_seconds: float, controller: str, number: int, promised: frozenset[str]) -> None:
+        """A controller has voted in a round: yes for these transitions."""
+        data = {"controller": controller, "round": number, "promised": sorted(promised)}
+        self._write(Noted(at_seconds, VOTED, data))
+
+    def applied(self, at_seconds: float, controller: str, number: int, transition: str) -> None:
+        """A controller has applied its part of what a round committed: of one host among others, that is told."""
+        if self.machines:
+            data = {"controller": controller, "round": number, "transition": transition}
+            self._write(Noted(at_seconds, APPLIED, data))
 
     def signal(self, at_seconds: float, name: str, value: bool) -> None:
         """A controller has taken a new value of a signal."""
@@ -165,10 +189,11 @@ class Recorder:
         """Anything else that the trace should keep."""
         self._write(Noted(at_seconds, note, data))
 
-    def end(self, at_seconds: float, reason: str) -> None:
-        """The last line."""
-        self._write(End(at_seconds, self.player.net.names(self.marking), reason))
+    def end(self, at_seconds: float, marking: tuple[str, ...], reason: str) -> None:
+        """The last line; what happens afterwards, while links are closed, is none."""
+        self._write(End(at_seconds, marking, reason))
         self.flush()  # not kept: a run that is taken up again goes on before it
+        self.is_ended = True
 
     def flush(self) -> None:
         """Write the lines so far, and hand them over to who follows the file."""
@@ -178,10 +203,10 @@ class Recorder:
                 self.size_bytes += len(line)
             self.unwritten.clear()
             self.stream.flush()
-        self.waiting = 0
 
     def _write(self, item: Header | Event | End) -> None:
-        self.waiting += 1
+        if self.is_ended:
+            return
         if not isinstance(item, Header):
             self.at_seconds = item.at_seconds
         if self.stream is not None:

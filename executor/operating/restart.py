@@ -14,10 +14,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
+from firable.executor.links.link import called
 from firable.executor.protocol.commands import Answer
 
 if TYPE_CHECKING:
-    from firable.executor.operating.execution import Execution
+    from firable.executor.operating.host import Host
 
 _TELLS: Final = {
     Answer.DONE: "is done",
@@ -40,40 +41,36 @@ class TakingUp:
     """Whether everything has been asked."""
 
 
-async def take_up(run: Execution, found: TakingUp) -> None:
+async def take_up(run: Host, found: TakingUp) -> None:
     """Ask after each command; then resume, if that was said beforehand and nothing is uncertain.
 
     A pause or a stop meanwhile takes back what was said beforehand: then only the operator's resume ends the hold.
     """
     for name, controller in run.controllers.items():
         for place, entry in controller.commands.questions:
-            answer = await run.driver.ask(run.net.place(place), entry)
+            answer = Answer((await run.driver.ask(run.net.place(place), entry)).value)
             if answer is Answer.UNKNOWN:
                 answer = found.said.get(place, answer)
             found.answers[place] = answer
-            run.recorder.note(run.now_seconds(), "asked after", place=place, answer=answer.value)
-            run.answered(name, place, entry, answer)
+            run.note("asked after", place=place, answer=answer.value)
+            run.answer(name, place, entry, answer)
+            if answer is Answer.UNKNOWN:
+                run.told("held", f"nobody knows what became of the command of '{place}': look, and --say it")
     await run.quiet()
     found.is_final = True
-    if found.resume and not run.paused:  # as it is after a stop or a fault, too
-        release(run, found)
+    if not found.resume or run.paused or not run.resume():  # paused: as it is after a stop or a fault, too
+        for name, controller in run.controllers.items():
+            if controller.held:
+                run.told("held", f"{called(name)} is held after a restart, until it is resumed")
     run.moved()
 
 
-def release(run: Execution, found: TakingUp) -> bool:
-    """End the hold, which sends what is owed; False where something is uncertain, and everything stays as it is."""
-    if not found.is_final or uncertain(run):
-        return False
-    run.released()
-    return True
-
-
-def uncertain(run: Execution) -> list[str]:
+def uncertain(run: Host) -> list[str]:
     """The places with a command of which nobody knows what became of it."""
     return [place for controller in run.controllers.values() for place, _ in controller.commands.questions]
 
 
-def told(run: Execution, found: TakingUp) -> str:
+def told(run: Host, found: TakingUp) -> str:
     """The hold in words: each command that is not over, and what there is to do."""
     lines = ["the run was interrupted, and is taken up where it was; nothing moves until it is resumed"]
     for place, answer in found.answers.items():

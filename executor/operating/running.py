@@ -9,25 +9,23 @@ The simulated cell runs in virtual time unless a speed is given; then a run is a
 
 from __future__ import annotations
 
-import asyncio
 from collections import Counter
-from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from firable.executor.cell.plant import Disturbance, Plant
-from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.binding import Binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.simulated import SimulatedDriver
-from firable.executor.operating.execution import Execution
+from firable.executor.operating.host import Host
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.recorder import LineStream
+from firable.executor.operating.service import Service, figures_for, run_to_the_end
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.taken_up import opened
-from firable.executor.operating.uncut import ended_by_signals
 from firable.executor.protocol.commands import Answer
 from firable.nets.bundle import Bundle, read_bundle
 from firable.nets.decomposition import Decomposition
@@ -36,10 +34,6 @@ from firable.nets.layers import Layers
 from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.nets.net import Net
 from firable.nets.right_to_run import unproved
-
-if TYPE_CHECKING:  # these need the extra `serve`
-    from firable.executor.operating.control import Endpoint
-    from firable.executor.operating.metrics import Metrics
 
 
 class Watch(StrEnum):
@@ -50,7 +44,7 @@ class Watch(StrEnum):
     IGNORE = "ignore"
 
 
-Operator = Callable[[Execution], Awaitable[None]]
+Operator = Callable[[Host], Awaitable[None]]
 """A coroutine that runs beside the cell and uses its controls."""
 
 
@@ -129,8 +123,7 @@ def run(
     resume: bool = False,
     said: Mapping[str, Answer] | None = None,
     watch: Watch = Watch.TELL,
-    endpoint: Endpoint | None = None,
-    served: Callable[[str], None] | None = None,
+    service: Service | None = None,
 ) -> RunReport:
     """Run a bundle on the simulated cell of a plant until `workpieces` workpieces have gone through.
 
@@ -138,8 +131,8 @@ def run(
     `State.HELD`, unless an operator is there, or `resume` says beforehand that it may go on as soon as each command is
     accounted for; `said` gives the operator's word on those that no machine can tell of, by place.
 
-    The machines are held against their plant file as the run goes (`watch`). With an `endpoint` an operator may act
-    from elsewhere, in real time; `served` is told the address.
+    The machines are held against their plant file as the run goes (`watch`). With a `service` an operator may act from
+    elsewhere, in real time.
 
     `speed` None is virtual time, 1.0 real time, 10.0 ten times as fast. A command that is not completed within
     `overdue_seconds` (of the cell's time) is a fault. Raises `InputError` F5002 where the bundle is not proved, F5003
@@ -163,8 +156,7 @@ def run(
         resume=resume,
         said=said,
         watch=watch,
-        endpoint=endpoint,
-        served=served,
+        service=service,
     )
 
 
@@ -184,8 +176,7 @@ def execute(
     resume: bool = False,
     said: Mapping[str, Answer] | None = None,
     watch: Watch = Watch.TELL,
-    endpoint: Endpoint | None = None,
-    served: Callable[[str], None] | None = None,
+    service: Service | None = None,
 ) -> RunReport:
     """Run a decomposition, proved or not, on the simulated cell of a plant; parameters as for `run`.
 
@@ -193,11 +184,11 @@ def execute(
     """
     _check(plant, decomposition.net, workpieces, speed, overdue_seconds)
     cell = Plant(plant, workpieces=workpieces, seed=seed, disturbances=disturbances)
-    with opened(decomposition, digest, plant, workpieces, seed, journal_path, trace) as files:
+    with opened(decomposition, digest, journal_path, trace, simulated=(plant, workpieces, seed)) as files:
         # A run that is taken up may begin in any marking of the machines, which no model of them tells.
         watched = watch is not Watch.IGNORE and not files.is_taken_up
-        figures = _figures(decomposition.net) if endpoint is not None else None
-        execution = Execution(
+        figures = figures_for(decomposition.net, service)
+        host = Host(
             decomposition,
             SimulatedDriver(cell, decomposition.net, files.cell),
             files.recorder,
@@ -213,11 +204,7 @@ def execute(
             stop_at_divergence=watch is Watch.STOP,
             figures=figures,
         )
-        main = _terminable(execution)
-        if endpoint is not None and figures is not None:
-            main = _serving(main, execution, endpoint, figures.text, served)
-        situation = run_in_virtual_time(main) if speed is None else asyncio.run(main)
-        files.recorder.end(execution.now_seconds(), situation.state.value)
+        situation = run_to_the_end(host, service, figures, virtual=speed is None)
     delivered = tuple(workpiece.id for workpiece in cell.delivered)
     seen = Counter((*delivered, *cell.inside))
     return RunReport(
@@ -228,11 +215,11 @@ def execute(
         doubled=tuple(sorted(i for i, times in seen.items() if times > 1)),
         firings=files.recorder.firings,
         commands=files.recorder.commands,
-        messages=execution.messages,
+        messages=host.acts.messages,
         decided=_decided(decomposition, files.recorder.firings),
-        simulated_seconds=execution.now_seconds(),
+        simulated_seconds=host.now_seconds(),
         watched=watched,
-        divergence=execution.divergence,
+        divergence=host.divergence,
     )
 
 
@@ -249,14 +236,13 @@ def run_bound(
     said: Mapping[str, Answer] | None = None,
     plant: PlantModel | None = None,
     watch: Watch = Watch.TELL,
-    endpoint: Endpoint | None = None,
-    served: Callable[[str], None] | None = None,
+    service: Service | None = None,
 ) -> RunReport:
     """Run a bundle on the machines of a binding, in real time, until the operator stops it or nothing can go on.
 
     What workpieces there are is not to be known; the report counts none. `tell` is told of links that come and go, by
     device and sentence; journal, `resume` and `said` are as for `run`, and so are `watch`, where a `plant` says what
-    the machines do, and `endpoint` and `served`. Raises `InputError` F5002 where the bundle is
+    the machines do, and `service`. Raises `InputError` F5002 where the bundle is
     not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the trace cannot
     be written, and F5031 to F5034 where the journal cannot be gone on with.
     """
@@ -264,10 +250,10 @@ def run_bound(
         raise InputError(problems)
     driver = bound_driver(binding, bundle.net)
     decomposition = bundle.decomposition
-    with opened(decomposition, bundle.digest, None, 0, 0, journal_path, trace_path) as files:
+    with opened(decomposition, bundle.digest, journal_path, trace_path) as files:
         watched = plant if watch is not Watch.IGNORE and not files.is_taken_up else None
-        figures = _figures(decomposition.net) if endpoint is not None else None
-        execution = Execution(
+        figures = figures_for(decomposition.net, service)
+        host = Host(
             decomposition,
             driver,
             files.recorder,
@@ -282,12 +268,8 @@ def run_bound(
             stop_at_divergence=watch is Watch.STOP,
             figures=figures,
         )
-        main = _terminable(execution)
-        if endpoint is not None and figures is not None:
-            main = _serving(main, execution, endpoint, figures.text, served)
-        situation = asyncio.run(main)
+        situation = run_to_the_end(host, service, figures)
         recorder = files.recorder
-        recorder.end(execution.now_seconds(), situation.state.value)
     return RunReport(
         situation,
         (),
@@ -296,11 +278,11 @@ def run_bound(
         (),
         recorder.firings,
         recorder.commands,
-        execution.messages,
+        host.acts.messages,
         _decided(decomposition, recorder.firings),
-        execution.now_seconds(),
+        host.now_seconds(),
         watched=watched is not None,
-        divergence=execution.divergence,
+        divergence=host.divergence,
     )
 
 
@@ -311,37 +293,6 @@ def _decided(decomposition: Decomposition, firings: Mapping[str, int]) -> dict[s
     for row in decomposition.coordinated:
         of_each[row.at or layers.root] += firings.get(row.name, 0)
     return {name: of_each[name] for name in (layers.root, *layers.coordinators()) if name in of_each}
-
-
-async def _terminable(execution: Execution) -> Situation:
-    """The execution, which Ctrl-C or a request to terminate ends in order: no machine is left on."""
-    with ended_by_signals():
-        return await execution.main()
-
-
-async def _serving(
-    main: Coroutine[Any, Any, Situation],
-    execution: Execution,
-    endpoint: Endpoint,
-    figures: Callable[[], bytes],
-    served: Callable[[str], None] | None,
-) -> Situation:
-    """The execution, on which an operator may act from elsewhere for as long as it lasts."""
-    from firable.executor.operating.control import serving
-
-    try:
-        async with serving(execution, endpoint, figures) as address:
-            if served is not None:
-                served(address)
-            return await main
-    finally:
-        main.close()
-
-
-def _figures(net: Net) -> Metrics:
-    from firable.executor.operating.metrics import Metrics
-
-    return Metrics(net)
 
 
 def _check(

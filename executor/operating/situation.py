@@ -14,9 +14,10 @@ Asked at quiescence, when no message is under way, the joint marking and the pro
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.token_player import TokenPlayer, Word
 
 
@@ -96,3 +97,10 @@ def blocked(player: TokenPlayer, word: Word, untaken: Collection[str] = ()) -> I
             ),
             tuple(place for place in net.transition(compiled.name).inputs if place in untaken),
         )
+
+
+def blocked_parts(controller: LocalController, untaken: Collection[str] = ()) -> Iterator[Blocked]:
+    """The same of one controller, as far as it knows: a part of a coordinated transition bears its name."""
+    row_of = {part.name: row for row, part in controller.parts.items()}
+    for one in blocked(controller.player, controller.word, untaken):
+        yield replace(one, transition=row_of.get(one.transition, one.transition))

@@ -10,6 +10,7 @@ somewhere else.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from pathlib import Path
 from firable.executor.cell.cell_log import CellLog
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.journal.sqlite_journal import SqliteJournal
-from firable.executor.operating.recorder import KEY, LineStream, Recorder, TraceFile, size_bytes_of
+from firable.executor.operating.recorder import KEY, TRACE, LineStream, Recorder, TraceFile, size_bytes_of
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Stored
 from firable.executor.protocol.stored_word import stored_word
@@ -29,9 +30,6 @@ from firable.nets.interchange import net_digest
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Marking, Net
 from firable.nets.source import printable
-
-TRACE = "\ntrace"
-"""The name under which the journal keeps the trace; no machine has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,14 +48,16 @@ class Files:
 def opened(
     decomposition: Decomposition,
     digest: str,
-    plant: PlantModel | None,
-    workpieces: int,
-    seed: int,
     journal_path: Path | str | None,
     trace: LineStream | Path | str | None,
+    *,
+    simulated: tuple[PlantModel, int, int] | None = None,
+    machines: tuple[str, ...] = (),
 ) -> Iterator[Files]:
-    """The files of a run, for as long as it lasts; without a journal nothing is taken up, and without a plant there is
-    no simulated cell that would have to be where it was.
+    """The files of a run, for as long as it lasts; without a journal nothing is taken up.
+
+    `simulated` are plant, workpieces and seed of the simulated cell that would have to be where it was, if there is
+    one; `machines` those of one host among others, whose clock goes on while it is down.
 
     Raises `InputError` F5031-F5034 for a journal that cannot be gone on with, F5035 for a simulated cell of another
     run, F1017 for a trace that cannot be written or does not go on where it was.
@@ -66,25 +66,25 @@ def opened(
     with ExitStack() as stack:
         journal: Journal = MemoryJournal()
         cell = None
+        names = machines or (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))
         if journal_path is not None:
-            names = [*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets)]
             journal = stack.enter_context(closing(SqliteJournal(journal_path, digest, names)))
-            if plant is not None:
-                cell = stack.enter_context(closing(CellLog(f"{journal_path}.cell", plant, workpieces, seed)))
+            if simulated is not None:
+                cell = stack.enter_context(closing(CellLog(f"{journal_path}.cell", *simulated)))
         kept = journal.kept(TRACE).get(KEY)
-        begun = any(journal.kept(subnet.name) for subnet in decomposition.subnets)
+        begun = any(journal.kept(name) for name in names)
         if cell is not None and begun:
             _demand_the_cell(cell, net)
         if isinstance(trace, Path | str):
             if begun:
                 _demand_the_same(trace, kept)
             trace = stack.enter_context(closing(TraceFile(trace, size_bytes_of(kept))))
-        recorder = Recorder(net, net_digest(net), trace, kept)
+        now = time.time() if machines else 0.0
+        recorder = Recorder(net, net_digest(net), trace, kept, machines, now)
         if begun and kept is None:
             recorder.word = _joint(decomposition, journal)
-        yield Files(
-            journal, recorder, cell, max(recorder.at_seconds, cell.end_seconds if cell is not None else 0.0), begun
-        )
+        last = max(recorder.at_seconds, cell.end_seconds if cell is not None else 0.0, now - recorder.began)
+        yield Files(journal, recorder, cell, last, begun)
 
 
 def _demand_the_same(path: Path | str, kept: Stored | None) -> None:

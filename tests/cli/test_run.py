@@ -17,6 +17,7 @@ from firable.executor import execute
 from firable.executor.cell.plant import NeverCompletes
 from firable.executor.operating.running import Watch
 from firable.nets.catalogue import catalogue_net, catalogue_path
+from firable.semantics.joining import VOTED
 from firable.semantics.replaying import replay
 from firable.semantics.trace import Noted, read_trace
 
@@ -53,7 +54,7 @@ def notes_of(trace: Path) -> list[str]:
     read = read_trace(trace)
     assert replay(catalogue_net("one_robot"), read).complete
     assert read.end is not None
-    return [*(event.note for event in read.events if isinstance(event, Noted)), read.end.reason]
+    return [*(event.note for event in read.events if isinstance(event, Noted) and event.note != VOTED), read.end.reason]
 
 
 @pytest.mark.parametrize("last", ["s\n", ""], ids=["s", "end of input"])

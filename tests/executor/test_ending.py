@@ -14,9 +14,9 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.driver import Answer, Clock, Listener
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
-from firable.executor.operating.execution import Execution
+from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
-from firable.executor.operating.running import _terminable
+from firable.executor.operating.service import terminable
 from firable.executor.operating.situation import State
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
@@ -64,18 +64,18 @@ class Filling(MemoryJournal):
             raise InputError([Diagnostic("F5034", "the disk is full", "")])
 
 
-async def present(_: Execution) -> None:
+async def present(_: Host) -> None:
     await asyncio.sleep(60)
 
 
-def run_of(journal: Journal, *, overdue_seconds: float = 120.0, resume: bool = False) -> tuple[Execution, Machine]:
+def run_of(journal: Journal, *, overdue_seconds: float = 120.0, resume: bool = False) -> tuple[Host, Machine]:
     net = parse_net(LAMP)
     decomposition = split(net)
     machine = Machine(decomposition.subnets, 1.0, {"robot.key": False})
     machine.sent = []
     recorder = Recorder(net, net_digest(net), io.StringIO())
     return (
-        Execution(
+        Host(
             decomposition,
             machine,
             recorder,
@@ -91,16 +91,16 @@ def run_of(journal: Journal, *, overdue_seconds: float = 120.0, resume: bool = F
 @pytest.mark.parametrize(
     "act",
     [
-        Execution.stop,
-        Execution.pause,
+        Host.stop,
+        Host.pause,
         lambda run: run.emergency_stop("a person"),
         lambda run: run.driver_fault("R", "failed"),
-        Execution.moved,
+        lambda run: run.signal("robot.worked", value=True, entry=1),
     ],
-    ids=["stop", "pause", "emergency stop", "fault", "moved"],
+    ids=["stop", "pause", "emergency stop", "fault", "signal"],
 )
 def test_an_error_ends_the_run_and_stops_the_machines_even_where_its_caller_swallows_it(
-    act: Callable[[Execution], None],
+    act: Callable[[Host], object],
 ) -> None:
     async def main() -> None:
         journal = Filling()
@@ -143,10 +143,8 @@ def test_a_resume_after_the_stop_of_a_run_that_is_held_commands_nothing() -> Non
         await asyncio.sleep(2)
         assert run.taking_up is not None
         assert run.taking_up.is_final
-        run.under_way += 1  # a message under way delays the end
         run.stop()
-        run.resume()
-        run._handled()
+        assert not run.resume()
         assert (await ending).state is State.STOPPED
         assert machine.sent == []
 
@@ -187,7 +185,7 @@ class Slow(Machine):
             self.is_off = True
 
 
-def slow() -> tuple[Execution, Slow]:
+def slow() -> tuple[Host, Slow]:
     run, machine = run_of(MemoryJournal())
     run.driver = slowly = Slow([split(run.net).subnet("robot")], 1.0)
     slowly.sent = machine.sent
@@ -216,7 +214,7 @@ def test_a_second_signal_does_not_cut_off_the_safe_outputs(number: signal.Signal
         loop = asyncio.get_running_loop()
         for at in (1.0, 1.5, 1.7):
             loop.call_later(at, signal.raise_signal, number)
-        return (await _terminable(run)).state
+        return (await terminable(run)).state
 
     assert run_in_virtual_time(ended()) is State.STOPPED
     assert machine.is_off

@@ -5,6 +5,7 @@ import io
 import random
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import cast
 
 import pytest
 from support.cells import decomposition_of, firings, plant_of
@@ -13,7 +14,8 @@ from support.owned_nets import owned_net
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.plant import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.drivers.simulated import SimulatedDriver
-from firable.executor.operating.execution import Execution
+from firable.executor.operating.acts import Item
+from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.running import Operator, RunReport, execute
 from firable.executor.operating.situation import State, is_deadlock
@@ -24,6 +26,7 @@ from firable.nets.decomposition import Decomposition
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 from firable.nets.text import parse_net
+from firable.semantics.joining import VOTED
 from firable.semantics.judgement import Judgement, judge
 from firable.semantics.player import Player
 from firable.semantics.replaying import replay
@@ -62,6 +65,11 @@ def run_cell(
     assert catalogue_net(cell).names(replayed.marking) == report.situation.marking
     assert (replayed.firings, replayed.commands) == (sum(report.firings.values()), report.commands)
     return report, trace
+
+
+def notes(trace: Trace) -> list[str]:
+    """What the trace keeps beside firings, signals, commands and votes."""
+    return [event.note for event in trace.events if isinstance(event, Noted) and event.note != VOTED]
 
 
 def test_thousand_workpieces_go_through_none_lost_none_doubled_in_order() -> None:
@@ -161,20 +169,20 @@ def test_sensor_stuck_at_one_makes_the_cell_act_on_nothing_which_the_plant_tells
 
 
 def test_nothing_fires_during_a_pause_and_everything_goes_on_after_it() -> None:
-    async def operator(execution: Execution) -> None:
+    async def operator(host: Host) -> None:
         await asyncio.sleep(33.3)
-        execution.pause()
-        await execution.quiet()
-        before = firings(execution)
+        host.pause()
+        await host.quiet()
+        before = firings(host)
         await asyncio.sleep(100.0)
-        assert firings(execution) == before > 0
-        assert execution.situation().state is State.PAUSED
-        execution.resume()
+        assert firings(host) == before > 0
+        assert host.situation().state is State.PAUSED
+        host.resume()
 
     report, trace = run_cell("one_robot", 5, operator=operator, overdue_seconds=1000.0)
     assert report.state is State.DONE
     assert report.delivered == (1, 2, 3, 4, 5)
-    assert [event.note for event in trace.events if isinstance(event, Noted)] == ["paused", "resumed"]
+    assert notes(trace) == ["paused", "resumed"]
     times = [event.at_seconds for event in trace.events if isinstance(event, Fired)]
     assert not [at for at in times if 33.3 < at < 133.3]
 
@@ -182,18 +190,18 @@ def test_nothing_fires_during_a_pause_and_everything_goes_on_after_it() -> None:
 def test_single_step_fires_one_transition_at_a_time() -> None:
     stepped: list[str] = []
 
-    async def operator(execution: Execution) -> None:
-        execution.pause()
+    async def operator(host: Host) -> None:
+        host.pause()
         while len(stepped) < 15:
-            before = firings(execution)
-            name = await execution.step()
+            before = firings(host)
+            name = await host.step()
             if name is None:
-                assert firings(execution) == before
+                assert firings(host) == before
                 await asyncio.sleep(0.5)
             else:
-                assert firings(execution) == before + 1
+                assert firings(host) == before + 1
                 stepped.append(name)
-        execution.resume()
+        host.resume()
 
     report, trace = run_cell("one_robot", 3, operator=operator)
     assert report.state is State.DONE
@@ -211,26 +219,26 @@ def test_single_step_fires_one_transition_at_a_time() -> None:
 def test_cell_is_at_rest_when_nothing_is_pending_and_not_while_a_completion_is_awaited(
     disturbance: Disturbance, state: State
 ) -> None:
-    async def operator(execution: Execution) -> None:
-        execution.pause()
-        while await execution.step() is not None or not execution.at_rest:
+    async def operator(host: Host) -> None:
+        host.pause()
+        while await host.step() is not None or not host.at_rest:
             await asyncio.sleep(0.5)
-        assert not execution.overdue
-        execution.resume()
+        assert not host.alarms.timers
+        host.resume()
 
     report, _ = run_cell("one_robot", 1, operator=operator, disturbances=[disturbance])
     assert report.state is state
 
 
 def test_paused_run_does_not_end_while_the_operator_holds_firings_back() -> None:
-    async def operator(execution: Execution) -> None:
-        while firings(execution) < 14:
+    async def operator(host: Host) -> None:
+        while firings(host) < 14:
             await asyncio.sleep(0.5)
-        execution.pause()
-        execution.stop(at_end_of_cycle=True)
+        host.pause()
+        host.stop(at_end_of_cycle=True)
         await asyncio.sleep(100.0)
-        assert execution.at_rest
-        execution.resume()
+        assert host.at_rest
+        host.resume()
 
     report, _ = run_cell("one_robot", 1, operator=operator, overdue_seconds=1000.0)
     assert sum(report.firings.values()) == 15
@@ -238,27 +246,29 @@ def test_paused_run_does_not_end_while_the_operator_holds_firings_back() -> None
 
 
 def test_step_is_for_a_paused_run() -> None:
-    async def operator(execution: Execution) -> None:
-        assert await execution.step() is None
+    async def operator(host: Host) -> None:
+        assert await host.step() is None
 
     assert run_cell("one_robot", 1, operator=operator)[0].state is State.DONE
 
 
 def test_after_a_stop_nothing_fires_and_every_machine_stands_still() -> None:
-    kept: list[Execution] = []
+    kept: list[Host] = []
 
-    async def operator(execution: Execution) -> None:
-        kept.append(execution)
+    async def operator(host: Host) -> None:
+        kept.append(host)
         await asyncio.sleep(41.0)
-        execution.stop()
-        execution.resume()  # a stop is final
+        host.stop()
+        host.resume()  # a stop is final
 
     report, trace = run_cell("one_robot", 50, operator=operator)
     assert report.state is State.STOPPED
     assert report.simulated_seconds == pytest.approx(41.0)
     assert report.inside
-    notes = [i for i, event in enumerate(trace.events) if isinstance(event, Noted)]
-    assert not [event for event in trace.events[notes[0] :] if isinstance(event, Fired | CommandSent)]
+    stopped = next(
+        i for i, e in enumerate(trace.events) if isinstance(e, Noted) and e.note == "stopped by the operator"
+    )
+    assert not [event for event in trace.events[stopped:] if isinstance(event, Fired | CommandSent)]
     driver = kept[0].driver
     assert isinstance(driver, SimulatedDriver)
     assert all(machine.busy is None for machine in driver.plant.machines.values())
@@ -277,9 +287,9 @@ def test_a_trace_that_breaks_while_a_command_is_overdue_ends_the_run() -> None:
 
 
 def test_stop_at_the_end_of_the_cycle_leaves_an_empty_cell() -> None:
-    async def operator(execution: Execution) -> None:
+    async def operator(host: Host) -> None:
         await asyncio.sleep(60.0)
-        execution.stop(at_end_of_cycle=True)
+        host.stop(at_end_of_cycle=True)
 
     report, _ = run_cell("one_robot", 50, operator=operator)
     assert report.state is State.STOPPED
@@ -289,9 +299,9 @@ def test_stop_at_the_end_of_the_cycle_leaves_an_empty_cell() -> None:
 
 
 def test_cancelled_run_is_an_operators_stop() -> None:
-    async def cancelled(execution: Execution) -> None:
+    async def cancelled(host: Host) -> None:
         await asyncio.sleep(20.0)
-        (main,) = (task for task in asyncio.all_tasks() if "_terminable" in repr(task.get_coro()))
+        (main,) = (task for task in asyncio.all_tasks() if "terminable" in repr(task.get_coro()))
         main.cancel()
 
     report, _ = run_cell("one_robot", 5, operator=cancelled)
@@ -299,7 +309,7 @@ def test_cancelled_run_is_an_operators_stop() -> None:
 
 
 def test_operators_mistake_ends_the_run() -> None:
-    async def operator(execution: Execution) -> None:
+    async def operator(host: Host) -> None:
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
@@ -308,8 +318,8 @@ def test_operators_mistake_ends_the_run() -> None:
 
 @pytest.mark.parametrize(("mailbox", "receiver"), [("", "the coordinator"), ("robot", "'robot'")])
 def test_message_that_nobody_knows_ends_the_run(mailbox: str, receiver: str) -> None:
-    async def operator(execution: Execution) -> None:
-        execution.mailboxes[mailbox].post("a letter")
+    async def operator(host: Host) -> None:
+        host.acts.post(mailbox, cast(Item, "a letter"))
 
     with pytest.raises(ProtocolError, match=f"{receiver} was sent 'a letter'"):
         run_cell("one_robot", 5, operator=operator)
@@ -318,12 +328,12 @@ def test_message_that_nobody_knows_ends_the_run(mailbox: str, receiver: str) -> 
 def test_situation_while_running_names_the_gates_that_are_waited_for() -> None:
     seen = []
 
-    async def operator(execution: Execution) -> None:
+    async def operator(host: Host) -> None:
         await asyncio.sleep(1e-3)
-        while firings(execution) < 1:
+        while firings(host) < 1:
             await asyncio.sleep(0.01)
-        await execution.quiet()
-        seen.append(execution.situation())
+        await host.quiet()
+        seen.append(host.situation())
 
     run_cell("one_robot", 1, operator=operator)
     assert seen[0].state is State.WAITING
@@ -366,15 +376,15 @@ NO_MACHINES = parse_plant(
 def test_nothing_fires_in_a_step_that_a_stop_overtakes(yields: int) -> None:
     fired: list[int] = []
 
-    async def operator(execution: Execution) -> None:
-        execution.pause()
-        step = asyncio.create_task(execution.step())
+    async def operator(host: Host) -> None:
+        host.pause()
+        step = asyncio.create_task(host.step())
         for _ in range(yields):
             await asyncio.sleep(0)
-        execution.stop()
-        fired.append(firings(execution))
+        host.stop()
+        fired.append(firings(host))
         await step
-        fired.append(firings(execution))
+        fired.append(firings(host))
 
     stopped = execute(circles("a", "b"), NO_MACHINES, workpieces=1, operator=operator)
     assert stopped.state is State.STOPPED
@@ -382,7 +392,7 @@ def test_nothing_fires_in_a_step_that_a_stop_overtakes(yields: int) -> None:
 
 
 def test_net_that_runs_in_circles_without_its_cell_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("firable.executor.operating.execution.FIRINGS_AT_ONCE_MAX", 500)
+    monkeypatch.setattr("firable.executor.operating.host.FIRINGS_AT_ONCE_MAX", 500)
     report = execute(circles("a"), NO_MACHINES, workpieces=1)
     assert report.state is State.FAULT
     assert "fire without end" in report.situation.message
@@ -391,11 +401,11 @@ def test_net_that_runs_in_circles_without_its_cell_is_a_fault(monkeypatch: pytes
 def test_single_steps_take_turns_among_the_controllers() -> None:
     stepped = []
 
-    async def operator(execution: Execution) -> None:
-        execution.pause()
+    async def operator(host: Host) -> None:
+        host.pause()
         for _ in range(6):
-            stepped.append(await execution.step())
-        execution.stop()
+            stepped.append(await host.step())
+        host.stop()
 
     execute(circles("a", "b"), NO_MACHINES, workpieces=1, operator=operator)
     assert [str(name)[0] for name in stepped] == ["a", "b"] * 3

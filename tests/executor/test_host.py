@@ -15,8 +15,7 @@ from firable.executor.journal.journal import MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.operating.host import Host
-from firable.executor.operating.host_trace import TRACE, HostTrace
-from firable.executor.operating.hosting import _resume
+from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.messages import Decision, Stored, Vote, VoteRequest
@@ -75,7 +74,7 @@ def test_a_host_that_is_cut_off_is_told_and_the_cell_goes_on_when_the_line_is_ba
         assert [kind for kind, _ in cell.told].count("lost") == 8
         await asyncio.sleep(30)
         assert cell.firings() == stood  # nobody goes on without the machine that is cut off
-        waiting = [sentence for host in cell.hosts.values() for sentence in host.waits()]
+        waiting = [sentence for host in cell.hosts.values() for sentence in host.peers.waits()]
         cell.exchange.mend(cell.links[cut])
         await asyncio.sleep(60)
         await cell.stop()
@@ -118,7 +117,7 @@ def test_while_held_nothing_that_needs_the_machine_fires(tmp_path: Path) -> None
         stood = cell.firings()
         await asyncio.sleep(30)
         assert cell.firings() == stood
-        assert any("held after a restart" in sentence for sentence in cell.hosts[ROBOT].waits())
+        assert any("held after a restart" in sentence for sentence in cell.hosts[ROBOT].peers.waits())
         assert ("held", "'robot' is held after a restart, until it is resumed") in cell.told
         await cell.stop()
         cell.replayed()
@@ -133,12 +132,12 @@ def test_what_a_host_may_not_say_is_dropped(tmp_path: Path) -> None:
         centre, robot = cell.hosts[CENTRE], cell.hosts[ROBOT]
         before = dict(centre.coordinators[COORDINATOR].seen)
         readiness = robot.controllers["robot"].above[COORDINATOR].readiness
-        centre.arrived("mc", COORDINATOR, Vote("robot", 0, frozenset({"G2"}), readiness))
-        robot.arrived("mc", "robot", Decision("robot", 0, "G2", 0, 0))
-        robot.arrived(COORDINATOR, "robot", Decision("mc", 0, "G2", 0, 0))
+        centre.peers.arrived("mc", COORDINATOR, Vote("robot", 0, frozenset({"G2"}), readiness))
+        robot.peers.arrived("mc", "robot", Decision("robot", 0, "G2", 0, 0))
+        robot.peers.arrived(COORDINATOR, "robot", Decision("mc", 0, "G2", 0, 0))
         assert [kind for kind, _ in cell.told].count("dropped") == 3
-        assert not centre.posted
-        assert not robot.posted
+        assert not centre.acts.posted
+        assert not robot.acts.posted
         assert before is not None
         await cell.stop()
         cell.replayed()
@@ -150,7 +149,7 @@ def test_an_overdue_command_ends_its_host_and_the_others_see_it_lost(tmp_path: P
     async def main() -> None:
         cell = Cell(tmp_path)
         host = cell.hosts[ROBOT]
-        host.overdue_seconds = 0.5
+        host.alarms.overdue_seconds = 0.5
         situation = await cell.tasks[ROBOT]
         assert situation.state is State.FAULT
         assert "is overdue" in situation.message
@@ -186,8 +185,8 @@ def test_nothing_stands_behind_the_last_line(tmp_path: Path) -> None:
         await asyncio.sleep(5)
         await cell.stop()
         for host in cell.hosts.values():
-            host.lost("robot")
-            host.trace.flush()
+            host.peers.lost("robot")
+            host.recorder.flush()
         assert cell.replayed().firings > 3
 
     run_in_virtual_time(main())
@@ -200,7 +199,7 @@ def test_a_round_that_was_aborted_keeps_nobody_waiting(tmp_path: Path) -> None:
         cell.exchange.cut(cell.links[ROBOT])
         await asyncio.sleep(5)
         cell.hosts[CENTRE].coordinators[COORDINATOR].permit(0)
-        assert not any("robot" in sentence for sentence in cell.hosts[CENTRE].waits())
+        assert not any("robot" in sentence for sentence in cell.hosts[CENTRE].peers.waits())
 
     run_in_virtual_time(main())
 
@@ -222,10 +221,9 @@ def test_what_no_machine_knows_an_operator_may_say_beforehand(tmp_path: Path) ->
         assert not host.resume()
         assert any(f"of '{place}': look" in sentence for kind, sentence in cell.told if kind == "held")
         await cell.kill(ROBOT)
-        cell.start(ROBOT)
+        cell.start(ROBOT, said={place: Answer.NOT_RECEIVED})
         host = cell.hosts[ROBOT]
         host.driver = Forgetful([cell.decomposition.subnet("robot")], 1.0)
-        host.said = {place: Answer.NOT_RECEIVED}
         await asyncio.sleep(1)
         assert host.resume()
         await asyncio.sleep(20)
@@ -242,7 +240,7 @@ def test_a_host_that_is_stopping_promises_nothing_more(tmp_path: Path) -> None:
         host, controller = cell.hosts[ROBOT], cell.hosts[ROBOT].controllers["robot"]
         name = next(n for n, part in controller.parts.items() if part.enabled(controller.word))
         host.stop()
-        host.arrived(COORDINATOR, "robot", VoteRequest("robot", 7 << 40, (name,), 0, -1))
+        host.peers.arrived(COORDINATOR, "robot", VoteRequest("robot", 7 << 40, (name,), 0, -1))
         await asyncio.sleep(0.1)
         assert not controller.promises
         await cell.stop()
@@ -254,7 +252,7 @@ def test_what_was_missed_is_said_again_as_soon_as_the_line_is_back(tmp_path: Pat
     async def main() -> None:
         cell = Cell(tmp_path)
         for host in cell.hosts.values():
-            host.resend_seconds = 1e6
+            host.peers.repeat_seconds = 1e6
         await asyncio.sleep(7.3)
         cell.exchange.cut(cell.links[CENTRE])
         await asyncio.sleep(5)
@@ -304,15 +302,13 @@ def test_a_host_that_is_to_resume_by_itself_commands_nothing_after_a_stop(
         cell = Cell(tmp_path)
         await asyncio.sleep(2.5)
         await cell.kill(ROBOT)
-        cell.start(ROBOT)
+        cell.start(ROBOT, resume=True)
         host = cell.hosts[ROBOT]
         driver = host.driver = Slow([cell.decomposition.subnet("robot")], 1.0)
-        resuming = asyncio.create_task(_resume(host))
         await asyncio.sleep(0.1)
         assert host.controllers["robot"].commands.questions
         end(host)
         await cell.tasks[ROBOT]
-        await asyncio.wait_for(resuming, 1)  # it does not try for ever
         assert driver.sent == 0
         assert not host.resume()
         await cell.stop()
@@ -320,7 +316,7 @@ def test_a_host_that_is_to_resume_by_itself_commands_nothing_after_a_stop(
     run_in_virtual_time(main())
 
 
-def test_a_command_that_is_decided_when_the_driver_fails_is_asked_after_at_the_restart(tmp_path: Path) -> None:
+def test_a_command_that_is_decided_when_the_driver_fails_is_asked_after_at_the_restart() -> None:
     class Kept(MemoryJournal):
         durable: Mapping[str, Stored] = {}
 
@@ -338,13 +334,13 @@ def test_a_command_that_is_decided_when_the_driver_fails_is_asked_after_at_the_r
         decomposition, journal = split(parse_net(LAMP)), Kept()
         driver = Noting([decomposition.subnet("a")], 1.0)
         link = InProcessLink(Exchange(), Greeting("d", ("a",)))
-        trace = HostTrace(decomposition.net, ("a",), tmp_path / "trace", journal.kept(TRACE))
-        host = Host(decomposition, ("a",), driver, link, trace, journal)
+        recorder = Recorder(decomposition.net, "", None, None, ("a",))
+        host = Host(decomposition, driver, recorder, machines=("a",), link=link, journal=journal)
         ending = asyncio.create_task(host.main())
         await asyncio.sleep(0.05)
-        host.arrived("", "a", VoteRequest("a", 0, ("hand",), 0, -1))
+        host.peers.arrived("", "a", VoteRequest("a", 0, ("hand",), 0, -1))
         await asyncio.sleep(0.05)
-        host.arrived("", "a", Decision("a", 0, "hand", 0, -1))
+        host.peers.arrived("", "a", Decision("a", 0, "hand", 0, -1))
         host.driver_fault("A", "failed")
         assert (await ending).state is State.FAULT
         assert driver.sent == 0

@@ -18,7 +18,7 @@ from firable.executor.cell.plant import Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.journal.journal import MemoryJournal
-from firable.executor.operating.execution import Execution
+from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.running import Operator, RunReport
 from firable.executor.protocol.commands import Answer
@@ -74,9 +74,9 @@ def run_here(
 ) -> tuple[RunReport, Trace | None]:
     """A run with a journal, or its taking up; with `seconds`, the operator stops it then."""
 
-    async def stops(execution: Any) -> None:
+    async def stops(host: Any) -> None:
         await asyncio.sleep(seconds or 0)
-        execution.stop()
+        host.stop()
 
     report = execute(
         decomposition_of("one_robot"),
@@ -125,12 +125,12 @@ def test_run_is_not_resumed_on_a_guess_and_goes_on_when_the_operator_has_said(tm
 
 
 def test_operator_who_is_there_resumes_a_run(tmp_path: Path) -> None:
-    async def resumes(execution: Any) -> None:
-        await execution.quiet()
-        assert execution.situation().state is State.HELD
-        while execution.situation().state is State.HELD:
+    async def resumes(host: Any) -> None:
+        await host.quiet()
+        assert host.situation().state is State.HELD
+        while host.situation().state is State.HELD:
             await asyncio.sleep(0.1)
-            execution.resume()
+            host.resume()
 
     left = half_done(tmp_path)
     looked = run_here(left)[0].situation  # to look changes nothing
@@ -241,9 +241,9 @@ def test_nothing_leaves_that_the_journal_does_not_have(syncs: int) -> None:
             super().send(place, entry)
 
     driver = Noting(plant, net)
-    execution = Execution(decomposition_of("one_robot"), driver, Recorder(net, "", stream), journal=journal)
+    host = Host(decomposition_of("one_robot"), driver, Recorder(net, "", stream), journal=journal)
     with pytest.raises(InputError, match="the disk is full"):
-        run_in_virtual_time(execution.main())
+        run_in_virtual_time(host.main())
     assert all(left >= 0 for left, _ in sent)
     assert driver.stopped  # the safe outputs were driven
     written = [json.loads(line) for line in stream.getvalue().splitlines()]

@@ -10,7 +10,7 @@ import pytest
 from support.cells import decomposition_of, firings, plant_of
 from support.evidence_names import document_naming
 
-from firable.executor.operating.execution import Execution
+from firable.executor.operating.host import Host
 from firable.executor.operating.running import load, run
 from firable.nets.bundle import Bundle, write_bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
@@ -110,10 +110,10 @@ def test_refused_run_leaves_an_older_trace_as_it_is(tmp_path: Path) -> None:
 
 
 def test_trace_is_on_disk_as_far_as_it_goes_while_the_run_waits(tmp_path: Path) -> None:
-    async def operator(execution: Execution) -> None:
-        while firings(execution) < 3:
+    async def operator(host: Host) -> None:
+        while firings(host) < 3:
             await asyncio.sleep(0.5)
-        await execution.quiet()
+        await host.quiet()
         so_far.append(parse_trace((tmp_path / "trace").read_text("utf-8")))
 
     so_far: list[Trace] = []
@@ -130,7 +130,7 @@ def test_full_disk_is_an_error_of_the_trace(workpieces: int) -> None:
 
 
 def test_other_errors_of_the_system_are_not_taken_for_errors_of_the_trace(tmp_path: Path) -> None:
-    async def operator(execution: Execution) -> None:
+    async def operator(host: Host) -> None:
         raise ConnectionResetError("the panel is gone")
 
     with pytest.raises(ConnectionResetError):

@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from importlib.metadata import EntryPoint
-from pathlib import Path
 
 import pytest
 from support.third_party_driver import MemoryEnd
@@ -25,9 +24,7 @@ from firable.executor.drivers.far_side.machine import ROLES
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import Greeting
-from firable.executor.operating.execution import Execution
 from firable.executor.operating.host import Host
-from firable.executor.operating.host_trace import HostTrace
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import State
 from firable.executor.protocol.messages import Effect, Firing, Sending
@@ -73,36 +70,33 @@ class Queue(DryRunDriver):
         self.waiting.clear()
 
 
-async def present(_: Execution) -> None:
+async def present(_: Host) -> None:
     await asyncio.sleep(3600)
 
 
-def execution(driver: Queue, journal: Journal, _: Path, *, resume: bool = False) -> Execution:
+def whole(driver: Queue, journal: Journal, *, resume: bool = False) -> Host:
     recorder = Recorder(NET, net_digest(NET), io.StringIO())
-    return Execution(SPLIT, driver, recorder, journal=journal, operator=present, overdue_seconds=30, resume=resume)
+    return Host(SPLIT, driver, recorder, journal=journal, operator=present, overdue_seconds=30, resume=resume)
 
 
-def host(driver: Queue, journal: Journal, folder: Path, *, resume: bool = False) -> Host:
-    link, trace = InProcessLink(Exchange(), Greeting("d", ("a",))), HostTrace(NET, ("a",), folder / "trace", {})
-    made = Host(SPLIT, ("a",), driver, link, trace, journal, overdue_seconds=30)
-    if resume:
-        asyncio.get_running_loop().call_later(0.5, made.resume)
-    return made
+def among_others(driver: Queue, journal: Journal, *, resume: bool = False) -> Host:
+    link, recorder = InProcessLink(Exchange(), Greeting("d", ("a",))), Recorder(NET, "", None, None, ("a",))
+    return Host(SPLIT, driver, recorder, machines=("a",), link=link, journal=journal, overdue_seconds=30, resume=resume)
 
 
-Make = Callable[..., "Execution | Host"]
-RUNS = pytest.mark.parametrize("make", [execution, host], ids=["one process", "host"])
+Make = Callable[..., Host]
+RUNS = pytest.mark.parametrize("make", [whole, among_others], ids=["whole", "among others"])
 
 
-def marking(run: Execution | Host) -> tuple[str, ...]:
+def marking(run: Host) -> tuple[str, ...]:
     return tuple(name for each in run.controllers.values() for name in each.subnet.names(each.marking))
 
 
 @RUNS
-def test_token_without_completion_waits_until_the_machine_has_its_command(make: Make, tmp_path: Path) -> None:
+def test_token_without_completion_waits_until_the_machine_has_its_command(make: Make) -> None:
     async def main() -> None:
         driver = Queue()
-        run = make(driver, MemoryJournal(), tmp_path)
+        run = make(driver, MemoryJournal())
         ending = asyncio.create_task(run.main())
         await asyncio.sleep(20)
         assert driver.waiting == [(NET.place("a.lamp"), 1)]
@@ -120,9 +114,9 @@ def test_token_without_completion_waits_until_the_machine_has_its_command(make: 
 
 
 @RUNS
-def test_command_that_no_machine_takes_is_overdue(make: Make, tmp_path: Path) -> None:
+def test_command_that_no_machine_takes_is_overdue(make: Make) -> None:
     async def main() -> None:
-        ended = await make(Queue(), MemoryJournal(), tmp_path).main()
+        ended = await make(Queue(), MemoryJournal()).main()
         assert ended.state is State.FAULT
         assert "'A OPEN' of 'a.lamp'" in ended.message
         assert "its machine has not taken it within 30 s" in ended.message
@@ -132,12 +126,10 @@ def test_command_that_no_machine_takes_is_overdue(make: Make, tmp_path: Path) ->
 
 @RUNS
 @pytest.mark.parametrize("ends", ["stop", "emergency stop", "fault"])
-def test_command_that_was_in_the_queue_when_the_run_ended_is_asked_after_and_sent_again(
-    make: Make, ends: str, tmp_path: Path
-) -> None:
+def test_command_that_was_in_the_queue_when_the_run_ended_is_asked_after_and_sent_again(make: Make, ends: str) -> None:
     async def main() -> None:
         journal = MemoryJournal()
-        run = make(Queue(), journal, tmp_path)
+        run = make(Queue(), journal)
         ending = asyncio.create_task(run.main())
         await asyncio.sleep(1)
         if ends == "stop":
@@ -148,7 +140,7 @@ def test_command_that_was_in_the_queue_when_the_run_ended_is_asked_after_and_sen
             run.emergency_stop("a person")
         await ending
         driver = Queue()
-        again = make(driver, journal, tmp_path, resume=True)
+        again = make(driver, journal, resume=True)
         ending = asyncio.create_task(again.main())
         await asyncio.sleep(1)
         assert driver.waiting == [(NET.place("a.lamp"), 1)]
@@ -167,11 +159,11 @@ def test_what_a_firing_leaves_behind_is_given_up_also_where_it_has_not_left_the_
     driver = Queue()
     driver.send(NET.place("a.lamp"), 1)
     leaving = deque([Sending("a.lamp", 2), Sending("b.lamp", 1)])
-    assert withdraw(driver, NET, "begin", leaving) == []
-    assert withdraw(driver, NET, "end", leaving) == ["a.lamp"]
+    assert withdraw(driver, [NET.place("a.free")], leaving) == []
+    assert withdraw(driver, [NET.place("a.lamp")], leaving) == ["a.lamp"]
     assert (driver.waiting, list(leaving)) == ([], [Sending("b.lamp", 1)])
     others: list[Effect] = [Firing("t"), Sending("a.lamp", 1)]
-    assert withdraw(driver, NET, "end", others) == ["a.lamp"]
+    assert withdraw(driver, [NET.place("a.lamp")], others) == ["a.lamp"]
     assert others == [Firing("t")]
 
 

@@ -3,7 +3,7 @@
 from functools import cache
 
 from firable.decompose.splitting.cut import split
-from firable.executor.operating.execution import Execution
+from firable.executor.operating.host import Host
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.machines.plant_file import PlantModel, read_plant
@@ -19,5 +19,5 @@ def plant_of(cell: str) -> PlantModel:
     return read_plant(catalogue_path(cell).with_name(f"{cell}.plant.yaml"))
 
 
-def firings(execution: Execution) -> int:
-    return sum(execution.recorder.firings.values())
+def firings(host: Host) -> int:
+    return sum(host.recorder.firings.values())

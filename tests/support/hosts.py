@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from firable.decompose import split
 from firable.executor.drivers.dry_run import DryRunDriver
@@ -11,7 +12,7 @@ from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import COORDINATOR, Greeting, Link
 from firable.executor.operating.host import Host
-from firable.executor.operating.host_trace import TRACE, HostTrace
+from firable.executor.operating.recorder import KEY, TRACE, Recorder, TraceFile, size_bytes_of
 from firable.executor.operating.situation import Situation
 from firable.nets.catalogue import catalogue_net
 from firable.semantics.joining import join
@@ -52,10 +53,14 @@ class Cell:
         """The trace of a host."""
         return self.folder / f"{machines[0] or 'coordinator'}.trace"
 
-    def start(self, machines: tuple[str, ...], shown: Mapping[str, bool] | None = None) -> None:
+    def start(self, machines: tuple[str, ...], shown: Mapping[str, bool] | None = None, **options: Any) -> None:
         """Start a host, or start it anew."""
         journal = self.journals[machines]
-        trace = HostTrace(self.net, machines, self.path(machines), journal.kept(TRACE))
+        kept = journal.kept(TRACE).get(KEY)
+        now = asyncio.get_running_loop().time()
+        recorder = Recorder(
+            self.net, "", TraceFile(self.path(machines), size_bytes_of(kept)), kept, machines, began=1e9 + now
+        )
         subnets = [subnet for subnet in self.decomposition.subnets if subnet.name in machines]
         greeting = Greeting("d", machines)
         link: Link
@@ -65,12 +70,14 @@ class Cell:
             link = self.links[machines] = InProcessLink(self.exchange, greeting)
         host = self.hosts[machines] = Host(
             self.decomposition,
-            machines,
             DryRunDriver(subnets, self.seconds, shown),
-            link,
-            trace,
-            journal,
+            recorder,
+            machines=machines,
+            link=link,
+            journal=journal,
+            begin_seconds=1e9 + now - recorder.began,
             tell=lambda kind, sentence: self.told.append((kind, sentence)),
+            **options,
         )
         self.tasks[machines] = asyncio.create_task(host.main())
 

@@ -23,7 +23,7 @@ from firable.executor.cell.cell_log import CellLog
 from firable.executor.cell.plant import Plant
 from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.journal.sqlite_journal import SqliteJournal
-from firable.executor.operating.execution import Execution
+from firable.executor.operating.acts import Acts
 from firable.executor.operating.recorder import Recorder, TraceFile
 from firable.executor.operating.running import execute
 
@@ -80,7 +80,7 @@ def live(folder: Path, cell: str, workpieces: int, seed: int, last: int) -> None
     """One process: until it is killed, or the run ends."""
     moments = Moments(last)
     for owner, name in (
-        (Execution, "_act"),
+        (Acts, "act"),
         (SqliteJournal, "sync"),
         (SqliteJournal, "_bear_witness"),
         (Recorder, "flush"),

@@ -17,7 +17,7 @@ from firable.executor.drivers.far_side.cell import CellServer
 from firable.executor.drivers.far_side.end import FarEnd
 from firable.executor.drivers.far_side.ends import binding_text, ends_of
 from firable.executor.drivers.far_side.serial_device import SerialEnd
-from firable.executor.operating.execution import Execution
+from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import Situation, State
 from firable.nets.interchange import net_digest
@@ -70,16 +70,15 @@ async def served(workpieces: int, *disturbances: Disturbance, speed: float = 50.
 async def executed(one: Served, done: Callable[[], object], *, overdue_seconds: float = 20.0) -> Situation:
     """Run the net on a served cell until something is so; the trace must be one of the net."""
 
-    async def operator(execution: Execution) -> None:
+    async def operator(host: Host) -> None:
         await until(done, "the work in the cell")
-        execution.stop()
+        host.stop()
 
     stream = io.StringIO()
     recorder = Recorder(NET, net_digest(NET), stream)
     driver = bound_driver(one.binding, NET)
-    execution = Execution(DECOMPOSITION, driver, recorder, operator=operator, overdue_seconds=overdue_seconds)
-    situation = await execution.main()
-    recorder.end(execution.now_seconds(), situation.state.value)
+    host = Host(DECOMPOSITION, driver, recorder, operator=operator, overdue_seconds=overdue_seconds)
+    situation = await host.main()
     assert replay(NET, parse_trace(stream.getvalue())).complete
     return situation
 

@@ -1,0 +1,330 @@
+"""The acts of the machines of one host, in groups: what they are given, what they keep, what leaves.
+
+Machines are pure: a message, a signal, or their turn to fire goes in, effects come out. What a machine says to another
+one of the same host is that one's next act, since a crash loses both or none. All acts of one turn of the event loop
+are one *group*; at its end comes the one sync of the journal, then the lines of the trace, and then the caller lets go
+of what leaves the host, commands and messages, in the order of the acts. So a signal and the command that follows from
+it, whatever controllers and coordinators say about it in between, are one callback and one sync (`journal.py` says why
+messages need not wait for the sync within a host).
+
+A signal is not acted upon inside the call that tells it. A driver tells in the middle of its own bookkeeping, and would
+be commanded there; and signals that come together would cost a sync each.
+
+Nothing here waits, and nothing here is a machine's: no rule of the protocol stands in this file.
+
+Rejected: a task and a mailbox for each machine. Messages between them are then turns of the event loop, of which a
+coordinated transition takes a dozen, and nothing gained: acts exclude each other anyway.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Final, assert_never
+
+from firable.executor.journal.journal import Journal
+from firable.executor.links.link import called
+from firable.executor.operating.clock import RunClock
+from firable.executor.operating.figures import Figures
+from firable.executor.operating.recorder import TRACE, Recorder
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.deciders import coordinators
+from firable.executor.protocol.messages import (
+    Acknowledgement,
+    Decision,
+    Effect,
+    Firing,
+    Hello,
+    Keep,
+    Message,
+    ProtocolError,
+    Report,
+    Sending,
+    Taken,
+    ToController,
+    ToCoordinator,
+    Vote,
+    VoteRequest,
+)
+from firable.nets.decomposition import Decomposition
+
+ACTS_AT_ONCE_MAX: Final = 250
+"""So many acts are one group at most; then they become durable, and the driver, the link and the operator are heard."""
+
+
+@dataclass(frozen=True, slots=True)
+class SignalRead:
+    """A driver's word to a controller: a new value of one of its signals."""
+
+    signal: str
+    value: bool
+    entry: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class CommandTaken:
+    """A driver's word to a controller: the machine has the command of one of its places."""
+
+    place: str
+    entry: int
+
+
+Item = Message | SignalRead | CommandTaken | None
+"""What a machine is given; None is a controller's turn to fire."""
+
+
+class Acts:
+    """The machines of these names, as the journal kept them, and what they do.
+
+    `wake` is called when there is something to do; `left` when a controller's part of a transition has fired.
+    """
+
+    def __init__(
+        self,
+        decomposition: Decomposition,
+        names: Collection[str],
+        journal: Journal,
+        recorder: Recorder,
+        figures: Figures | None,
+        wake: Callable[[], None],
+        left: Callable[[str, str], None],
+    ) -> None:
+        self.journal = journal
+        self.recorder = recorder
+        self.figures = figures
+        self.wake = wake
+        self.left = left
+        self.coordinators = {
+            name: Coordinator.restored(decomposition, journal.kept(name), name)
+            for name in coordinators(decomposition)
+            if name in names
+        }
+        self.controllers = {
+            subnet.name: LocalController.restored(decomposition, subnet.name, journal.kept(subnet.name))
+            for subnet in decomposition.subnets
+            if subnet.name in names
+        }
+        self.posted: deque[tuple[str, Item]] = deque()
+        """What the machines here are given next."""
+        self.leaving: list[Sending | Message] = []
+        """What leaves the host when this group is durable."""
+        self.unsynced = False
+        self.has_news = False
+        """Whether anything is said to other hosts for the first time."""
+        self.halted = False
+        """Whether nothing may fire here by itself, nor be promised to the coordinators of other hosts."""
+        self.withheld: dict[tuple[str, int], VoteRequest] = {}
+        """What those have asked for meanwhile."""
+        self.clock: RunClock | None = None
+        self.ticks: dict[str, asyncio.TimerHandle] = {}
+        """For each controller with a time that runs, when it is told the time next."""
+        self.messages = 0
+        self.repeats = 0
+        self.heard = False
+        """Whether anything came from outside since the last firing."""
+        self.fired_seconds = -1.0
+        self.fired_at_once: deque[str] = deque(maxlen=1)
+        self.firings_at_once = 0
+        """How many transitions have fired without that, or at one instant."""
+
+    # What they are given
+
+    def start(self) -> None:
+        """The first act of each."""
+        for machine, coordinator in self.coordinators.items():
+            self.act(machine, coordinator.start())
+        for machine, controller in self.controllers.items():
+            self.act(machine, controller.start())
+            self.post(machine, None)
+
+    def post(self, machine: str, item: Item) -> None:
+        """Have a machine given something, behind what was posted before."""
+        self.posted.append((machine, item))
+        self.wake()
+
+    def hear(self, machine: str, item: Item) -> None:
+        """The same, of what comes from outside the host: a signal, a message, the time."""
+        self.heard = True
+        self.post(machine, item)
+
+    def group(self) -> None:
+        """Acts until nothing is posted, or they are many."""
+        for _ in range(ACTS_AT_ONCE_MAX):
+            if not self.posted:
+                return
+            self._give(*self.posted.popleft())
+
+    def permit(self, firings: int | None) -> None:
+        """Let each coordinator commit so many transitions from now on; None is without limit."""
+        for machine, coordinator in self.coordinators.items():
+            self.act(machine, coordinator.permit(firings))
+
+    def go_on(self) -> None:
+        """End a halt: what was withheld is answered, and everybody has a turn."""
+        self.halted = False
+        self.permit(None)
+        for request in self.withheld.values():
+            self.post(request.controller, request)
+        self.withheld.clear()
+        for machine in self.controllers:
+            self.post(machine, None)
+
+    def fire(self, machine: str) -> None:
+        """Let a controller fire one local transition, although nothing may fire by itself."""
+        controller = self.controllers[machine]
+        self.act(machine, controller.fire())
+        self._tick(machine)
+        self.act(machine, controller.report())
+
+    def repeat(self) -> None:
+        """Say again what is unanswered."""
+        for machine, coordinator in self.coordinators.items():
+            self.act(machine, coordinator.resend(), again=True)
+        for machine, controller in self.controllers.items():
+            self.act(machine, controller.resend(), again=True)
+
+    def end(self) -> None:
+        """Tell nobody the time any more."""
+        for timer in self.ticks.values():
+            timer.cancel()
+
+    def _give(self, machine: str, item: Item) -> None:
+        """One act of one machine, and a controller's turn to fire and to report."""
+        if (coordinator := self.coordinators.get(machine)) is not None:
+            if not isinstance(item, ToCoordinator):
+                raise ProtocolError(f"{called(machine)} was sent {item!r}")
+            self.act(machine, coordinator.receive(item))
+            return
+        controller = self.controllers[machine]
+        match item:
+            case VoteRequest() if self.halted and item.coordinator not in self.coordinators:
+                self.withheld[machine, item.round] = item
+                return
+            case VoteRequest() | Decision() | Hello():
+                self._receive(machine, controller, item)
+            case SignalRead(signal, value, entry):
+                self.act(machine, controller.read(signal, value, entry))
+            case CommandTaken(place, entry):
+                self.act(machine, controller.sent(place, entry))
+            case None:
+                pass
+            case unknown:
+                raise ProtocolError(f"{called(machine)} was sent {unknown!r}")
+        self._tick(machine)
+        if not self.halted and (fired := controller.fire()):
+            self.act(machine, fired)
+            self.posted.append((machine, None))
+            self._tick(machine)
+        self.act(machine, controller.report())
+
+    def _receive(self, machine: str, controller: LocalController, item: ToController) -> None:
+        known = frozenset(controller.promises)
+        effects = controller.receive(item)
+        if isinstance(item, Decision) and item.committed in controller.parts and item.round in known:
+            self.recorder.applied(self.now_seconds(), machine, item.round, str(item.committed))
+            self.left(machine, str(item.committed))
+        self.act(machine, effects, known)
+
+    def _tick(self, machine: str) -> None:
+        """Tell a controller the time, and see to it that it is told again when the next of its times is over."""
+        controller = self.controllers[machine]
+        self.act(machine, controller.tick(self.now_seconds()))
+        if (earlier := self.ticks.pop(machine, None)) is not None:
+            earlier.cancel()
+        if self.clock is not None and (due := controller.deadline()) is not None:
+            delay = self.clock.loop_delay_seconds(due)
+            self.ticks[machine] = self.clock.loop.call_later(delay, self.hear, machine, None)
+
+    # What comes of it
+
+    def now_seconds(self) -> float:
+        """The time since the run began."""
+        return self.clock.now_seconds() if self.clock is not None else self.recorder.at_seconds
+
+    def act(self, machine: str, effects: list[Effect], known: Collection[int] = (), *, again: bool = False) -> None:
+        """Take the effects of one act: writes to the journal, messages to machines here, the rest to those who wait.
+
+        `known` are the rounds that the controller has voted in before; `again`: all are repeated.
+        """
+        if not effects:
+            return
+        self.journal.write(machine, effects)
+        now = self.now_seconds()
+        for effect in effects:
+            match effect:
+                case Keep():
+                    self.unsynced = True
+                case Firing(transition):
+                    self._fired(now, machine, transition, effects)
+                case Taken(signal, value):
+                    self.recorder.signal(now, signal, value)
+                case Sending(place, again=once_more):
+                    if once_more:  # its line stands in the trace since before the restart
+                        self.recorder.note(now, "sent again", place=place)
+                    else:
+                        self.recorder.sent(now, place)
+                    self.leaving.append(effect)
+                case VoteRequest() | Decision() | Hello():
+                    self._say(effect.controller, effect, again=again)
+                case Vote(controller, number, promised):
+                    is_new = not again and number not in known
+                    if is_new:
+                        self.recorder.voted(now, controller, number, promised)
+                    self._say(effect.coordinator, effect, again=not is_new)
+                case Report() | Acknowledgement():
+                    self._say(effect.coordinator, effect, again=again)
+                case _:
+                    assert_never(effect)
+        self.wake()
+
+    def _fired(self, now: float, machine: str, transition: str, effects: list[Effect]) -> None:
+        number = None
+        if machine in self.coordinators:
+            number = next(e.round for e in effects if isinstance(e, Decision) and e.committed == transition)
+        else:
+            self.left(machine, transition)
+        self.recorder.fired(now, transition, number)
+        if self.heard and now != self.fired_seconds:
+            self.firings_at_once = 0
+        self.heard, self.fired_seconds = False, now
+        self.firings_at_once += 1
+        self.fired_at_once.append(transition)
+
+    def _say(self, receiver: str, message: Message, *, again: bool) -> None:
+        self.messages += 1
+        self.repeats += again
+        if self.figures is not None:
+            self.figures.message(message, again=again)
+        if receiver in self.coordinators or receiver in self.controllers:
+            self.posted.append((receiver, message))
+        else:
+            self.leaving.append(message)
+            self.has_news |= not again
+
+    def commit(self) -> list[Sending | Message]:
+        """Make the group durable, and tell it in the trace; returns what leaves the host now, or is never sent.
+
+        Raises `InputError` where journal or trace cannot be written; then the process must end.
+        """
+        leaving, self.leaving = self.leaving, []
+        if self.unsynced:
+            self.unsynced = False
+            self.journal.write(TRACE, self.recorder.keep())
+            self.journal.sync()
+        self.recorder.flush()
+        return leaving
+
+    # What is open
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether nothing is open: whatever was decided is applied, and no part is promised."""
+        rounds = (opened for coordinator in self.coordinators.values() for opened in coordinator.rounds.values())
+        return (
+            not self.posted
+            and all(opened.decided and opened.committed is None for opened in rounds)
+            and not any(p.promised for controller in self.controllers.values() for p in controller.promises.values())
+        )

@@ -1,0 +1,73 @@
+"""When a run is over, asked at quiescence, and what it is doing until then.
+
+A run of a whole cell ends by itself when its work is done or nothing can go on, unless an operator is there who may
+change that. A host among others never does: its machines rest because others work. It ends when it is stopped, and not
+before nobody waits for a word of it, as far as that comes in time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import takewhile
+from typing import TYPE_CHECKING
+
+from firable.executor.operating import restart
+from firable.executor.operating.situation import Situation, State, blocked, blocked_parts
+
+if TYPE_CHECKING:
+    from firable.executor.operating.host import Host
+
+
+def situation(run: Host) -> Situation:
+    """What a host is doing, and what waits for what; exact at quiescence, as far as its machines know."""
+    others = "; ".join(sentence for sentence in run.peers.waits() if run.taking_up is None or "is held" not in sentence)
+    if run.is_whole:
+        waiting = tuple(blocked(run.recorder.player, run.recorder.word, run.untaken))
+    else:
+        waiting = tuple(one for each in run.controllers.values() for one in blocked_parts(each, run.untaken))
+    if run.fault:
+        return Situation(State.FAULT, run.marking, waiting, run.fault)
+    if run.stopping:
+        return Situation(State.STOPPED, run.marking, waiting, run.ended_by or others)
+    if run.taking_up is not None:
+        held = restart.told(run, run.taking_up)
+        return Situation(State.HELD, run.marking, (), "; ".join(filter(None, (held, others))))
+    if not run.is_quiet and not run.paused:
+        return Situation(State.RUNNING, run.marking, (), others)
+    if run.is_whole and run.recorder.is_deadlock:
+        message = "no transition can fire any more, whatever the signals do"
+        return Situation(State.DEADLOCK, run.marking, waiting, message)
+    return Situation(State.PAUSED if run.paused else State.WAITING, run.marking, waiting, others)
+
+
+def ended(run: Host) -> Situation | None:
+    """How the run has ended; None where it goes on."""
+    if not run.is_whole:
+        return situation(run) if run.stopping and (run.has_waited or _nobody_waits(run)) else None
+    if run.stopping:
+        return situation(run)
+    if run.taking_up is not None:
+        if not run.taking_up.is_final or run.operated:
+            return None
+        if run.was_done and run.is_complete():
+            message = "this run was done before, and nothing moved; to run the bundle again, name a new journal"
+            return replace(situation(run), state=State.DONE, message=message)
+        return situation(run)
+    # What a pause holds back still has to fire before the cycle, or the work, is at its end.
+    if run.at_rest and run.draining and not run.paused:
+        return replace(situation(run), state=State.STOPPED, message="stopped at the end of the cycle")
+    if run.at_rest and run.is_complete() and not (run.paused and run.operated):
+        return replace(situation(run), state=State.DONE, blocked=())
+    # With an operator present, a cell at rest is waited for: it may be paused, or be given work.
+    is_stuck = run.at_rest and not run.operated
+    return situation(run) if is_stuck or run.recorder.is_deadlock else None
+
+
+def _nobody_waits(run: Host) -> bool:
+    """Whether nothing is open here, all rounds of coordinators here are closed, and those above have ended.
+
+    Hosts end from the top down: each waits for the coordinators before its own, without any for all.
+    """
+    before = takewhile(lambda name: name not in run.coordinators, run.deciding)
+    is_heard = all(each.idle for each in run.coordinators.values()) and run.peers.connected_to.isdisjoint(before)
+    return run.acts.is_settled and is_heard

@@ -1,0 +1,152 @@
+"""The other hosts, as one host knows them: who is reached, who never was, what they may say, what is repeated.
+
+*Watching*: a peer that is lost or refused is told, with what waits for it; so is one that has not come within
+`MEET_SECONDS`, because a name that was written wrong, a cable or a host that nobody has started look the same, a link
+that connects to nobody and is silent about it. Nothing else changes: a controller that has promised waits for the
+decision whoever is gone (O6), and one that has not goes on alone as far as its own transitions go.
+
+*Repeats*: what is unanswered is repeated after `REPEAT_SECONDS`, then at twice that, and so on up to
+`REPEAT_SECONDS_MAX` (exponential backoff), because a coordinator has no word for "heard" when there is nothing to
+decide, and an idle cell would talk for ever. As soon as something new is said the repeats begin anew, and a peer that
+is back is told at once.
+
+Where all machines are on one host there are no others, and this does nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from firable.executor.links.link import Link, called
+from firable.executor.operating.acts import Acts
+from firable.executor.operating.waits import reached, waits
+from firable.executor.protocol.deciders import coordinators
+from firable.executor.protocol.messages import Message, ToController
+from firable.nets.decomposition import Decomposition
+from firable.nets.diagnostics import Diagnostic
+
+REPEAT_SECONDS: Final = 0.2
+REPEAT_SECONDS_MAX: Final = 3.2
+MEET_SECONDS: Final = 3.0
+"""A peer that has not been met by then is told."""
+
+
+class Peers:
+    """The machines of other hosts, behind a link; `told` hears of them, by the kind of news and a sentence."""
+
+    def __init__(
+        self,
+        decomposition: Decomposition,
+        acts: Acts,
+        link: Link | None,
+        told: Callable[[str, str], None],
+        repeat_seconds: float,
+    ) -> None:
+        self.acts = acts
+        self.link = link
+        self.told = told
+        self.repeat_seconds = self.pause_seconds = repeat_seconds
+        here = {*acts.coordinators, *acts.controllers}
+        self.names = {*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets)} - here
+        deciding = {above for controller in acts.controllers.values() for above in controller.above}
+        voting = {
+            c for each in acts.coordinators.values() for took_part in each.participants.values() for c in took_part
+        }
+        self.needed = tuple(sorted((deciding | voting) - here))
+        """Those that some machine here talks to."""
+        self.connected_to: set[str] = set()
+        self.met: set[str] = set()
+        self.is_due = False
+        """Whether all should have come by now."""
+        self.timer: asyncio.TimerHandle | None = None
+
+    async def run(self) -> None:
+        """Be linked to them until cancelled; raises `InputError` where the link cannot be opened, or fails."""
+        if self.link is None:
+            return
+        loop = asyncio.get_running_loop()
+        watchdog = loop.call_later(MEET_SECONDS, self._should_have_come)
+        self._repeat_later(self.repeat_seconds)
+        try:
+            await self.link.run(self)
+        finally:
+            watchdog.cancel()
+            if self.timer is not None:
+                self.timer.cancel()
+
+    def send(self, message: Message) -> None:
+        """Hand a message to the link."""
+        if self.link is None:
+            raise RuntimeError(f"nobody here takes {message!r}")
+        controller, coordinator = message.controller, message.coordinator
+        to_controller = isinstance(message, ToController)
+        self.link.send(*((coordinator, controller) if to_controller else (controller, coordinator)), message)
+
+    def something_new(self) -> None:
+        """Something was said for the first time: repeats begin anew."""
+        if self.pause_seconds > self.repeat_seconds and self.timer is not None:
+            self._repeat_later(self.repeat_seconds)
+
+    def waits(self) -> Iterator[str]:
+        """What waits for another machine, in a sentence each."""
+        yield from waits(self.acts.coordinators, self.acts.controllers, self.names - self.connected_to)
+        yield from map(_missing, self.never_met)
+
+    @property
+    def never_met(self) -> tuple[str, ...]:
+        """The machines that should have come by now and have not, of those that some machine here talks to."""
+        return tuple(name for name in self.needed if name not in self.met) if self.is_due else ()
+
+    # What the link tells
+
+    def arrived(self, sender: str, receiver: str, message: Message) -> None:
+        """A message of another host; what its sender may not say is dropped."""
+        is_order = isinstance(message, ToController)
+        way = (message.coordinator, message.controller)
+        if (sender, receiver) != (way if is_order else way[::-1]):
+            self.told("dropped", f"{called(sender)} sent a {type(message).__name__} that is not its to send")
+            return
+        self.acts.hear(receiver, message)
+
+    def connected(self, peer: str) -> None:
+        """A peer can be reached: what it has missed is said again."""
+        if peer in self.names:
+            self.connected_to.add(peer)
+            self.met.add(peer)
+            self.told("connected", f"{called(peer)} is connected")
+            self.acts.repeat()
+            self.something_new()
+
+    def lost(self, peer: str) -> None:
+        """A peer can no longer be reached."""
+        if peer in self.names:
+            self.connected_to.discard(peer)
+            waiting = [sentence for sentence in self.waits() if reached(peer, {peer}) in sentence]
+            self.told("lost", "; ".join([f"{called(peer)} is lost", *waiting]))
+
+    def refused(self, peer: str, problem: Diagnostic) -> None:
+        """A host was refused."""
+        self.told("refused", f"{called(peer)} is refused: {problem.message}; {problem.hint}")
+
+    # Time
+
+    def _should_have_come(self) -> None:
+        self.is_due = True
+        for name in self.never_met:
+            self.told("never-met", _missing(name))
+
+    def _repeat_later(self, after_seconds: float) -> None:
+        if self.timer is not None:
+            self.timer.cancel()
+        self.pause_seconds = after_seconds
+        self.timer = asyncio.get_running_loop().call_later(self.pause_seconds, self._repeat)
+
+    def _repeat(self) -> None:
+        self.acts.repeat()
+        self._repeat_later(min(2 * self.pause_seconds, max(REPEAT_SECONDS_MAX, self.repeat_seconds)))
+
+
+def _missing(name: str) -> str:
+    return f"{called(name)} was never reached: is its host started, and the address right?"

@@ -1,0 +1,73 @@
+"""Running a host to its end: on an event loop, in real time or in virtual, obeying signals and an operator elsewhere.
+
+The endpoint serves within the event loop of the run and as long as it lasts (`control.py`), on every host alike: what
+may be done to a whole run may be done to one controller, and an emergency stop there needs neither the coordinator nor
+a link.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.operating.host import Host
+from firable.executor.operating.situation import Situation
+from firable.executor.operating.uncut import ended_by_signals
+from firable.nets.net import Net
+
+if TYPE_CHECKING:  # these need the extra `serve`
+    from firable.executor.operating.control import Endpoint
+    from firable.executor.operating.metrics import Metrics
+
+
+@dataclass(frozen=True)
+class Service:
+    """An operator's endpoint, and who is told its address."""
+
+    endpoint: Endpoint
+    served: Callable[[str], None] = lambda _: None
+
+
+def figures_for(net: Net, service: Service | None, machines: Collection[str] = ()) -> Metrics | None:
+    """What counts for the endpoint, where there is one: of the places of these controllers, or of all."""
+    if service is None:
+        return None
+    from firable.executor.operating.metrics import Metrics
+
+    return Metrics(net, machines)
+
+
+def run_to_the_end(
+    host: Host, service: Service | None = None, figures: Metrics | None = None, *, virtual: bool = False
+) -> Situation:
+    """Run a host on an event loop of its own; Ctrl-C or a request to terminate ends it in order."""
+    if virtual:
+        situation: Situation = run_in_virtual_time(terminable(host))
+        return situation
+    return asyncio.run(terminable(host) if service is None or figures is None else _serving(host, service, figures))
+
+
+async def terminable(host: Host) -> Situation:
+    """The host, which Ctrl-C or a request to terminate ends in order: no machine is left on."""
+    with ended_by_signals():
+        return await host.main()
+
+
+async def _serving(host: Host, service: Service, figures: Metrics) -> Situation:
+    from firable.executor.operating.control import serving
+
+    counted: dict[str, int] = {}
+
+    def text() -> bytes:
+        for signal, reading in host.driver.readings().items():
+            if new := reading.coalesced - counted.get(signal, 0):
+                figures.inputs_coalesced(signal, new)
+                counted[signal] = reading.coalesced
+        return figures.text()
+
+    async with serving(host, service.endpoint, text) as address:
+        service.served(address)
+        return await terminable(host)
