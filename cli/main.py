@@ -23,6 +23,7 @@ from firable.cli import (
     ci,
     convert,
     draw,
+    explain,
     live_io,
     operate,
     prove,
@@ -90,6 +91,7 @@ for _command in (
     verify.verify,
     draw.draw,
     convert.convert,
+    explain.explain,
     ci.ci,
     schema.schema,
 ):

@@ -5,7 +5,8 @@ reported together. The model (`Net`) knows nothing of files: it names the *subje
 `("transitions", "G1", "from", "conveyor.cvx")`, and the reader that built the net knows where each subject stands in
 its text. So the rules of a well-formed net are written once, for text, PNML and nets built by a program.
 
-To add a diagnostic: one row in `CODES`, the place that reports it, a case in the tests of its room.
+To add a diagnostic: one row in `CODES`, the place that reports it, a case in the tests of its room, a page
+in docs/codes.
 """
 
 from __future__ import annotations

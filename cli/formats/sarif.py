@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
 
+from firable.cli.explain import page_of
 from firable.cli.formats.alerts import Alert, alerts, ending, place_of, place_of_name
 from firable.cli.report import ExitCode, Outcome, Report
 from firable.cli.text import reasons
@@ -72,7 +73,7 @@ def _driver(codes: Sequence[str]) -> dict[str, Any]:
             "id": code,
             "name": "".join(word.capitalize() for word in re.findall(r"\w+", CODES[code])),
             "shortDescription": {"text": CODES[code].capitalize()},
-            "help": {"text": f"firable explain {code}"},
+            "help": {"text": f"firable explain {code}", "markdown": page_of(code)},
         }
         for code in codes
     ]

@@ -45,6 +45,8 @@ def test_the_wheel_holds_every_module_and_every_data_file(wheel: Path) -> None:
                 relative = path.relative_to(ROOT)
                 if "engine" not in relative.parts:
                     assert f"firable/{relative}" in names
+    for page in (ROOT / "docs" / "codes").iterdir():
+        assert f"firable/cli/codes/{page.name}" in names
     assert "firable/py.typed" in names
     assert any(name.startswith("firable/analysis/_engine.") for name in names)
     assert any(name.endswith("licenses/LICENSE") for name in names)

@@ -4,35 +4,18 @@ Blocks marked `console` hold commands after `$ ` and their output, in which a li
 within a line for any words. A `yaml` block is saved under the name that the sentence before it gives.
 """
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from support.sessions import fits, run, session
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```(console|yaml)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
-def session(text: str) -> list[tuple[str, str]]:
-    """The commands of a block, each with the output that it shows."""
-    return [(part.partition("\n")[0], part.partition("\n")[2]) for part in re.split(r"^\$ ", text, flags=re.M)[1:]]
-
-
-def fits(shown: str, printed: str) -> bool:
-    pattern = "".join("(?:.*\n)*" if line == "..." else words(line) + "\n" for line in shown.splitlines())
-    return re.fullmatch(pattern, printed) is not None
-
-
-def words(line: str) -> str:
-    return ".*".join(re.escape(part) for part in line.split("..."))
-
-
 def test_every_command_of_the_readme_prints_what_it_shows(tmp_path: Path) -> None:
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     status, commands = 0, 0
     for match in BLOCK.finditer(README):
         kind, text = match.groups()
@@ -41,15 +24,7 @@ def test_every_command_of_the_readme_prints_what_it_shows(tmp_path: Path) -> Non
             (tmp_path / name).write_text(text, encoding="utf-8")
             continue
         for command, shown in session(text):
-            done = subprocess.run(
-                ["bash", "-c", f"(exit {status}); {command}"],
-                cwd=tmp_path,
-                env={**os.environ, "PATH": path, "NO_COLOR": "1", "COLUMNS": "120"},
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-                check=False,
-            )
+            done = run(command, tmp_path, status)
             status, commands = done.returncode, commands + 1
             assert fits(shown, done.stdout), f"$ {command}\n{done.stdout}"
     assert commands >= 10

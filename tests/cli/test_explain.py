@@ -1,0 +1,79 @@
+"""Every code has a page, and what its example shows is what is printed."""
+
+import contextlib
+import io
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from support.sessions import fits, run, session
+
+from firable.cli.main import main
+from firable.nets.diagnostics import CODES
+
+PAGES = Path(__file__).parents[2] / "docs" / "codes"
+BLOCK = re.compile(r"^(?:In `(?P<file>[^`]+)`:\n\n)?```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
+WITH_EXAMPLE = [code for code in CODES if "```console" in (PAGES / f"{code}.md").read_text("utf-8")]
+NEVER_NAMED = {"F3015", "F3016", "F3017", "F3019", "F3022", "F3023"}  # verdicts whose lines need no hint
+
+
+def page(code: str) -> str:
+    return (PAGES / f"{code}.md").read_text("utf-8")
+
+
+def test_there_is_a_page_for_each_code_and_no_other() -> None:
+    assert {path.stem for path in PAGES.iterdir()} == set(CODES)
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_a_page_begins_with_the_code_and_its_title(code: str) -> None:
+    title, blank, text = page(code).split("\n", 2)
+    assert title == f"# {code}: {CODES[code]}"
+    assert not blank
+    assert len(text) > 60
+    assert all(len(line) <= 120 for line in BLOCK.sub("", text).splitlines())
+
+
+def printed(command: str, folder: Path) -> str:
+    if not command.startswith("firable "):
+        return run(command, folder).stdout
+    told = io.StringIO()
+    with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
+        main(shlex.split(command)[1:])
+    return told.getvalue()
+
+
+@pytest.mark.parametrize("code", WITH_EXAMPLE)
+def test_what_a_page_shows_is_printed(code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    commands = 0
+    for block in BLOCK.finditer(page(code)):
+        if block["kind"] != "console":
+            (tmp_path / block["file"]).write_text(block["text"], "utf-8")
+            continue
+        for command, shown in session(block["text"]):
+            told = printed(command, tmp_path)
+            assert fits(shown, told), f"$ {command}\n{told}"
+            commands += 1
+    assert commands
+    assert code in page(code).split("```console")[1] or code in NEVER_NAMED
+
+
+def test_most_codes_show_an_example() -> None:
+    assert len(WITH_EXAMPLE) >= 70
+
+
+@pytest.mark.parametrize("asked", ["F3011", "f3011", "3011", "[F3011]", "error[F3011]"])
+def test_explain_prints_the_page(asked: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", asked]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("F3011: a deadlock can be reached\n")
+    assert "$ firable check cell.firable.yaml" in told
+    assert "```" not in told
+
+
+def test_an_unknown_code_is_refused_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", "F301"]) == 2
+    assert "'F301' is no code of firable. did you mean 'F30" in capsys.readouterr().err
