@@ -6,7 +6,7 @@ the last thing. A connection that has failed in any way is closed and never aske
 pause that doubles up to a bound, and is read before it is written, because what the device shows then decides what is
 still to be sent.
 
-A stop breaks off what is being written and makes new connections until the device has confirmed the safe outputs, or
+A stop breaks off what is being written, if it is not confirmed at once, and makes new connections until the device has confirmed the safe outputs, or
 has had its time.
 
 While the cell runs, the safe outputs are not driven on a *later* connection. What the machines do while the line is
@@ -28,6 +28,9 @@ BEATS: Final = 65_536
 """Heartbeats are numbers from 0, one more each time, and again from 0."""
 
 _CANCELLED_AGAIN_SECONDS: Final = 0.5
+
+_CONFIRMED_SECONDS: Final = 0.02
+"""A command that the device confirms so soon after the stop leaves its connection good for the safe outputs."""
 
 _FAILURES: Final = (LinkError, OSError, TimeoutError)
 
@@ -90,6 +93,11 @@ class Served(Protocol):
         """The device has confirmed that."""
         ...
 
+    @property
+    def is_writing(self) -> bool:
+        """Whether something that is to be written has not been confirmed."""
+        ...
+
 
 class Kept:
     """A device that is kept connected until it is stopped."""
@@ -112,8 +120,8 @@ class Kept:
         self.is_safe = not self.safe
         """Whether the device has confirmed the safe outputs of the stop, where it has any."""
         self.stopping = False
-        self.halt = asyncio.Event()
-        """Set with the stop: a command that is being written is broken off."""
+        self.writing: asyncio.Timeout | None = None
+        """Around a command that is being written: a stop breaks it off."""
         self.stopped = asyncio.Event()
         """The safe outputs have been written for the last time, or cannot be."""
         self.beat = 0
@@ -152,7 +160,8 @@ class Kept:
     def stop(self) -> None:
         """Write the safe outputs and nothing afterwards."""
         self.stopping = True
-        self.halt.set()
+        if self.writing is not None and not self.writing.expired():
+            self.writing.reschedule(asyncio.get_running_loop().time() + _CONFIRMED_SECONDS)
         self.awake.set()
 
     async def _asked_to_stop(self) -> None:
@@ -199,7 +208,8 @@ class Kept:
     async def _read(self, connection: Connection) -> None:
         while True:
             self._take(await connection.read())
-            self.awake.set()
+            if self.served.is_writing:  # what was read may be what the next command waits for
+                self.awake.set()
 
     async def _write(self, connection: Connection) -> None:
         if not self.started and not self.stopping:
@@ -232,16 +242,19 @@ class Kept:
         self.is_safe = True
 
     async def _put(self, connection: Connection, some: Writes) -> None:
-        """Write, and break it off at a stop, so that no machine starts after it; the connection is of no use then."""
-        writing = asyncio.ensure_future(connection.write(some))
-        halting = asyncio.create_task(self.halt.wait())
+        """Write, and break it off at a stop, so that no machine starts after it; the connection is of no use then.
+
+        Without a task of its own, which would be two more turns of the loop on the way of each command.
+        """
         try:
-            await asyncio.wait((writing, halting), return_when=asyncio.FIRST_COMPLETED)
-            if not writing.done():
-                raise LinkError("stopped while something was written")
-            writing.result()
+            async with asyncio.timeout(None) as self.writing:
+                await connection.write(some)
+        except TimeoutError:
+            if self.stopping:
+                raise LinkError("stopped while something was written") from None
+            raise
         finally:
-            await ended((writing, halting))
+            self.writing = None
 
     async def _watch(self) -> None:
         """End the connection when the device has not changed its sign of life in time."""
