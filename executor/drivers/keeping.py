@@ -6,8 +6,8 @@ the last thing. A connection that has failed in any way is closed and never aske
 pause that doubles up to a bound, and is read before it is written, because what the device shows then decides what is
 still to be sent.
 
-A stop breaks off what is being written, if it is not confirmed at once, and makes new connections until the device has confirmed the safe outputs, or
-has had its time.
+A stop breaks off what is being written, if it is not confirmed at once, and makes new connections until the device has
+confirmed the safe outputs, or has had its time.
 
 While the cell runs, the safe outputs are not driven on a *later* connection. What the machines do while the line is
 down is for the device's own watchdog, which knows of it in time; a driver that is back after a second would stop a
