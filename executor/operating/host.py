@@ -30,6 +30,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Mapping
+from dataclasses import replace
 from typing import Final
 
 from firable.executor.drivers.driver import Driver, withdraw
@@ -45,7 +46,7 @@ from firable.executor.operating.peers import REPEAT_SECONDS, Peers
 from firable.executor.operating.recorder import TRACE, Recorder
 from firable.executor.operating.single_step import step
 from firable.executor.operating.situation import Situation, State
-from firable.executor.operating.uncut import uncut
+from firable.executor.operating.uncut import Patience, uncut
 from firable.executor.operating.watching import Watching
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import coordinators
@@ -89,6 +90,7 @@ class Host:
         figures: Figures | None = None,
         settle_seconds: float = SETTLE_SECONDS,
         repeat_seconds: float = REPEAT_SECONDS,
+        patience: Patience | None = None,
     ) -> None:
         self.net = decomposition.net
         self.driver = driver
@@ -131,6 +133,7 @@ class Host:
         self.left_nothing_open = False
         self.ended_by = ""
         self.fault = ""
+        self.patience = patience or Patience()
         self.alarms = Alarms(self.net, overdue_seconds, self._fail)
         self.untaken: set[str] = set()
         """The places whose command has no completion, and is with the driver."""
@@ -168,11 +171,14 @@ class Host:
                 self._make_safe()
             for task in tasks:
                 task.cancel()
-            await uncut(tasks)
+            hanging = await uncut(tasks, self.patience)
             self.acts.end()
             self.alarms.end()
             if self.watching is not None:
                 self.watching.end()
+        if hanging:
+            self.fault = f"{' and '.join(hanging)} did not end in time: look at the machines, they may not be safe"
+            ended = replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, self.fault))))
         if self.left_nothing_open:
             self.recorder.end(self.now_seconds(), self.marking, ended.state.value)
         else:

@@ -15,7 +15,7 @@ from typing import Final
 from firable.executor.drivers.driver import Driver
 from firable.executor.links.link import Greeting, Link
 from firable.executor.operating.host import Host, Told
-from firable.executor.operating.service import Service, figures_for, run_to_the_end
+from firable.executor.operating.service import Service, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.taken_up import opened
 from firable.executor.protocol.commands import Answer
@@ -162,6 +162,7 @@ def run_host(
             journal=files.journal,
             begin_seconds=files.begin_seconds,
             overdue_seconds=overdue_seconds,
+            patience=patience_with(driver),
             resume=resume,
             said=said,
             tell=tell,

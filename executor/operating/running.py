@@ -23,7 +23,7 @@ from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.operating.host import Host
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.recorder import LineStream
-from firable.executor.operating.service import Service, figures_for, run_to_the_end
+from firable.executor.operating.service import Service, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.taken_up import opened
 from firable.executor.protocol.commands import Answer
@@ -258,6 +258,7 @@ def run_bound(
             driver,
             files.recorder,
             overdue_seconds=overdue_seconds,
+            patience=patience_with(driver),
             operator=operator,
             tell=tell,
             journal=files.journal,

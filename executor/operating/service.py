@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.bound import BoundDriver
+from firable.executor.drivers.driver import Driver
 from firable.executor.operating.host import Host
 from firable.executor.operating.situation import Situation
-from firable.executor.operating.uncut import ended_by_signals
+from firable.executor.operating.uncut import STOP_SECONDS, Guard, Patience, ended_by_signals
 from firable.nets.net import Net
 
 if TYPE_CHECKING:  # these need the extra `serve`
@@ -40,6 +42,16 @@ def figures_for(net: Net, service: Service | None, machines: Collection[str] = (
     return Metrics(net, machines)
 
 
+def patience_with(driver: Driver) -> Patience:
+    """How long the end of a driver is waited for: as long as its devices may take, and then some."""
+    own = (
+        3 * max((d.timeout_s for d in driver.binding.document.devices.values()), default=0.0)
+        if isinstance(driver, BoundDriver)
+        else 0.0
+    )
+    return Patience(STOP_SECONDS + own)
+
+
 def run_to_the_end(
     host: Host, service: Service | None = None, figures: Metrics | None = None, *, virtual: bool = False
 ) -> Situation:
@@ -47,12 +59,20 @@ def run_to_the_end(
     if virtual:
         situation: Situation = run_in_virtual_time(terminable(host))
         return situation
-    return asyncio.run(terminable(host) if service is None or figures is None else _serving(host, service, figures))
+    work = terminable(host) if service is None or figures is None else _serving(host, service, figures)
+    guard = Guard(host.patience.seconds)
+    try:
+        with asyncio.Runner() as runner:
+            ended = runner.run(work)
+            guard.begin()  # a thread of a driver that hangs keeps the event loop from being closed
+    finally:
+        guard.end()
+    return ended
 
 
 async def terminable(host: Host) -> Situation:
     """The host, which Ctrl-C or a request to terminate ends in order: no machine is left on."""
-    with ended_by_signals():
+    with ended_by_signals(host.patience):
         return await host.main()
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import asyncio
 import io
 import signal
+import subprocess
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 
 import pytest
 
@@ -18,6 +21,7 @@ from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.service import terminable
 from firable.executor.operating.situation import State
+from firable.executor.operating.uncut import GIVEN_UP, HURRY_SECONDS, STOP_SECONDS
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
 from firable.nets.net import Place
@@ -218,3 +222,69 @@ def test_a_second_signal_does_not_cut_off_the_safe_outputs(number: signal.Signal
 
     assert run_in_virtual_time(ended()) is State.STOPPED
     assert machine.is_off
+
+
+class Hanging(Machine):
+    """A machine that never lets go."""
+
+    async def run(self, clock: Clock, listener: Listener) -> None:
+        try:
+            await super().run(clock, listener)
+        finally:
+            while True:
+                with suppress(asyncio.CancelledError):
+                    await asyncio.sleep(1000)
+
+
+def hanging() -> Host:
+    run, machine = run_of(MemoryJournal())
+    run.driver = held = Hanging([split(run.net).subnet("robot")], 1.0)
+    held.sent = machine.sent
+    return run
+
+
+def test_a_driver_that_hangs_is_given_up_and_the_run_says_so() -> None:
+    async def main() -> tuple[State, str, float]:
+        run = hanging()
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(1)
+        run.stop()
+        ended = await ending
+        return ended.state, ended.message, asyncio.get_running_loop().time()
+
+    state, message, seconds = run_in_virtual_time(main())
+    assert state is State.FAULT
+    assert "driver did not end in time" in message
+    assert seconds == pytest.approx(1 + STOP_SECONDS, abs=0.2)
+
+
+def test_a_second_ctrl_c_leaves_a_driver_that_hangs_no_more_than_a_moment() -> None:
+    async def ended() -> tuple[State, float]:
+        loop = asyncio.get_running_loop()
+        for at in (1.0, 3.0):
+            loop.call_later(at, signal.raise_signal, signal.SIGINT)
+        return (await terminable(hanging())).state, loop.time()
+
+    state, seconds = run_in_virtual_time(ended())
+    assert state is State.FAULT
+    assert seconds == pytest.approx(3.0 + HURRY_SECONDS, abs=0.2)
+
+
+BLOCKED = """
+import asyncio, signal, sys, threading, time
+from firable.executor.operating.uncut import ended_by_signals
+async def main():
+    with ended_by_signals():
+        for after in (0.1, 0.3):
+            threading.Timer(after, signal.raise_signal, [signal.SIGINT]).start()
+        while True:
+            time.sleep(0.01)
+asyncio.run(main())
+"""
+
+
+def test_a_program_that_blocks_the_event_loop_is_ended_by_a_second_ctrl_c() -> None:
+    done = subprocess.run([sys.executable, "-c", BLOCKED], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == GIVEN_UP
+    assert "the run hangs and is given up" in done.stderr
+    assert "Traceback" not in done.stderr
