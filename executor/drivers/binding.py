@@ -69,11 +69,13 @@ class ChannelDocument(_Model):
     """Where the commands of one machine go, and where it shows the numbers of what it has taken, done or failed at.
 
     The number stands alone at `number`, behind what the command writes; or `command` takes a text with the number, the
-    command and its parameters as the net has them.
+    command and its parameters as the net has them. A device that knows no numbers has a bit `request`, and bits that
+    say what has become of it (`handshake.py`).
     """
 
     number: Name | None = None
     command: Name | None = None
+    request: Name | None = None
     taken: Name | None = None
     done: Name | None = None
     failed: Name | None = None
@@ -307,11 +309,15 @@ class _Reading:
             for path, point, use in _device_points(device):
                 self.point(name, ("devices", name, *path), point, use)
             for channel, body in device.channels.items():
-                if (body.number is None) == (body.command is None):
-                    self.problem(
-                        "F5101", ("devices", name, "channels", channel),
-                        f"'{channel}' takes commands in one way", "write `number: ADDRESS` or `command: ADDRESS`",
-                    )  # fmt: skip
+                ways = [one for one in (body.number, body.command, body.request) if one is not None]
+                if len(ways) != 1:
+                    hint = "write `number: ADDRESS`, or `command: ADDRESS`, or `request: ADDRESS`"
+                    message = f"'{channel}' takes commands in one way"
+                    self.problem("F5101", ("devices", name, "channels", channel), message, hint)
+                elif body.request is not None and body.taken is None and body.done is None:
+                    hint = "write `done: ADDRESS`, where the device shows that it has done it, or `taken: ADDRESS`"
+                    message = f"nobody would know when the request of '{channel}' may fall"
+                    self.problem("F5101", ("devices", name, "channels", channel), message, hint)
         for name, contact in self.document.emergency_stop.items():
             if self.device(("emergency_stop", name), contact.device):
                 self.contact(name, contact)
@@ -353,6 +359,12 @@ class _Reading:
             self.problem("F5102", path, f"{quoted(point)} cannot be a point to {use}: {problem}", hint)
 
 
+_CHANNEL_POINTS: Final[Mapping[str, Use]] = {
+    **dict.fromkeys(("number", "command", "request"), Use.WRITE),
+    **dict.fromkeys(("taken", "done", "failed"), Use.READ),
+}
+
+
 def _device_points(device: DeviceDocument) -> Iterator[tuple[TreePath, Point, Use]]:
     for point in device.safe:
         yield ("safe", point), point, Use.WRITE
@@ -363,11 +375,9 @@ def _device_points(device: DeviceDocument) -> Iterator[tuple[TreePath, Point, Us
     if device.alive is not None:
         yield ("alive", "read"), device.alive.read, Use.READ
     for name, channel in device.channels.items():
-        for key, use in (("number", Use.WRITE), ("command", Use.WRITE), ("taken", Use.READ), ("done", Use.READ)):
+        for key, use in _CHANNEL_POINTS.items():
             if (point := getattr(channel, key)) is not None:
                 yield ("channels", name, key), point, use
-        if channel.failed is not None:
-            yield ("channels", name, "failed"), channel.failed, Use.READ
 
 
 def writes(mapping: Mapping[Point, str]) -> Writes:

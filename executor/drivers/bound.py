@@ -10,6 +10,8 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
+from typing import Final
 
 from firable.executor.drivers.binding import Binding, CommandDocument, SignalDocument, writes
 from firable.executor.drivers.channels import Channel, Outcome, Said
@@ -18,10 +20,13 @@ from firable.executor.drivers.device import Point, Value, Writes, as_bit
 from firable.executor.drivers.driver import Answer, Clock, Listener, Quality, Reading
 from firable.executor.drivers.emergency import Contacts
 from firable.executor.drivers.fitting import misfits
+from firable.executor.drivers.handshake import Handshake
 from firable.executor.drivers.image import Change, Image
 from firable.executor.drivers.keeping import Kept, ended, uninterrupted
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Net, Place, SignalKind
+
+_LOOK_SECONDS: Final = 0.01
 
 
 def bound_driver(binding: Binding, net: Net, part: Net | None = None) -> BoundDriver:
@@ -128,6 +133,8 @@ class BoundDriver:
             channel.expect(place.name, entry)
             return Answer.UNKNOWN
         stopped = bool(device.document.safe)
+        if stopped:
+            await device.settled(channel, place.name, entry)
         answer = channel.answer(place.name, entry, stopped=stopped)
         if answer is not Answer.DONE or place.completion is None:
             return answer
@@ -187,13 +194,12 @@ class _Device:
         self.sensed = [signal for signal in signals if signal in driver.completions.shown]
         """Signals from which completions are formed; the others are told as they are."""
         commands = {place: one for place, one in binding.document.commands.items() if one.device == name}
-        self.channels = {
-            channel: Channel(
-                document, [place for place, one in commands.items() if one.channel == channel], driver.answered
-            )
-            for channel, document in self.document.channels.items()
-        }
-        self.replies: dict[Point, list[tuple[Channel, str]]] = {}
+        self.channels: dict[str, Channel | Handshake] = {}
+        for channel_name, body in self.document.channels.items():
+            places = [place for place, one in commands.items() if one.channel == channel_name]
+            made = Channel if body.request is None else Handshake
+            self.channels[channel_name] = made(body, places, driver.answered)
+        self.replies: dict[Point, list[tuple[Channel | Handshake, str]]] = {}
         for channel in self.channels.values():
             for point, key in channel.points().items():
                 self.replies.setdefault(point, []).append((channel, key))
@@ -201,7 +207,7 @@ class _Device:
         self.tripped = None if heartbeat is None else heartbeat.tripped
         self.has_tripped: bool | None = None
         self.forced: deque[Writes] = deque()
-        self.writing: Channel | None = None
+        self.writing: Channel | Handshake | None = None
         self.is_ready = asyncio.Event()
         self.was_ready = False
         self.alarm: asyncio.TimerHandle | None = None
@@ -227,6 +233,15 @@ class _Device:
         """Send a command by its channel."""
         self.channels[command.channel].send(place.name, entry, str(place.command), writes(command.write))
         self.kept.awake.set()
+
+    async def settled(self, channel: Channel | Handshake, place: str, entry: int) -> None:
+        """Wait until the device shows what the safe outputs of the start have ended, or its time is over."""
+        if channel.document.failed is None:
+            return
+        with suppress(TimeoutError):
+            async with asyncio.timeout(self.document.timeout_s):
+                while channel.is_at(place, entry):
+                    await asyncio.sleep(_LOOK_SECONDS)
 
     def force(self, point: Point, value: bool) -> None:
         """Write a point beside all else."""
@@ -354,12 +369,12 @@ class _Device:
             several = f"{faults[0]} and {len(faults) - 1} more" if len(faults) > 1 else faults[0]
             self._fault(f"'{several}' cannot be read: {self.image.readings[faults[0]].why}")
 
-    def _replied(self, channel: Channel, key: str, point: Point, value: Value) -> None:
+    def _replied(self, channel: Channel | Handshake, key: str, point: Point, value: Value) -> None:
         for outcome in channel.shows(key, value):
             self._said(outcome)
         if channel.shown[key] is None and value != self.garbage.get(point):
             self.garbage[point] = value
-            self.note(f"'{point}' shows {value!r}, which is no number of a command")
+            self.note(f"'{point}' shows {value!r}, which says nothing of a command")
 
     def _said(self, outcome: Outcome) -> None:
         order = outcome.order

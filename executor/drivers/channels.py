@@ -7,9 +7,9 @@ confirmation was lost is repeated without harm. After a restart the numbers show
 the number is computed from place and entry, which outlive the executor in its journal.
 
 Where the device already shows the number that is to be sent, as it may when a run begins without a journal, it is sent
-number 0 first, "no command", and the number goes out when it is shown no more. Rejected: bits for request and done,
-with their four edges for each command. They know no order, and say nothing after a restart; a device that has nothing
-else needs a few lines of its own program, as its watchdog does.
+number 0 first, "no command", and the number goes out when it is shown no more. Rejected, where a device has the choice:
+bits for request and done, with their four edges for each command. They know no order, and say little after a restart;
+a device that has nothing else is spoken to by `handshake.py`.
 
 The device *has* a command when it shows its number. Of a channel that shows nothing of what it has taken, the
 confirmation of the write must do; behind a broker that is the broker's word alone.
@@ -191,18 +191,28 @@ class Channel:
         if number not in self.shown.values():
             self.untaken[number] = order
 
+    def is_at(self, place: str, entry: int) -> bool:
+        """Whether the device shows that it has a command, and neither that it is done nor that it has failed."""
+        number = self.number(place, entry)
+        return self.shown.get("taken") == number and number not in {self.shown.get("done"), self.shown.get("failed")}
+
     def answer(self, place: str, entry: int, *, stopped: bool) -> Answer:
         """What became of a command that was sent before a restart; `stopped` where the safe outputs came in between.
 
-        The command is taken up again, so that its outcome is told if it comes.
+        A device that would show that it has failed is believed to be at work as long as it does not, also then; without
+        that, whether the machine was stopped in the middle of it nobody knows. Of a command without completion nothing
+        is asked but that the machine has it. The command is taken up again, so that its outcome is told if it comes.
         """
         number = self.number(place, entry)
         if self.shown.get("done") == number:
             return Answer.DONE
         self.expect(place, entry)
+        if self.shown.get("failed") == number:
+            return Answer.UNKNOWN
         if number in self.shown.values():
-            failed = self.shown.get("failed") == number
-            return Answer.UNKNOWN if failed or stopped else Answer.WORKING
+            if place not in self.answered:
+                return Answer.DONE
+            return Answer.UNKNOWN if stopped and self.document.failed is None else Answer.WORKING
         taken = self.shown.get("taken")
         if taken is None or not self._came_before(taken):
             return Answer.UNKNOWN

@@ -515,12 +515,12 @@ class DriverConformance:
                 await until(lambda: b.machine.orders, "the command arrives")
             b.begin()
             async with b.connected():
-                # The safe outputs of the start have come between: whether it will be done nobody knows.
-                assert await b.driver.ask(b.place("move"), 7) is Answer.UNKNOWN
-                assert await b.driver.ask(b.place("move"), 8) is Answer.NOT_RECEIVED
+                # The safe outputs of the start have come between; the machine would show if they had ended it.
+                assert await b.driver.ask(b.place("move"), 7) is Answer.WORKING
+                assert await b.driver.ask(b.place("grip"), 1) is Answer.NOT_RECEIVED
                 assert b.heard_of("moved") == []
                 b.machine.finish()
-                await until(lambda: b.driver.devices["D"].channels["M"].shown["done"], "the answer is read")
+                await until(lambda: b.heard_of("moved") == [(True, 7)], "the completion")
             b.begin()
             async with b.connected():
                 assert await b.driver.ask(b.place("move"), 7) is Answer.DONE
@@ -531,6 +531,22 @@ class DriverConformance:
                 b.machine.finish()
                 await until(lambda: b.heard_of("moved"), "the completion")
             assert b.heard_of("moved") == [(True, 8)]
+
+        self.bench(test)
+
+    def test_a_machine_that_the_safe_outputs_of_the_start_have_stopped_leaves_it_to_a_person(self) -> None:
+        """How far it has come is to be seen only there."""
+
+        async def test(b: Bench) -> None:
+            async with b.connected():
+                b.driver.send(b.place("move"), 7)
+                await until(lambda: b.machine.orders, "the command arrives")
+            b.machine.stands_at_output = True
+            b.begin()
+            async with b.connected():
+                assert await b.driver.ask(b.place("move"), 7) is Answer.UNKNOWN
+                assert await b.driver.ask(b.place("move"), 8) is Answer.NOT_RECEIVED
+            assert len(b.machine.orders) == 1
 
         self.bench(test)
 

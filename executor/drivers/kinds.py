@@ -23,6 +23,7 @@ OWN: Final[Mapping[str, tuple[str, str]]] = {
     "modbus-rtu": ("firable.executor.drivers.modbus", "RTU"),
     "opcua": ("firable.executor.drivers.opcua", "KIND"),
     "mqtt": ("firable.executor.drivers.mqtt", "KIND"),
+    "simulated": ("firable.executor.drivers.simulated_device", "KIND"),
     "serial": ("firable.executor.drivers.serial_line", "KIND"),
 }
 """The module and the name of the kind in it."""

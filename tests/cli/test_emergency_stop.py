@@ -144,9 +144,9 @@ def test_open_contact_stops_the_machines_of_its_controller_and_the_run_stays_sto
         assert (lamp.machine.outputs, len(lamp.machine.orders)) == ([False, False], 1)
         notes = [event for event in read_trace(trace).events if isinstance(event, Noted)]
         assert [note.data["reason"] for note in notes if note.note == "emergency stop"] == ["plc: 'button' is open"]
-        # Started again with the button pressed it ends at once.
+        # Started again with the button pressed it ends at once, whatever the operator says.
         lamp.show("button", value=False)
-        again = started(*mine)
+        again = started(*mine, "--resume")
         processes.append(again)
         said, _ = again.communicate(timeout=60)
         assert "emergency stop: plc: 'button' is open" in said

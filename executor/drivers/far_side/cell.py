@@ -32,6 +32,8 @@ class _Channel:
     commands: list[tuple[dict[Point, int | str], Command]] = field(default_factory=list)
     """What is written for a command, and the command."""
     number: int = 0
+    requests: int = 0
+    """How often the bit of a channel without numbers has risen."""
 
 
 @dataclass
@@ -97,6 +99,8 @@ class CellServer:
                 device.end.show(device.document.heartbeat.tripped, value=False)
         for signal in self.plant.shown:
             self._sensor(signal)
+        for contact in self.binding.document.emergency_stop.values():
+            self.devices[contact.device].end.show(contact.read, not contact.invert)
         self.begun_seconds = asyncio.get_running_loop().time()
 
     async def stop(self) -> None:
@@ -131,9 +135,18 @@ class CellServer:
         for channel in device.channels.values():
             if point == channel.document.number:
                 self._ordered(device, channel, as_number(value), "")
+            elif point == channel.document.request:
+                self._requested(device, channel, asked=bool(device.last[point]))
             elif point == channel.document.command:
                 number, _, text = str(value).partition(" ")
                 self._ordered(device, channel, as_number(number), text)
+
+    def _requested(self, device: _Device, channel: _Channel, *, asked: bool) -> None:
+        if asked and not channel.number:
+            channel.requests += 1
+            self._ordered(device, channel, channel.requests, "")
+        elif not asked:
+            self._ordered(device, channel, 0, "")
 
     def _ordered(self, device: _Device, channel: _Channel, number: int | None, text: str) -> None:
         if number is None or number == channel.number:
@@ -142,7 +155,7 @@ class CellServer:
         if number == 0:
             self._clear(device, channel)
             return
-        self._show(device, channel.document.taken, number)
+        self._say(device, channel, channel.document.taken, number)
         known = [
             command
             for written, command in channel.commands
@@ -150,7 +163,7 @@ class CellServer:
         ]
         if not known:
             self.tell(self.now_seconds(), f"a command that nobody knows: {text or device.last}")
-            self._show(device, channel.document.failed, number)
+            self._say(device, channel, channel.document.failed, number)
             return
         command = known[0]
         self.tell(self.now_seconds(), f"{command}")
@@ -170,7 +183,7 @@ class CellServer:
                     if (waiting := self.tickets.pop(ticket, None)) is not None:
                         device, channel, number = waiting
                         self.at = {machine: one for machine, one in self.at.items() if one is not waiting}
-                        self._show(device, channel.document.done, number)
+                        self._say(device, channel, channel.document.done, number)
                 case PlantFault(machine, message):
                     self.fault = f"{machine}: {message}" if machine else message
                     self.tell(self.now_seconds(), self.fault)
@@ -200,11 +213,18 @@ class CellServer:
             of, channel, number = self.at.pop(machine)
             self.plant.stand(machine)
             self.tell(self.now_seconds(), f"{machine} is stopped by {why}")
-            self._show(of, channel.document.failed, number)
+            self._say(of, channel, channel.document.failed, number)
 
     def _clear(self, device: _Device, channel: _Channel) -> None:
         for point in (channel.document.taken, channel.document.done, channel.document.failed):
-            self._show(device, point, 0)
+            self._show(device, point, 0 if channel.document.request is None else False)
+
+    def _say(self, device: _Device, channel: _Channel, point: Point | None, number: int) -> None:
+        """Say something of a command: by its number, or by a bit as long as it is asked for."""
+        if channel.document.request is None:
+            self._show(device, point, number)
+        elif number == channel.number:
+            self._show(device, point, value=True)
 
     def _show(self, device: _Device, point: Point | None, value: Value) -> None:
         if point is not None:

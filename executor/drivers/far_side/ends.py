@@ -152,11 +152,16 @@ def _points(binding: Binding, name: str) -> dict[Point, Value]:
         if device.heartbeat.tripped is not None:
             points[device.heartbeat.tripped] = False
     for channel in device.channels.values():
-        points |= {point: 0 for point in (channel.number, channel.taken, channel.done, channel.failed) if point}
+        said: Value = 0 if channel.request is None else False
+        points |= {point: said for point in (channel.taken, channel.done, channel.failed, channel.request) if point}
+        points |= {point: 0 for point in (channel.number,) if point}
         points |= {point: "" for point in (channel.command,) if point}
     for command in document.commands.values():
         if command.device == name:
             points |= {point: type(value)() for point, value in writes(command.write)}
+    for contact in document.emergency_stop.values():
+        if contact.device == name:
+            points[contact.read] = not contact.invert
     for signal in document.signals.values():
         if signal is not None and signal.device == name:
             points[signal.read] = False

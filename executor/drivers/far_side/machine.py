@@ -43,6 +43,9 @@ class Machine:
         self.code: Value = 0
         self.beats = 0
         self.taking = True
+        self.stands_at_output = False
+        """Whether what is written to the output stops it in the middle of a command, which has failed then."""
+        self.finished = 0
         self.waiting: tuple[int, Value] | None = None
         """The command that stands there while it takes none."""
         self.finishes_at_once = False
@@ -83,7 +86,8 @@ class Machine:
 
     def finish(self, number: int | None = None) -> None:
         """Show that the newest command, or the one of a number, is done."""
-        self.show("done", self.number if number is None else number)
+        self.finished = self.number if number is None else number
+        self.show("done", self.finished)
 
     def fail(self) -> None:
         """Show that the newest command has failed."""
@@ -106,6 +110,8 @@ class Machine:
             case "output":
                 self.show("tripped", value=False)
                 self.outputs.append(bool(as_number(value) if isinstance(value, str) else value))
+                if self.stands_at_output and self.number != self.finished:
+                    self.fail()
             case "beat":
                 self._beaten()
 

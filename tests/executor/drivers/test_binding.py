@@ -216,6 +216,11 @@ def test_who_only_looks_sees_the_contacts_and_is_stopped_by_none() -> None:
     assert driver.may_move
 
 
+@pytest.mark.parametrize("channel", ["{request: coil 1}", "{request: coil 1, number: holding 3, done: discrete 1}"])
+def test_a_request_that_nobody_answers_or_that_stands_beside_a_number_is_refused(channel: str) -> None:
+    assert refusal(edited("{number: holding 5}", channel)) == [("F5101", "12: N")]
+
+
 def test_the_binding_of_the_catalogue_fits_its_net_and_can_be_served() -> None:
     binding = read_binding(catalogue_path("one_robot").with_name("one_robot.bind.yaml"))
     driver = bound_driver(binding, catalogue_net("one_robot"))

@@ -2,6 +2,7 @@
 
 import asyncio
 import io
+import re
 import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -46,13 +47,19 @@ def free_port() -> int:
 
 
 @asynccontextmanager
-async def served(workpieces: int, *disturbances: Disturbance, speed: float = 50.0) -> AsyncIterator[Served]:
+async def served(
+    workpieces: int, *disturbances: Disturbance, speed: float = 50.0, knows_numbers: bool = True
+) -> AsyncIterator[Served]:
     """The one-robot cell over Modbus and a serial line, fifty times as fast as it would be."""
     line = SerialEnd()
     line.line.open()
-    binding = parse_binding(
-        binding_text(NET, {"modbus": str(free_port()), "serial": line.line.near}, plant_of("one_robot").sensors)
-    )
+    text = binding_text(NET, {"modbus": str(free_port()), "serial": line.line.near}, plant_of("one_robot").sensors)
+    if not knows_numbers:
+        numbers = r"number: holding (\d+), taken: input (\d+), done: input (\d+), failed: input (\d+)"
+        bits = r"request: coil \1, taken: discrete 1\2, done: discrete 1\3, failed: discrete 1\4"
+        text, count = re.subn(numbers, bits, text)
+        assert count
+    binding = parse_binding(text)
     ends: dict[str, FarEnd] = {**ends_of(binding.without({"serial"})), "serial": line}
     plant = Plant(plant_of("one_robot"), workpieces=workpieces, disturbances=disturbances)
     said: list[str] = []
@@ -89,6 +96,17 @@ def test_workpieces_go_through_a_cell_behind_sockets_none_lost_and_none_doubled(
             situation = await executed(one, lambda: len(one.plant.delivered) == 3)
             assert situation.state is State.STOPPED
             assert [workpiece.processed for workpiece in one.plant.delivered] == [1, 1, 1]
+            assert not one.cell.fault
+
+    asyncio.run(main())
+
+
+def test_machines_that_know_no_numbers_lose_and_double_no_workpiece_either() -> None:
+    async def main() -> None:
+        async with served(2, knows_numbers=False) as one:
+            situation = await executed(one, lambda: len(one.plant.delivered) == 2)
+            assert situation.state is State.STOPPED
+            assert [workpiece.processed for workpiece in one.plant.delivered] == [1, 1]
             assert not one.cell.fault
 
     asyncio.run(main())

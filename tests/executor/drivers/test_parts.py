@@ -85,8 +85,9 @@ def test_completion_needs_the_acknowledgement_of_its_own_entry_and_its_sensor() 
     assert formed.acknowledged("blind", 1) == 1
 
 
-def channel(*places: str, answered: Iterable[str] = (), taken: bool = True) -> Channel:
-    document = ChannelDocument.model_validate({"number": "n", "done": "d", **({"taken": "t"} if taken else {})})
+def channel(*places: str, answered: Iterable[str] = (), taken: bool = True, failed: bool = False) -> Channel:
+    more = {**({"taken": "t"} if taken else {}), **({"failed": "f"} if failed else {})}
+    document = ChannelDocument.model_validate({"number": "n", "done": "d", **more})
     return Channel(document, places, frozenset(answered))
 
 
@@ -205,11 +206,15 @@ def test_device_that_has_forgotten_a_command_is_not_given_it_again() -> None:
 
 
 def test_answer_after_a_restart_is_made_of_the_numbers_shown() -> None:
-    def answer(taken: Value | None, done: Value = 0, *, stopped: bool = False, place: str = "a") -> Answer:
-        one = channel("a", "b", "stop", answered="ab", taken=taken is not None)
+    def answer(
+        taken: Value | None, done: Value = 0, *, failed: Value | None = None, stopped: bool = False, place: str = "a"
+    ) -> Answer:
+        one = channel("a", "b", "stop", answered="ab", taken=taken is not None, failed=failed is not None)
         if taken is not None:
             one.shows("taken", taken)
         one.shows("done", done)
+        if failed is not None:
+            one.shows("failed", failed)
         return one.answer(place, 3, stopped=stopped)
 
     one = channel("a", "b", "stop", answered="ab")
@@ -218,7 +223,11 @@ def test_answer_after_a_restart_is_made_of_the_numbers_shown() -> None:
     )  # fmt: skip
     assert answer(this, this) is Answer.DONE
     assert answer(this) is Answer.WORKING
-    assert answer(this, stopped=True) is Answer.UNKNOWN
+    # Without a number of what has failed, nobody knows what the safe outputs have ended.
+    assert answer(this, stopped=True) is answer(this, failed=this, stopped=True) is Answer.UNKNOWN
+    assert answer(this, failed=0, stopped=True) is Answer.WORKING
+    assert answer(stop, place="stop") is Answer.UNKNOWN  # of another entry
+    assert answer(one.number("stop", 3), place="stop", stopped=True) is Answer.DONE
     assert answer(0) is answer(earlier, earlier) is answer(other, other) is Answer.NOT_RECEIVED
     # A stop may have come after it, and says nothing of what it has overtaken.
     assert answer(stop) is Answer.UNKNOWN
