@@ -7,6 +7,7 @@ signed it; at connection the hosts compare what they hold.
 
 from __future__ import annotations
 
+import ssl
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +26,7 @@ from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
 from firable.nets.layers import Layers
 from firable.nets.net import Net
-from firable.nets.source import read_bytes
+from firable.nets.source import printable, read_bytes
 
 CERTIFICATE_BYTES_MAX: Final = 1_000_000
 
@@ -99,7 +100,8 @@ def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLi
     """The link of a host; raises `ModuleNotFoundError` where the extra `zenoh` or `serial` is not installed.
 
     On a serial line controllers speak to the master alone: `InputError` F5021 where only some coordinators are there.
-    F1001 or F1003 where a certificate cannot be read: Zenoh would ask for them at a connection, and only try again.
+    F1001 or F1003 where a certificate cannot be read, F5062 where it is none, or the key not its own: Zenoh would look
+    at them at a connection, and only try again.
     """
     greeting = Greeting(bundle.digest, machines)
     if isinstance(way, SerialLine):
@@ -115,12 +117,27 @@ def make_link(bundle: Bundle, machines: tuple[str, ...], way: Network | SerialLi
         return SerialLink(greeting, way.port, addresses, own, baud=way.baud, lease_seconds=way.lease_seconds)
     from firable.executor.links.zenoh_link import Certificates, ZenohLink
 
-    for file in way.certificates or ():
-        read_bytes(file, CERTIFICATE_BYTES_MAX)
-    certificates = None if way.certificates is None else Certificates(*way.certificates)
+    certificates = None
+    if way.certificates is not None:
+        _demand_certificates(*way.certificates)
+        certificates = Certificates(*way.certificates)
     return ZenohLink(
         greeting, listen=way.listen, join=way.join, certificates=certificates, lease_seconds=way.lease_seconds
     )
+
+
+def _demand_certificates(authority: str, certificate: str, key: str) -> None:
+    for file in (authority, certificate, key):
+        read_bytes(file, CERTIFICATE_BYTES_MAX)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    problem = f"{authority} is no certificate of an authority"
+    try:
+        context.load_verify_locations(authority)
+        problem = f"{certificate} and {key} are no certificate and its key"
+        context.load_cert_chain(certificate, key, password="")  # or one would be asked for at the terminal
+    except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
+        message = f"{printable(problem)}: {printable(str(getattr(error, 'reason', None) or error))}"
+        raise InputError([Diagnostic("F5062", message, "name PEM files, and a key without a password")]) from None
 
 
 def own_net(decomposition: Decomposition, machines: Sequence[str]) -> Net:

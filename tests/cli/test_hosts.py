@@ -36,6 +36,21 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
         ["--controller", "robot", "--dry-run", "1", "--join", "tls/[::1]:1", "--tls", "{bundle}", "no-cert", "no-key"],
         "no-cert:1:1: error[F1001]",
     ),
+    "a file that is no certificate": (
+        [
+            "--controller",
+            "robot",
+            "--dry-run",
+            "1",
+            "--join",
+            "tls/[::1]:1",
+            "--tls",
+            "{bundle}",
+            "{bundle}",
+            "{bundle}",
+        ],
+        "cell.bundle is no certificate of an authority",
+    ),
     "one file for two": (["--controller", "mc", "--trace", "{bundle}", "--journal", "x"], "overwrite"),
 }
 

@@ -1,8 +1,9 @@
 """Messages as JSON: every message has one text, and nothing else is read."""
 
+import hashlib
 import json
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import get_args
 
 import pytest
@@ -11,8 +12,9 @@ from hypothesis import strategies as st
 from support.examples import examples
 
 from firable.executor.links.encoding import KINDS, MESSAGE_BYTES_MAX, EncodingError, _writer, decode, encode
+from firable.executor.links.link import PROTOCOL_VERSION
 from firable.executor.protocol import messages
-from firable.executor.protocol.messages import Decision, Message, ToController, ToCoordinator
+from firable.executor.protocol.messages import Decision, Message, Readiness, ToController, ToCoordinator
 
 MESSAGES: st.SearchStrategy[Message] = st.one_of([st.from_type(kind) for kind in KINDS.values()])
 
@@ -108,3 +110,16 @@ class Odd:
 def test_a_message_with_a_field_that_has_no_one_spelling_is_refused_when_the_program_starts() -> None:
     with pytest.raises(TypeError, match="cannot be part of a message"):
         _writer(Odd)
+
+
+SHAPES = {2: "f8449b1cb1bf4c25"}
+"""What the messages of each version of the protocol look like; one that was in use keeps its line."""
+
+
+def test_the_version_of_the_protocol_is_that_of_its_messages() -> None:
+    # Whoever changes a message gives the protocol a new version, or hosts of both would talk past each other.
+    told = {
+        name: {f.name: str(f.type) for f in fields(kind)} for name, kind in {**KINDS, "Readiness": Readiness}.items()
+    }
+    shape = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+    assert SHAPES[PROTOCOL_VERSION] == shape[:16]

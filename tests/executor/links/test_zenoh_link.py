@@ -13,7 +13,7 @@ from support.certificates import Site
 from support.link_rigs import Heard, free_port, running
 
 from firable.executor.links.encoding import encode
-from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.link import COORDINATOR, PROTOCOL_VERSION, Greeting
 from firable.executor.links.zenoh_link import Certificates, ZenohLink, open_to_the_network
 from firable.executor.protocol.messages import Decision, Readiness, Report
 from firable.nets.diagnostics import InputError, Severity
@@ -97,11 +97,11 @@ def test_what_a_stranger_publishes_is_not_delivered() -> None:
             await robot.until_told(("connected", COORDINATOR))
             assert there.session is not None
             message = encode(Report("robot", Readiness(0, frozenset())))
-            to = f"firable/1/d1/to/%/{here.identity}/from/robot"
+            to = f"firable/{PROTOCOL_VERSION}/d1/to/%/{here.identity}/from/robot"
             there.session.put(f"{to}/{there.identity}", b"\xff" + message)  # damaged
             there.session.put(f"{to}/abc", message)  # of a process that is not known
             there.session.delete(f"{to}/{there.identity}")  # not a message
-            there.session.put(f"firable/1/d2/to/%/{here.identity}/from/robot/{there.identity}", message)
+            there.session.put(f"firable/{PROTOCOL_VERSION}/d2/to/%/{here.identity}/from/robot/{there.identity}", message)
             while not centre.messages:
                 there.send("robot", COORDINATOR, Report("robot", Readiness(7, frozenset())))
                 await asyncio.sleep(0.02)
