@@ -146,7 +146,7 @@ def test_a_place_of_two_rules_is_refused_where_it_stands(capsys: pytest.CaptureF
     own = ["--own", "a=system*,robot*,conveyor*", "--own", "b=mc*,robot.free"]
     assert main(["split", "catalogue:one_robot", *own]) == 2
     said = capsys.readouterr().err
-    assert "catalogue:one_robot:20:7: error[F2023]: 'robot.free' is given to each of a, b" in said
+    assert "catalogue:one_robot:21:7: error[F2023]: 'robot.free' is given to each of a, b" in said
 
 
 def test_split_says_what_a_vote_without_promise_is_and_ends_no_line_in_spaces(

@@ -1,6 +1,7 @@
 """The committed JSON Schema is the generated one, and agrees with the reader on what it can judge."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,34 @@ import firable.nets
 from firable.nets.catalogue import catalogue_names, catalogue_path
 from firable.nets.diagnostics import InputError
 from firable.nets.document import json_schema
+from firable.nets.machines.plant_file import PlantModel
 from firable.nets.printing import format_net
+from firable.nets.tasks.document import json_schema as tasks_schema
 from firable.nets.text import parse_net
 
 SCHEMA = Path(str(firable.nets.__file__)).parent / "net.schema.json"
 
 
-def test_the_committed_schema_is_the_generated_one() -> None:
-    assert json.loads(SCHEMA.read_text("utf-8")) == json_schema()
+CATALOGUE = SCHEMA.parent / "catalogue"
+SCHEMAS = {"net": json_schema, "tasks": tasks_schema, "plant": PlantModel.model_json_schema}
+FILES = sorted(file for kind in ("firable", "tasks", "plant") for file in CATALOGUE.glob(f"*.{kind}.yaml"))
+FIRST_LINE = re.compile(r"# yaml-language-server: \$schema=(.+)\n")
+
+
+@pytest.mark.parametrize("kind", SCHEMAS)
+def test_the_committed_schema_is_the_generated_one(kind: str) -> None:
+    assert json.loads(SCHEMA.with_name(f"{kind}.schema.json").read_text("utf-8")) == SCHEMAS[kind]()
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+def test_the_first_line_of_a_file_of_the_catalogue_names_its_schema(file: Path) -> None:
+    text = file.read_text("utf-8")
+    named = FIRST_LINE.match(text)
+    assert named
+    schema = json.loads((file.parent / named[1]).read_text("utf-8"))
+    jsonschema.Draft202012Validator(schema).validate(yaml.safe_load(text))
+    kind = file.name.split(".")[-2].replace("firable", "net")
+    assert schema == SCHEMAS[kind]()
 
 
 def test_the_schema_is_a_schema() -> None:
