@@ -286,5 +286,5 @@ def test_prove_tells_the_side_conditions_of_the_protocol_theorem_in_one_line(
     side = [v for v in data["reports"][0]["verdicts"] if v["name"].startswith("protocol.side.")]
     assert code == 0
     assert [(v["name"].rpartition(".")[2], v["status"]) for v in side] == [
-        (name, "proved") for name in ("owner", "parts", "locals", "strangers", "gates", "start")
+        (name, "proved") for name in ("owner", "parts", "locals", "strangers", "gates", "start", "free")
     ]
