@@ -384,7 +384,7 @@ class Explorer:
     ) -> tuple[Step, Configuration]:
         restored, started = self._restored(number, which)
         step = Step(f"{kind}, crash" if effects else "crash", which, about, effects, before.machines[which], restored)
-        central = self._fired(at.central, effects)
+        central = self.fired(at.central, effects)
         budget = _less(at.budget, "crashes")
         left = self._left(Configuration(at.machines, at.under_way, at.jobs, budget, central), which, restored, started)
         return step, self._counted(left)
@@ -396,9 +396,9 @@ class Explorer:
         for sending in sent:
             jobs = frozenset(job for job in jobs if job[0] != sending.place) | {(sending.place, sending.entry, False)}
         messages = frozenset(effect for effect in effects if isinstance(effect, Message))
-        return Configuration(machines, at.under_way | messages, jobs, at.budget, self._fired(at.central, effects))
+        return Configuration(machines, at.under_way | messages, jobs, at.budget, self.fired(at.central, effects))
 
-    def _fired(self, central: Word, effects: Sequence[Effect]) -> Word:
+    def fired(self, central: Word, effects: Sequence[Effect]) -> Word:
         """The central net after what fired and was taken in; raises `NotATraceError`."""
         for effect in effects:
             match effect:
