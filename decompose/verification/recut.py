@@ -169,7 +169,8 @@ class Cut:
             met = [names for names in classes if one in names or other in names]
             if len(met) > 1:
                 classes = [names for names in classes if names not in met] + [met[0] | met[1]]
-        return {name: self.lowest_above(sorted(names)) for names in classes for name in names}
+        decided = ((names, self.lowest_above(sorted(names))) for names in classes)
+        return {name: at for names, at in decided for name in names}
 
     def standing_in_the_way(self, among: set[str]) -> Iterator[tuple[str, str]]:
         """The pairs of these that disturb each other at a controller where the arcs let both be promised."""
