@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from firable.executor import Answer, Operator, PlantModel, RunReport, Watch
+    from firable.executor.operating.log import Log
     from firable.executor.operating.service import Service
     from firable.nets.bundle import Bundle
     from firable.nets.verdict import Verdict
@@ -32,6 +33,7 @@ def run_bound_of(
     plant: PlantModel | None,
     watch: Watch,
     service: Service | None,
+    log: Log | None,
 ) -> Report:
     """Run until the operator stops it or nothing can go on, and report how it ended."""
     from firable.executor.drivers.binding import read_binding
@@ -49,6 +51,7 @@ def run_bound_of(
         plant=plant,
         watch=watch,
         service=service,
+        log=log,
     )
     known = report.to_json()
     kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages", "divergence")

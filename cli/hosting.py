@@ -17,6 +17,7 @@ from firable.nets.source import printable
 if TYPE_CHECKING:
     from firable.executor.drivers.driver import Driver
     from firable.executor.links.link import Link
+    from firable.executor.operating.log import Log
     from firable.executor.operating.service import Service
     from firable.executor.operating.situation import Situation
     from firable.executor.protocol.commands import Answer
@@ -147,6 +148,7 @@ def run_host_of(
     trace: str | None,
     said: Mapping[str, Answer],
     service: Service | None,
+    log: Log | None,
 ) -> Report:
     """Run this host until it is stopped or fails, and report how it ended."""
     from firable.executor.operating.hosting import machines_of, run_host
@@ -167,6 +169,7 @@ def run_host_of(
         said=said,
         tell=_told,
         service=service,
+        log=log,
     )
     return Report(
         "run",

@@ -10,6 +10,7 @@ import click
 from firable.cli import text
 from firable.cli.bound_run import run_bound_of, show_bound
 from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
+from firable.cli.log import log_option, log_to
 from firable.cli.operate import ServeOptions, serve_options
 from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option, refuse_a_net
 from firable.cli.report import Report
@@ -40,6 +41,7 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
     help="Times real time; max is virtual time, where a run is a function of bundle, plant and seed.",
 )
 @click.option("--trace", metavar="FILE", help="Write what happens to a file, for `firable replay`.")
+@log_option
 @trust_option
 @host_options
 @click.option(
@@ -65,6 +67,7 @@ def run(
     seed: int,
     speed: str,
     trace: str | None,
+    log: str | None,
     trust: tuple[str, ...],
     say: tuple[str, ...],
     watch: str,
@@ -95,6 +98,9 @@ def run(
     first thing that they do and cannot have done, or have not done and must have, is told, and with --watch stop it
     ends the run.
 
+    With --log, what happens to the run is told in JSON lines as well: links and hosts that come and go, faults, what an
+    operator commands, and how it ends.
+
     With --serve, in real time, `firable operate` pauses, steps and stops the run from elsewhere, and Prometheus reads
     its figures; everybody is asked for a token or a certificate, and beyond this host nothing goes without TLS.
 
@@ -124,7 +130,7 @@ def run(
             if trace is not None:
                 _refuse_to_overwrite(trace, bundle, *filter(None, (options.bind, options.journal)))
             said = _said(loaded.net, say, options.journal)
-            return run_host_of(bundle, loaded, options, trace, said, service)
+            return run_host_of(bundle, loaded, options, trace, said, service, log_to(log))
         if options.bind is not None:
             if trace is not None:
                 _refuse_to_overwrite(trace, bundle, options.bind, *_files_beside(options.journal))
@@ -140,6 +146,7 @@ def run(
                 plant=None if plant is None else read_plant(_plant_file(loaded, plant)),
                 watch=Watch(watch),
                 service=service,
+                log=log_to(log),
             )
         plant_file = _plant_file(loaded, plant)
         model = read_plant(plant_file)
@@ -157,6 +164,7 @@ def run(
             said=_said(loaded.net, say, options.journal),
             watch=Watch(watch),
             service=service,
+            log=log_to(log),
             operator=stepping(_SPEEDS[speed], to_stderr=format_ == "json") if step else None,
         )
         return Report(

@@ -41,6 +41,7 @@ from firable.executor.operating.acts import Acts, CommandTaken, SignalRead
 from firable.executor.operating.alarms import Alarms
 from firable.executor.operating.clock import RunClock
 from firable.executor.operating.figures import Figures
+from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.peers import REPEAT_SECONDS, Peers
 from firable.executor.operating.recorder import TRACE, Recorder
@@ -91,6 +92,7 @@ class Host:
         settle_seconds: float = SETTLE_SECONDS,
         repeat_seconds: float = REPEAT_SECONDS,
         patience: Patience | None = None,
+        log: Log | None = None,
     ) -> None:
         self.net = decomposition.net
         self.driver = driver
@@ -114,7 +116,8 @@ class Host:
         self.divergence: Divergence | None = None
         self.stop_at_divergence = stop_at_divergence
         self.watching = None if monitor is None else Watching(monitor, self._diverged)
-        recorder.observers += [one.seen for one in (self.watching, figures) if one is not None]
+        self.log = log
+        recorder.observers += [one.seen for one in (self.watching, figures, log) if one is not None]
         self.owner_of = {
             signal.name: name for name in self.controllers for signal in decomposition.subnet(name).signals
         }
@@ -163,6 +166,8 @@ class Host:
         tasks = [asyncio.create_task(work, name=name) for name, work in works.items()]
         for task in tasks:
             task.add_done_callback(self._task_ended)
+        if self.log is not None:
+            self.log.began(self.net.name, [*self.coordinators, *self.controllers])
         try:
             self.acts.start()
             ended = await self._outcome(self.outcome)
@@ -183,6 +188,8 @@ class Host:
             self.recorder.end(self.now_seconds(), self.marking, ended.state.value)
         else:
             self.recorder.flush()
+        if self.log is not None:
+            self.log.ended(ended)
         return ended
 
     async def _outcome(self, outcome: asyncio.Future[Situation]) -> Situation:

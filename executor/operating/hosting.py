@@ -16,6 +16,7 @@ from typing import Final
 from firable.executor.drivers.driver import Driver
 from firable.executor.links.link import Greeting, Link
 from firable.executor.operating.host import Host, Told
+from firable.executor.operating.log import Log
 from firable.executor.operating.service import Service, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.taken_up import opened
@@ -162,6 +163,7 @@ def run_host(
     overdue_seconds: float = 120.0,
     tell: Told | None = None,
     service: Service | None = None,
+    log: Log | None = None,
 ) -> HostReport:
     """Run a host until it is stopped (Ctrl-C, SIGTERM, an operator) or fails.
 
@@ -184,6 +186,7 @@ def run_host(
             said=said,
             tell=tell,
             figures=figures,
+            log=log,
         )
         situation = run_to_the_end(host, service, figures)
     return HostReport(situation, machines, host.acts.messages, host.acts.repeats, host.peers.never_met)

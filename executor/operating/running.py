@@ -21,6 +21,7 @@ from firable.executor.drivers.binding import Binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.operating.host import Host
+from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.recorder import LineStream
 from firable.executor.operating.service import Service, figures_for, patience_with, run_to_the_end
@@ -124,6 +125,7 @@ def run(
     said: Mapping[str, Answer] | None = None,
     watch: Watch = Watch.TELL,
     service: Service | None = None,
+    log: Log | None = None,
 ) -> RunReport:
     """Run a bundle on the simulated cell of a plant until `workpieces` workpieces have gone through.
 
@@ -132,7 +134,7 @@ def run(
     accounted for; `said` gives the operator's word on those that no machine can tell of, by place.
 
     The machines are held against their plant file as the run goes (`watch`). With a `service` an operator may act from
-    elsewhere, in real time.
+    elsewhere, in real time. A `log` is told what the trace notes.
 
     `speed` None is virtual time, 1.0 real time, 10.0 ten times as fast. A command that is not completed within
     `overdue_seconds` (of the cell's time) is a fault. Raises `InputError` F5002 where the bundle is not proved, F5003
@@ -157,6 +159,7 @@ def run(
         said=said,
         watch=watch,
         service=service,
+        log=log,
     )
 
 
@@ -177,6 +180,7 @@ def execute(
     said: Mapping[str, Answer] | None = None,
     watch: Watch = Watch.TELL,
     service: Service | None = None,
+    log: Log | None = None,
 ) -> RunReport:
     """Run a decomposition, proved or not, on the simulated cell of a plant; parameters as for `run`.
 
@@ -203,6 +207,7 @@ def execute(
             monitor=Monitor(decomposition.net, plant) if watched else None,
             stop_at_divergence=watch is Watch.STOP,
             figures=figures,
+            log=log,
         )
         situation = run_to_the_end(host, service, figures, virtual=speed is None)
     delivered = tuple(workpiece.id for workpiece in cell.delivered)
@@ -237,12 +242,13 @@ def run_bound(
     plant: PlantModel | None = None,
     watch: Watch = Watch.TELL,
     service: Service | None = None,
+    log: Log | None = None,
 ) -> RunReport:
     """Run a bundle on the machines of a binding, in real time, until the operator stops it or nothing can go on.
 
     What workpieces there are is not to be known; the report counts none. `tell` is told of links that come and go, by
     device and sentence; journal, `resume` and `said` are as for `run`, and so are `watch`, where a `plant` says what
-    the machines do, and `service`. Raises `InputError` F5002 where the bundle is
+    the machines do, `service` and `log`. Raises `InputError` F5002 where the bundle is
     not proved, F5101 where the binding does not fit it, both before anything is connected; F1017 where the trace cannot
     be written, and F5031 to F5034 where the journal cannot be gone on with.
     """
@@ -268,6 +274,7 @@ def run_bound(
             monitor=None if watched is None else Monitor(decomposition.net, watched),
             stop_at_divergence=watch is Watch.STOP,
             figures=figures,
+            log=log,
         )
         situation = run_to_the_end(host, service, figures)
         recorder = files.recorder

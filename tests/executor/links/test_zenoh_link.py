@@ -101,7 +101,9 @@ def test_what_a_stranger_publishes_is_not_delivered() -> None:
             there.session.put(f"{to}/{there.identity}", b"\xff" + message)  # damaged
             there.session.put(f"{to}/abc", message)  # of a process that is not known
             there.session.delete(f"{to}/{there.identity}")  # not a message
-            there.session.put(f"firable/{PROTOCOL_VERSION}/d2/to/%/{here.identity}/from/robot/{there.identity}", message)
+            there.session.put(
+                f"firable/{PROTOCOL_VERSION}/d2/to/%/{here.identity}/from/robot/{there.identity}", message
+            )
             while not centre.messages:
                 there.send("robot", COORDINATOR, Report("robot", Readiness(7, frozenset())))
                 await asyncio.sleep(0.02)

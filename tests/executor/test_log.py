@@ -1,0 +1,93 @@
+"""The log of a run: few lines, each with what happened, how much it matters, and when."""
+
+from __future__ import annotations
+
+import io
+import json
+import logging
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.cells import decomposition_of, plant_of
+
+from firable.cli.log import log_to
+from firable.cli.main import main
+from firable.executor import State, Watch, execute
+from firable.executor.cell.plant import NeverCompletes
+from firable.executor.operating.log import Log, logger_to
+from firable.executor.operating.situation import Situation
+from firable.nets.diagnostics import InputError
+from firable.semantics.trace import Noted
+
+
+def lines(text: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def test_a_log_tells_how_a_run_began_and_ended_and_what_failed_with_what_waits_for_what() -> None:
+    stream = io.StringIO()
+    report = execute(
+        decomposition_of("one_robot"),
+        plant_of("one_robot"),
+        workpieces=2,
+        overdue_seconds=60.0,
+        watch=Watch.IGNORE,
+        disturbances=[NeverCompletes("MC", "CLAMP", 1)],
+        log=Log(logger_to(logging.StreamHandler(stream))),
+    )
+    assert report.state is State.FAULT
+    told = lines(stream.getvalue())
+    assert [(line["level"], line["event"]) for line in told] == [
+        ("info", "began"),
+        ("error", "fault"),
+        ("error", "ended"),
+    ]
+    assert told[0]["machines"] == ["", "system", "robot", "mc", "conveyor"]
+    assert "is overdue" in told[1]["message"]
+    assert any("waits for mc.clamped" in sentence for sentence in told[2]["blocked"])
+    assert all(line["time"].endswith("Z") for line in told)
+
+
+def test_logs_of_two_runs_do_not_write_into_each_other() -> None:
+    streams = io.StringIO(), io.StringIO()
+    logs = [Log(logger_to(logging.StreamHandler(stream))) for stream in streams]
+    logs[0].seen(Noted(1.0, "lost", {"message": "'robot' is lost"}))
+    assert lines(streams[0].getvalue())[0]["level"] == "warning"
+    assert not streams[1].getvalue()
+
+
+def test_a_log_that_is_rotated_goes_on_in_a_new_file(tmp_path: Path) -> None:
+    path = tmp_path / "run.log"
+    log = log_to(str(path))
+    assert log is not None
+    log.began("cell", ["robot"])
+    path.rename(tmp_path / "run.log.1")
+    log.ended(Situation(State.STOPPED, ("robot.free",)))
+    assert [line["event"] for line in lines(path.read_text())] == ["ended"]
+
+
+def test_a_log_that_breaks_is_told_once_and_ends_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    log = log_to(str(folder / "run.log"))
+    assert log is not None
+    (folder / "run.log").unlink()
+    folder.rmdir()
+    for _ in range(3):
+        log.began("cell", ["robot"])
+    assert capsys.readouterr().err.count("cannot be written any more") == 1
+
+
+def test_a_log_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        log_to(str(tmp_path / "none" / "run.log"))
+    assert caught.value.diagnostics[0].code == "F1017"
+
+
+def test_the_command_writes_the_log_that_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bundle = str(tmp_path / "cell.bundle")
+    assert main(["bundle", "catalogue:one_robot", "-o", bundle]) == 0
+    assert main(["run", bundle, "--workpieces", "1", "--log", str(tmp_path / "run.log")]) == 0
+    capsys.readouterr()
+    assert [line["event"] for line in lines((tmp_path / "run.log").read_text())] == ["began", "ended"]
