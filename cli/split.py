@@ -186,7 +186,7 @@ def _show(report: Report) -> None:
     if not report.table:
         click.echo("  no transition has more than one participant")
     for title, lines in (
-        ("proposed owners", _proposed(report.split.get("suggestion"))),
+        ("proposed owners", _proposed(report.split.get("suggestion"), written=bool(report.files))),
         ("coordinated, or decided higher up, because of a gate or a conflict", _because(report.split["coordinated"])),
         ("arbitration", _groups(report)),
         ("votes", _votes(report)),
@@ -205,7 +205,7 @@ def _show(report: Report) -> None:
     text.show_page(report)
 
 
-def _proposed(suggestion: Mapping[str, Any] | None) -> Iterator[str]:
+def _proposed(suggestion: Mapping[str, Any] | None, *, written: bool) -> Iterator[str]:
     """What was proposed, what it cuts, and what that compares with."""
     if suggestion is None:
         return
@@ -224,6 +224,8 @@ def _proposed(suggestion: Mapping[str, Any] | None) -> Iterator[str]:
         yield f"{one['transition']} joins {_listed(one['controllers'])}"
     if len(cut) > _CONTROLLERS_MAX:
         yield f"and {len(cut) - _CONTROLLERS_MAX} more are cut; --format json has them all"
+    if not written:
+        yield "-o FILE writes the net with these owners, each place and signal under its controller"
 
 
 def _because(reasons: Sequence[dict[str, Any]]) -> Iterator[str]:

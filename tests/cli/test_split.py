@@ -106,7 +106,10 @@ def test_proposed_owners_are_told_with_their_reasons_and_written(
     assert "proposed        7 global,   16 votes" in told
     assert "in the file     9 global,   24 votes" in told
     assert "G3 joins cv1, r" in told
+    assert "-o FILE writes" not in told
     assert main(["prove", str(path)]) == 0
+    assert main(["split", "catalogue:one_robot", "--suggest", "2"]) == 0
+    assert "-o FILE writes the net with these owners" in capsys.readouterr().out
 
 
 def test_json_of_a_proposal_fits_the_schema(capsys: pytest.CaptureFixture[str]) -> None:
