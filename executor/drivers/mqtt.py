@@ -20,7 +20,7 @@ from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes, quiet
 
@@ -28,14 +28,23 @@ if TYPE_CHECKING:
     from aiomqtt import Client
 
 
+class MqttTls(BaseModel):
+    """The files of TLS: the authority of the broker, and a certificate of one's own where the broker asks for one."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    ca: str | None = None
+    certificate: str | None = None
+    key: str | None = None
+
+
 class MqttOptions(Options):
-    """A broker; `tls` uses the certificates that the system trusts."""
+    """A broker; `tls: true` trusts the authorities that the system trusts."""
 
     host: str
     port: int = Field(default=1883, ge=1, le=65_535)
     user: str | None = None
     password: str | None = None
-    tls: bool = False
+    tls: bool | MqttTls = False
 
 
 class MqttConnection:
@@ -110,6 +119,9 @@ class Mqtt:
         from aiomqtt import Client, MqttError, TLSParameters
 
         quiet("firable.mqtt")
+        tls = TLSParameters() if options.tls else None
+        if isinstance(options.tls, MqttTls):
+            tls = TLSParameters(options.tls.ca, options.tls.certificate, options.tls.key)
         client = Client(
             options.host,
             options.port,
@@ -118,7 +130,7 @@ class Mqtt:
             logger=logging.getLogger("firable.mqtt"),
             timeout=wanted.timeout_s,
             keepalive=max(1, math.ceil(wanted.timeout_s)),
-            tls_params=TLSParameters() if options.tls else None,
+            tls_params=tls,
         )
         connection = MqttConnection(client, wanted)
         try:

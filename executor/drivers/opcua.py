@@ -15,9 +15,10 @@ import asyncio
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes, quiet
 
@@ -32,6 +33,22 @@ OVERFLOW: Final = 0x480
 """The bits of a status by which a server says that it has dropped changes from a queue."""
 
 
+class OpcUaSecurity(BaseModel):
+    """How messages are signed and encrypted, and the files of who is who (PEM or DER).
+
+    `server` is the certificate of the server itself: what another one shows is not believed, whoever has signed it.
+    `application` is the name by which the certificate of this client was made out, where the server asks for that.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    policy: Literal["Basic256Sha256", "Aes128Sha256RsaOaep", "Aes256Sha256RsaPss"] = "Basic256Sha256"
+    mode: Literal["Sign", "SignAndEncrypt"] = "SignAndEncrypt"
+    certificate: str
+    key: str
+    server: str
+    application: str | None = None
+
+
 class OpcUaOptions(Options):
     """A server, and how often it looks at its nodes and tells of them."""
 
@@ -39,6 +56,7 @@ class OpcUaOptions(Options):
     every_s: float = Field(default=0.01, gt=0, le=60, allow_inf_nan=False)
     user: str | None = None
     password: str | None = None
+    security: OpcUaSecurity | None = None
 
 
 class OpcUaConnection:
@@ -170,6 +188,7 @@ class OpcUa:
         """Make a new client."""
         from asyncua.client.client import Client
         from asyncua.ua.uaerrors import UaError
+        from cryptography.exceptions import InvalidSignature
 
         quiet("asyncua")
         client = Client(options.url, timeout=wanted.timeout_s, watchdog_intervall=wanted.timeout_s)
@@ -178,14 +197,36 @@ class OpcUa:
             client.set_password(options.password or "")
         connection = OpcUaConnection(client, wanted)
         try:
+            if options.security is not None:
+                await _secure(client, options.security)
             await connection.open(options.every_s)
-        except UaError as error:
+        except (UaError, InvalidSignature) as error:
             await connection.close()
-            raise LinkError(f"{options.url}: {error}") from None
+            raise LinkError(f"{options.url}: {error or type(error).__name__}") from None
         except BaseException:
             await connection.close()
             raise
         return connection
+
+
+async def _secure(client: Client, security: OpcUaSecurity) -> None:
+    from asyncua.crypto import security_policies
+    from asyncua.crypto.uacrypto import CertProperties
+    from asyncua.ua.uaprotocol_auto import MessageSecurityMode
+
+    if security.application is not None:
+        client.application_uri = security.application
+    try:
+        await client.set_security(
+            getattr(security_policies, f"SecurityPolicy{security.policy}"),
+            Path(security.certificate),
+            Path(security.key),
+            server_certificate=CertProperties(Path(security.server)),
+            mode=MessageSecurityMode[security.mode],
+        )
+    except ValueError as error:
+        files = f"{security.certificate}, {security.key}, {security.server}"
+        raise LinkError(f"what stands in these files is no certificate and its key: {files}: {error}") from None
 
 
 KIND: Final = OpcUa()

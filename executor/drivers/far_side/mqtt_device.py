@@ -27,15 +27,26 @@ def mosquitto() -> str | None:
     return shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
 
 
-class MqttEnd:
-    """A device that takes what is written to `taken` topics, and a broker; `port` 0 takes a free one for drivers."""
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
 
-    def __init__(self, taken: Collection[Point], port: int = 0) -> None:
+
+class MqttEnd:
+    """A device that takes what is written to `taken` topics, and a broker; `port` 0 takes a free one for drivers.
+
+    With `secured`, drivers come by a listener of their own that has these lines of the broker's configuration.
+    """
+
+    def __init__(self, taken: Collection[Point], port: int = 0, secured: str = "") -> None:
+        self.secured = secured
         self.faults = Faults()
         quiet("firable.mqtt")
         self.taken = sorted(taken)
         self.relay = Relay(self.faults, port)
-        self.behind = 0
+        self.behind = self.front = 0
         self.broker: asyncio.subprocess.Process | None = None
         self.folder: tempfile.TemporaryDirectory[str] | None = None
         self.changes: asyncio.Queue[tuple[Point, Value]] = asyncio.Queue()
@@ -54,20 +65,26 @@ class MqttEnd:
         program = mosquitto()
         if program is None:
             raise FileNotFoundError("mosquitto is not installed")
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.behind = probe.getsockname()[1]
+        self.behind = self.front = _free_port()
         self.folder = tempfile.TemporaryDirectory()
         configuration = Path(self.folder.name) / "mosquitto.conf"
-        configuration.write_text(
-            f"listener {self.behind} 127.0.0.1\nallow_anonymous true\npersistence false\nset_tcp_nodelay true\n"
-        )
+        lines = ["per_listener_settings true", "persistence false", "set_tcp_nodelay true"]
+        lines += [f"listener {self.behind} 127.0.0.1", "allow_anonymous true"]
+        if self.secured:
+            self.front = _free_port()
+            lines += [f"listener {self.front} 127.0.0.1", self.secured]
+        configuration.write_text("\n".join([*lines, ""]))
         quiet = asyncio.subprocess.DEVNULL
         self.broker = await asyncio.create_subprocess_exec(
             program, "-c", str(configuration), stdout=quiet, stderr=quiet
         )
         self.serving = asyncio.create_task(self._serve())
-        await self.is_ready.wait()
+        ways = [asyncio.create_task(self.is_ready.wait()), asyncio.create_task(self.broker.wait())]
+        await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+        for way in ways:
+            way.cancel()
+        if self.broker.returncode is not None:
+            raise RuntimeError("mosquitto has ended; does it understand its configuration?")
         await self.mend()
 
     async def stop(self) -> None:
@@ -92,7 +109,7 @@ class MqttEnd:
 
     async def mend(self) -> None:
         """Take connections again, at the same port."""
-        await self.relay.open(self.behind)
+        await self.relay.open(self.front)
 
     async def _serve(self) -> None:
         while True:

@@ -6,7 +6,7 @@ Its nodes are made when it starts, from the values that its points have at first
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from asyncua import ua
@@ -23,7 +23,11 @@ from firable.executor.drivers.far_side.relay import Relay
 class OpcUaEnd:
     """A server in the network of this host; `port` 0 takes a free one."""
 
-    def __init__(self, points: Mapping[Point, Value], port: int = 0) -> None:
+    def __init__(
+        self, points: Mapping[Point, Value], port: int = 0, secure: Callable[[Server], Awaitable[None]] | None = None
+    ) -> None:
+        self.secure = secure
+        """What makes the server demand more than that somebody comes."""
         self.faults = Faults()
         self.values = dict(points)
         self.relay = Relay(self.faults, port, garbles=False)
@@ -75,7 +79,10 @@ class OpcUaEnd:
         quiet("asyncua")
         self.server = Server()
         await self.server.init()
-        self.server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
+        if self.secure is None:
+            self.server.set_security_policy([ua.SecurityPolicyType.NoSecurity])
+        else:
+            await self.secure(self.server)
         self.server.set_endpoint("opc.tcp://127.0.0.1:0/")
         await self.server.register_namespace("firable")
         for point, value in self.values.items():
