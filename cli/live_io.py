@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections.abc import Mapping
@@ -29,9 +30,23 @@ _COLOURS = {"good": "green", "uncertain": "yellow", "bad": "red"}
 @click.option("--for", "seconds", type=click.FloatRange(min=0), metavar="SECONDS", help="End by itself after so long.")
 @click.option("--force", metavar="SIGNAL=0|1", multiple=True, help="Write a signal on its device.")
 @click.option("--send", metavar="PLACE", multiple=True, help="Send the command of a place; needs --net.")
+@click.option(
+    "--format",
+    "format_",
+    type=click.Choice(["text", "json"]),
+    default="text",
+    show_default=True,
+    help="How to print: as a table, or one JSON document a line; `firable schema io` prints its schema.",
+)
 @click.option("--net", "of", metavar="NET", help="The net, or the bundle, whose commands are sent.")
 def live_io(
-    bind: str, once: bool, seconds: float | None, force: tuple[str, ...], send: tuple[str, ...], of: str | None
+    bind: str,
+    once: bool,
+    seconds: float | None,
+    force: tuple[str, ...],
+    send: tuple[str, ...],
+    format_: str,
+    of: str | None,
 ) -> int:
     """Show the signals of BIND as they are: value, quality, age, and how many edges were coalesced.
 
@@ -41,7 +56,8 @@ def live_io(
     --send this is the master of the devices: it gives them their heartbeats, and drives the safe outputs at both ends.
     Never do that beside a running cell.
 
-    Ctrl-C ends it. Exit code 3 where --once cannot read something.
+    Ctrl-C ends it. Exit codes: 0, or 1 where a machine was stopped or has failed at what was sent, 2 for a binding that
+    cannot be used, and 3 where --once cannot read something.
     """
     import asyncio
 
@@ -51,7 +67,8 @@ def live_io(
     forced = [_forced(binding, text) for text in force]
     places = _sent(binding, send, of)
     try:
-        return asyncio.run(_shown(binding, forced, places, once=once, seconds=seconds))
+        heard = _Heard() if format_ == "text" else _HeardByPrograms(bind)
+        return asyncio.run(_shown(binding, forced, places, heard, once=once, seconds=seconds))
     except KeyboardInterrupt:
         return 0
 
@@ -99,6 +116,8 @@ class _Heard:
 
     def __init__(self) -> None:
         self.begun = time.monotonic()
+        self.failed = False
+        """Whether a machine has failed, or was stopped."""
         self.lines = 0
         """How many lines of the table stand above, to be written over."""
 
@@ -118,20 +137,23 @@ class _Heard:
         pass
 
     def driver_fault(self, machine: str, message: str) -> None:
+        self.failed = True
         self._told(f"{click.style('fault', fg='red')}: {machine}: {message}")
 
     def driver_note(self, machine: str, message: str) -> None:
         self._told(f"{machine}: {message}")
 
     def emergency_stop(self, reason: str) -> None:
+        self.failed = True
         self._told(f"{click.style('emergency stop', fg='red')}: {reason}")
 
     def _told(self, line: str) -> None:
         self.lines = 0
         click.echo(line, err=True)
 
-    def show(self, readings: Mapping[str, Reading]) -> None:
+    def show(self, driver: BoundDriver) -> None:
         """The table, over the one before where that stands on a terminal."""
+        readings = driver.readings()
         if self.lines and sys.stdout.isatty():
             click.echo(f"\x1b[{self.lines}F\x1b[J", nl=False)
         rows = list(self.rows(readings))
@@ -152,8 +174,43 @@ class _Heard:
         return rows
 
 
+class _HeardByPrograms(_Heard):
+    """Who listens for a program: one line of JSON at a time."""
+
+    def __init__(self, binding: str) -> None:
+        super().__init__()
+        self.binding = binding
+
+    def show(self, driver: BoundDriver) -> None:
+        """Everything, as one document."""
+        now = self.now_seconds()
+        document = {
+            "firable_io": 1,
+            "binding": self.binding,
+            "at_seconds": round(now, 3),
+            "devices": {name: {"connected": one.is_ready.is_set()} for name, one in driver.devices.items()},
+            "signals": {
+                name: {
+                    "value": reading.value,
+                    "quality": reading.quality.value,
+                    "age_seconds": None if reading.value is None else round(now - reading.at_seconds, 3),
+                    "coalesced": reading.coalesced,
+                    "why": reading.why,
+                }
+                for name, reading in driver.readings().items()
+            },
+        }
+        click.echo(json.dumps(document, ensure_ascii=False))
+
+
 async def _shown(
-    binding: Binding, forced: list[tuple[str, bool]], places: list[Place], *, once: bool, seconds: float | None
+    binding: Binding,
+    forced: list[tuple[str, bool]],
+    places: list[Place],
+    heard: _Heard,
+    *,
+    once: bool,
+    seconds: float | None,
 ) -> int:
     """Show the signals until the end; returns the exit code."""
     import asyncio
@@ -162,7 +219,6 @@ async def _shown(
     from firable.executor.drivers.driver import Quality
 
     driver = BoundDriver(binding if places else binding.watching(), (), frozenset())
-    heard = _Heard()
     running = asyncio.create_task(driver.run(heard, heard))
     try:
         reached = await _connected(driver, running)
@@ -170,24 +226,24 @@ async def _shown(
             driver.force(signal, value)
         for place in places:
             driver.send(place, 0)
-        while any(device.is_writing for device in driver.devices.values() if device.is_ready.is_set()):
+        while not heard.failed and any(d.is_writing for d in driver.devices.values() if d.is_ready.is_set()):
             await asyncio.sleep(0.01)
         if once:
             await asyncio.sleep(_REFRESH_SECONDS)  # what is told a moment after the first answer
-            heard.show(driver.readings())
+            heard.show(driver)
             good = all(reading.quality is Quality.GOOD for reading in driver.readings().values())
-            return 0 if good and reached else 3
+            return 3 if not (good and reached) else 1 if places and heard.failed else 0
         before: dict[str, Reading] = {}
         while seconds is None or heard.now_seconds() < seconds:
             now = dict(driver.readings())
             changed = [name for name, one in now.items() if name not in before or _differ(one, before[name])]
             if sys.stdout.isatty() or changed:
-                heard.show(now)
+                heard.show(driver)
             before = now
             await asyncio.wait([running], timeout=_REFRESH_SECONDS)
             if running.done():
                 running.result()
-        return 0
+        return 1 if places and heard.failed else 0
     finally:
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)

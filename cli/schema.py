@@ -9,10 +9,12 @@ from typing import Any
 import click
 
 
-@click.command(short_help="Print the JSON Schema of net files, task files, plant files or reports.")
-@click.argument("kind", type=click.Choice(["net", "tasks", "plant", "report"]))
+@click.command(short_help="Print the JSON Schema of net files, task files, plant files or what is printed.")
+@click.argument("kind", type=click.Choice(["net", "tasks", "plant", "report", "io"]))
 def schema(kind: str) -> int:
     """Print the JSON Schema of a net file, a file of tasks, a plant file, or of what --format json prints.
+
+    `report` is what most commands print, `io` a line of `firable io`.
 
     Editors complete and check net files by it.
     """
@@ -35,4 +37,4 @@ def _schema(kind: str) -> Any:
 
             return PlantModel.model_json_schema()
         case _:
-            return json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+            return json.loads(files("firable.cli").joinpath(f"{kind}.schema.json").read_text(encoding="utf-8"))

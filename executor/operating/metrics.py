@@ -72,6 +72,12 @@ class Metrics:
             ["signal"],
             registry=registry,
         )
+        self.good = Gauge(
+            "firable_input_good",
+            "1 while a signal, or a contact of the emergency stop, is read and believed",
+            ["signal"],
+            registry=registry,
+        )
         self.messages = Counter(
             "firable_messages", "Messages between controllers and coordinator", ["kind"], registry=registry
         )
@@ -83,7 +89,9 @@ class Metrics:
         )
         self.rounds = Counter("firable_rounds", "Rounds of votes, by how they ended", ["outcome"], registry=registry)
         self.repeats = Counter("firable_repeats", "Messages sent again, unanswered so far", registry=registry)
-        self.faults = Counter("firable_faults", "Faults and divergences told", ["kind"], registry=registry)
+        self.faults = Counter(
+            "firable_faults", "Faults, divergences and emergency stops told", ["kind"], registry=registry
+        )
         self.since: dict[str, float] = {}
         self.fired_at: dict[str, float] = {}
         self.sent_at: dict[str, tuple[float, str]] = {}
@@ -117,7 +125,7 @@ class Metrics:
             case Noted(at, note, {"controller": str(controller), "transition": str(name)}) if note == APPLIED:
                 self._moved(at, name, {place.name for place in self.net.places if place.owner == controller})
             case Noted(_, note):
-                if note in ("fault", "divergence"):
+                if note in ("fault", "divergence", "emergency stop"):
                     self.faults.labels(note).inc()
 
     def message(self, message: Message, *, again: bool = False) -> None:
@@ -133,6 +141,10 @@ class Metrics:
                 still = {one for one in decided if one >= message.closed_below}
                 self.decided[message.coordinator] = still | {number}
                 self.rounds.labels("aborted" if message.committed is None else "committed").inc()
+
+    def input_read(self, signal: str, *, good: bool) -> None:
+        """Say how far what a driver reads of a signal may be believed."""
+        self.good.labels(signal).set(good)
 
     def inputs_coalesced(self, signal: str, changes: int = 1) -> None:
         """Count changes of a signal that a driver saw and could not hand over one by one."""

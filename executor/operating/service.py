@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bound import BoundDriver
-from firable.executor.drivers.driver import Driver
+from firable.executor.drivers.driver import Driver, Quality
 from firable.executor.operating.host import Host
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.uncut import STOP_SECONDS, Guard, Patience, ended_by_signals
@@ -83,6 +83,7 @@ async def _serving(host: Host, service: Service, figures: Metrics) -> Situation:
 
     def text() -> bytes:
         for signal, reading in host.driver.readings().items():
+            figures.input_read(signal, good=reading.quality is Quality.GOOD)
             if new := reading.coalesced - counted.get(signal, 0):
                 figures.inputs_coalesced(signal, new)
                 counted[signal] = reading.coalesced

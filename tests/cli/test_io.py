@@ -1,13 +1,17 @@
 """`firable sim`, `firable io` and `firable run --bind`: the cell over sockets, looked at, forced and run."""
 
+import json
 import signal
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
+import jsonschema
 import pytest
 
 from firable.cli.main import main
@@ -17,6 +21,7 @@ from firable.nets.machines.plant_file import read_plant
 from firable.semantics.replaying import replay
 from firable.semantics.trace import read_trace
 
+SCHEMA = json.loads(files("firable.cli").joinpath("io.schema.json").read_text(encoding="utf-8"))
 NET = catalogue_net("one_robot")
 SENSORS = read_plant(catalogue_path("one_robot").with_name("one_robot.plant.yaml")).sensors
 
@@ -76,6 +81,36 @@ def test_signals_are_shown_and_forced_only_where_the_binding_allows_it(
     assert "does not allow 'robot.touch' to be forced" in capsys.readouterr().err
 
 
+def shown(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
+    """What was printed, line by line, each as the published schema has it."""
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    for line in lines:
+        jsonschema.Draft202012Validator(SCHEMA).validate(line)
+    return lines
+
+
+def test_a_program_reads_signals_as_lines_of_json_of_the_published_schema(
+    cell: Cell, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    assert main(["io", str(cell.bind), "--once", "--format", "json", "--force", "mc.part_present=1"]) == 0
+    (line,) = shown(capsys)
+    assert line["devices"] == {"modbus": {"connected": True}}
+    assert (line["signals"]["mc.part_present"]["value"], line["signals"]["mc.part_present"]["quality"]) == (
+        True,
+        "good",
+    )
+    assert main(["io", str(cell.bind), "--for", "0.6", "--format", "json"]) == 0
+    assert 1 <= len(shown(capsys)) <= 3  # one for each change
+    gone = tmp_path / "gone.bind.yaml"
+    text = binding_text(NET, {"modbus": free_port()}, SENSORS)
+    gone.write_text(text.replace("host: 127.0.0.1", "host: 127.0.0.1\n    start_s: 0.2"))
+    assert main(["io", str(gone), "--once", "--format", "json"]) == 3
+    (line,) = shown(capsys)
+    assert line["devices"] == {"modbus": {"connected": False}}
+    assert {(one["value"], one["quality"]) for one in line["signals"].values()} == {(None, "bad")}
+
+
 def test_looking_writes_nothing_and_sending_by_hand_is_for_what_the_binding_allows(cell: Cell) -> None:
     sending = ["io", str(cell.bind), "--once", "--net", "catalogue:one_robot", "--send"]
     assert main(["io", str(cell.bind), "--once"]) == 0
@@ -97,12 +132,24 @@ def test_what_cannot_be_read_is_told_and_unknown(tmp_path: Path, capsys: pytest.
 def test_bundle_runs_on_the_machines_of_a_binding_until_it_is_stopped(cell: Cell, tmp_path: Path) -> None:
     bundle, trace = tmp_path / "cell.bundle", tmp_path / "trace"
     assert main(["bundle", "catalogue:one_robot", "-o", str(bundle)]) == 0
-    running = firable("run", str(bundle), "--bind", str(cell.bind), "--trace", str(trace))
+    running = firable("run", str(bundle), "--bind", str(cell.bind), "--trace", str(trace), "--format", "json")
     cell.line_with("workpiece 1 is carried out")
     running.send_signal(signal.SIGINT)
     said, _ = running.communicate(timeout=60)
     assert running.returncode == 0, said
-    assert "stopped after" in said
+    report = json.loads(said[said.index("{") :])
+    schema = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
+    bound = {
+        **schema,
+        "properties": {"run": {"$ref": "#/$defs/bound_run"}},
+        "additionalProperties": True,
+        "required": [],
+    }
+    jsonschema.Draft202012Validator(schema).validate(report)
+    (one,) = report["reports"]
+    jsonschema.Draft202012Validator(bound).validate(one)
+    assert (one["run"]["state"], one["run"]["binding"]) == ("stopped", str(cell.bind))
+    assert one["run"]["commands"] > 5
     assert replay(NET, read_trace(trace)).complete
 
 

@@ -1,0 +1,79 @@
+"""What drivers have read stands in the figures of a run: edges that were not told, and what cannot be believed."""
+
+import asyncio
+from importlib.metadata import EntryPoint
+
+import pytest
+from aiohttp import ClientSession
+from support.third_party_driver import MemoryEnd
+
+from firable.decompose.splitting.cut import split
+from firable.executor.drivers import kinds
+from firable.executor.drivers.bench import until
+from firable.executor.drivers.binding import parse_binding
+from firable.executor.drivers.bound import bound_driver
+from firable.executor.operating.control import Endpoint
+from firable.executor.operating.host import Host
+from firable.executor.operating.metrics import Metrics
+from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.service import Service, _serving
+from firable.nets.interchange import net_digest
+from firable.nets.text import parse_net
+
+NET = parse_net("""
+firable: 1
+cell: lamp
+controllers:
+  a: {start: dark, inputs: [key, other], places: {dark: , lit: }}
+transitions:
+  on1: {from: a.dark, to: a.lit, if: [a.key, a.other]}
+  off1: {from: a.lit, to: a.dark, unless: a.key}
+""")
+BINDING = """
+firable_bind: 1
+cell: lamp
+devices:
+  near: {driver: theirs, memory: near}
+  far: {driver: theirs, memory: far, start_s: 0.05}
+emergency_stop: {door: {device: near, read: door}}
+signals:
+  a.key: {device: near, read: key}
+  a.other: {device: far, read: other, on_loss: 0}
+"""
+
+
+def test_coalesced_edges_and_lost_signals_of_every_device_are_among_the_figures(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    theirs = EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP)
+    monkeypatch.setattr(kinds, "entry_points", lambda **_: [theirs])
+    token = "a token that nobody guesses"
+
+    async def main() -> tuple[str, str]:
+        near, _ = MemoryEnd("near"), MemoryEnd("far")  # which cannot be reached
+        await near.start(lambda _point, _value: None)
+        near.show("key", value=False)
+        near.show("door", value=True)
+        driver, metrics = bound_driver(parse_binding(BINDING), NET), Metrics(NET)
+        recorder, address = Recorder(NET, net_digest(NET), None), asyncio.get_running_loop().create_future()
+        host = Host(split(NET), driver, recorder, figures=metrics)
+        service = Service(Endpoint("127.0.0.1", 0, token), address.set_result)
+        serving = asyncio.create_task(_serving(host, service, metrics))
+        await until(lambda: driver.readings()["a.key"].value is False, "the signal is read")
+        for _ in range(3):
+            near.show("key", value=True)
+            near.show("key", value=False)
+        await until(lambda: driver.readings()["a.key"].coalesced == 6, "the edges")
+        await until(lambda: driver.readings()["a.other"].value is False, "the loss")
+        async with ClientSession(headers={"Authorization": f"Bearer {token}"}) as session:
+            text = await (await session.get(f"{await address}/metrics")).text()
+            near.show("door", value=False)
+            ended = await serving
+        return text, ended.message
+
+    text, message = asyncio.run(main())
+    assert 'firable_coalesced_inputs_total{signal="a.key"} 6.0' in text
+    assert 'firable_input_good{signal="a.key"} 1.0' in text
+    assert 'firable_input_good{signal="a.other"} 0.0' in text
+    assert 'firable_input_good{signal="emergency stop door"} 1.0' in text
+    assert message == "emergency stop: near: 'door' is open"
