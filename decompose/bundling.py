@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from firable.analysis.deadline import Deadline
+from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
@@ -38,6 +38,9 @@ SECONDS: Final = 30.0
 """How long evidence for the verdicts on the net is looked for, unless somebody says otherwise."""
 
 
+LATE: Final = "the time for evidence was over"
+
+
 def make_bundle(
     report: CheckReport,
     limits: Limits | None = None,
@@ -50,7 +53,7 @@ def make_bundle(
 ) -> Bundle:
     """Split the net of a report, prove the decomposition and bundle both with all verdicts and their evidence.
 
-    `limits` are for the evidence on the verdicts of the report: what it cannot show in that time is only claimed.
+    `limits` are for each kind of evidence anew: what of the report cannot be shown in that time is only claimed.
     `firable verify` will say so of a warning; a verdict that is required is no reason to run without evidence. With
     `protocol` and `faults` the bundle holds the verdicts on the protocol of this very net, too, proved by an
     invariant. With the text of a `plant` file, the bundle holds it and that its machines keep what votes rely on (O4);
@@ -66,33 +69,41 @@ def make_bundle(
     if not report.discipline is report.space.discipline is Discipline.INTERLEAVING:
         message = "the verdicts are on another discipline than interleaving, by which the net is executed"
         raise InputError([Diagnostic("F4003", message, "check the net with the discipline interleaving")])
+    seconds = SECONDS if limits is None else limits.deadline.left_seconds
     decomposition = split(report.net)
     proof = prove(decomposition, timeout_ms=timeout_ms)
     voted, shown = persistence(decomposition, report.space).with_evidence()
-    document = evidence_of_report(report, (), limits or Limits(Deadline.after(SECONDS)))
+    document = evidence_of_report(report, (), _anew(limits, seconds))
     named = {record.name for record in document.records if not record.lacking}
     on_the_net = (replace(v, evidence=(*v.evidence, EVIDENCE)) if v.name in named else v for v in report.verdicts)
     families = ["explored"] * (protocol or faults) + ["faults"] * faults
     run, obligations = proved_without_exploring(decomposition, families, timeout_ms)
-    dead, last_rites = sealed_outages(decomposition, limits) if faults else ((), {})
+    dead, last_rites = sealed_outages(decomposition, lambda: _anew(limits, seconds)) if faults else ((), {})
     held, machines = tuple[Verdict, ...](), dict[str, str]()
     if plant:
-        held, machines = held_gates(decomposition, parse_plant(plant)).sealed(plant, limits)
-    refined, opened = sealed(report.net, origin, limits, timeout_ms) if origin else ((), {})
+        held, machines = held_gates(decomposition, parse_plant(plant)).sealed(plant, _anew(limits, seconds))
+    refined, opened = sealed(report.net, origin, _anew(limits, seconds), timeout_ms) if origin else ((), {})
     verdicts = (*on_the_net, *proof.verdicts, *run, *dead, *held, *voted, *refined)
     proofs = {**proof.files, **obligations, **last_rites}
     files = {EVIDENCE: document.to_text(), **proofs, **machines, **shown, **opened}
     bundle = Bundle(decomposition, verdicts, files)
     if problems := unproved(bundle):
         lacking = {record.name: record.lacking for record in document.records if record.proved and record.lacking}
+        lacking |= {verdict.name: LATE for verdict in held if verdict.holds and not verdict.evidence}
         raise InputError(_unbundled(problem, lacking) for problem in problems)
     return bundle
+
+
+def _anew(limits: Limits | None, seconds: float | None) -> Limits:
+    """So many seconds from now on, and the memory of these limits."""
+    deadline = NEVER if seconds is None else Deadline.after(seconds)
+    return Limits(deadline) if limits is None else replace(limits, deadline=deadline)
 
 
 def _unbundled(problem: Diagnostic, lacking: Mapping[str, str]) -> Diagnostic:
     """What keeps a bundle from running, said to who makes it."""
     name = problem.subject[-1]
-    if name.startswith("o4."):
+    if name.startswith("o4.") and name not in lacking:
         hint = f"{problem.hint}; `firable prove NET --machines PLANT` shows the run"
         return replace(problem, code="F4003", hint=hint)
     if name not in lacking:

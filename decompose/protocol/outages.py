@@ -119,10 +119,10 @@ def inquests(decomposition: Decomposition, limits: Callable[[], Limits] = Limits
 
 
 def sealed_outages(
-    decomposition: Decomposition, limits: Limits | None = None
+    decomposition: Decomposition, limits: Callable[[], Limits] = Limits
 ) -> tuple[tuple[Verdict, ...], dict[str, str]]:
     """The verdicts on all who can be dead as a bundle holds them, and the documents that show them."""
-    found = [inquest.sealed() for inquest in inquests(decomposition, lambda: limits or Limits())]
+    found = [inquest.sealed() for inquest in inquests(decomposition, limits)]
     documents = {file: document.to_text() for _, some in found for file, document in some.items()}
     return tuple(verdict for verdict, _ in found), documents
 

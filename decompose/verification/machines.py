@@ -5,8 +5,9 @@ anew: of each gate that a vote relies on, whether a marking of the loop can be r
 places as Eq. (1) wants them and the gate open, and a move may close the gate. That the document shows this of the loop
 is checked as of any net.
 
-The loop itself is made by the one text that says what machine files mean, `firable.nets.machines`, as the net is read
-by the one reader of nets. That the plant is like the real machines nobody can show; it is assumed instead of O4.
+The net of the loop is made by the same text as in the prover, `firable.nets.machines`, and then held against a second
+reading of the plant file that shares nothing with it (`same_loop`), in every state. That the plant is like the real
+machines nobody can show; it is assumed instead of O4.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.documents import checked_document
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
+from firable.decompose.verification.same_loop import DiffersError, compare
 from firable.decompose.verification.solvers import Answers
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or
@@ -46,7 +48,11 @@ def check_machines(examination: Examination, cut: Cut, answers: Answers, timeout
         return
     plant = examination.text(PLANT)
     try:
-        loop = close(cut.net, parse_plant(plant, PLANT), sending=Sending.LATE)
+        model = parse_plant(plant, PLANT)
+        loop = close(cut.net, model, sending=Sending.LATE)
+        compare(cut.net, model, loop)
+    except DiffersError as error:
+        raise NotShownError(f"the loop with '{PLANT}' is not what that says: {error}", "evidence", PLANT) from None
     except InputError as error:
         message = f"'{PLANT}' closes no loop with the net: {error.diagnostics[0].message}"
         raise NotShownError(message, "evidence", PLANT) from None

@@ -12,7 +12,7 @@ from firable.analysis.check import check
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
 from firable.analysis.evidence.document import Document
 from firable.decompose.bundling import make_bundle
-from firable.decompose.verification import documents
+from firable.decompose.verification import documents, machines
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.machines import DOCUMENT, PLANT, PREFIX, check_machines
@@ -22,6 +22,7 @@ from firable.decompose.verification.solvers import by_cvc5
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
+from firable.nets.machines.laws import Laws
 
 TIMEOUT_MS = 10_000
 
@@ -48,6 +49,7 @@ def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(documents, "check_document", checker)
     monkeypatch.setattr(documents, "obligations", lambda *_: ())
+    monkeypatch.setattr(machines, "compare", lambda *_: 0)  # of the loop itself, which is not changed here
 
 
 def refused(bundle: Bundle) -> bool:
@@ -123,6 +125,15 @@ def test_the_document_on_other_machines_shows_nothing(old: str, new: str) -> Non
         check_bundle(resealed(bundled(), text))
     with pytest.raises(InputError, match=r"(?s)F4003.*'o4\..*' is violated, not proved.*--machines PLANT` shows"):
         make_bundle(check(catalogue_net("one_robot")), plant=text)
+
+
+def test_a_loop_that_is_not_what_the_plant_file_says_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mistake that prover and checker share, since one text closes the loop for both."""
+    monkeypatch.setattr(Laws, "spoiled", lambda *_: iter(()))
+    with pytest.raises(
+        InputError, match=r"the loop with 'plant\.yaml' is not what that says: .* as the plant file says"
+    ):
+        check_bundle(bundled())
 
 
 def test_the_machines_of_another_cell_are_refused() -> None:

@@ -1,0 +1,278 @@
+"""A second reading of the plant file: what can happen in a cell with its machines, told as an interpreter would.
+
+The loop that O4 is asked of is made by `firable.nets.machines`, for prover and checker alike. So the checker reads the
+plant file a second time, and not as arcs: here a machine *is at* a command or at none, a hand *is at* a position, a
+station or a hand *has* nothing, a raw or a machined workpiece; and of each thing that can happen it is told, in one
+state, which states may follow. That the net of the loop does the same in every state is compared in `same_loop`.
+
+The meaning is that of docs/machines.md, with the commands sent late: each controller sends a command some time after
+the firing that it belongs to, and what reads or takes the token of that place waits until then.
+
+    fire/T             a transition of the cell
+    sent/P             the command of place P reaches its machine, or cannot be taken: an accident, and all ends
+    M/done/P           the machine is done with it;           M/accident/P   it ends in an accident
+    S/shown            the sensor of an acknowledged completion shows it
+    arrives/E, leaves/E   a workpiece comes, or is taken away
+    S/drops, S/returns, S/clears     a sensor that is not exact
+    S/pressed, S/released            a key
+    S/over             a time limit that somebody reads
+
+Rejected: an explored comparison with the simulated cell, which is exact about times and cannot say that nothing is
+left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+from firable.decompose.verification.plant import ACCIDENT, OVERRUN, State, Things, Value, target_of
+from firable.nets.machines.plant_file import Action, Carry, Clamp, Grasp, Move, Process, Put, Release, Stop
+from firable.nets.net import Place, Transition
+
+Changes = dict[str, Value]
+Happens = Callable[[State], Iterator[Changes]]
+
+
+@dataclass(frozen=True)
+class Plant(Things):
+    """What can happen in a cell with its machines."""
+
+    @cached_property
+    def happenings(self) -> dict[str, Happens]:
+        """Everything that can happen, by its name: after a state, what changes, once for each way that it can go."""
+        found: dict[str, Happens] = {t.name: partial(self.fires, t) for t in self.net.transitions}
+        for place in self.commanding:
+            found[f"sent/{place.name}"] = partial(self.sent, place)
+            if place.name not in self.stops:
+                found[f"{self.machine_of(place)}/done/{place.name}"] = partial(self.done, place)
+                found[f"{self.machine_of(place)}/accident/{place.name}"] = partial(self.spoils, place)
+        found |= {f"{name}/shown": partial(self.comes_to_be_shown, name) for name in self.sensed}
+        found[f"arrives/{self.model.arrivals.station}"] = self.arrives
+        found[f"leaves/{self.model.departures.station}"] = self.leaves
+        for name, sensor in self.model.sensors.items():
+            if sensor.acknowledges is not None:
+                found[f"{name}/pressed"] = partial(self.pressed, name)
+                found[f"{name}/released"] = partial(self.released, name)
+            for way, may in (
+                ("drops", sensor.may_flicker),
+                ("returns", sensor.may_flicker),
+                ("clears", sensor.may_linger),
+            ):
+                if may:
+                    found[f"{name}/{way}"] = partial(self.wavers, name, way)
+        return found | {f"{timer}/over": partial(self.over, timer) for timer in self.timers}
+
+    def fires(self, t: Transition, state: State) -> Iterator[Changes]:
+        """Eq. (1)-(4), gates as the signals show them, once the commands of what it takes or reads have been sent."""
+        due = [f"unsent {p}" for p in (*t.inputs, *t.permissive, *t.outputs) if f"unsent {p}" in self.things]
+        full = all(state[f"token of {p}"] for p in (*t.inputs, *t.permissive))
+        empty = not any(state[f"token of {p}"] for p in (*t.outputs, *t.inhibitive))
+        timers = {place.within.timer for place in self.net.places if place.within is not None}
+        read = [gate for gate in t.external if gate.signal not in timers or gate.signal in self.timers]
+        may = full and empty and not any(state[one] for one in due)
+        if may and all(self.shown(gate.signal, state) == gate.wanted for gate in read):
+            changes: Changes = {f"token of {p}": False for p in t.inputs}
+            changes |= {f"token of {p}": True for p in t.outputs}
+            yield changes | {f"unsent {p}": True for p in t.outputs if f"unsent {p}" in self.things}
+
+    def sent(self, place: Place, state: State) -> Iterator[Changes]:
+        """The command reaches its machine, and clears the completion that it will set."""
+        if not state[f"unsent {place.name}"]:
+            return
+        cleared: Changes = {f"unsent {place.name}": False}
+        if place.completion is not None:
+            cleared[f"signal {place.completion}"] = False
+            if place.completion in self.sensed:
+                cleared[f"acknowledged {place.completion}"] = False
+                if state[f"acknowledged {place.completion}"] and state[f"signal {place.completion}"]:
+                    return  # no completion is both: it is shown, or waits to be
+        if place.within is not None and place.within.timer in self.timers:
+            cleared[f"signal {place.within.timer}"] = False
+        for taken in self.taken(place, state):
+            if ACCIDENT in taken or OVERRUN in taken:
+                yield cleared | taken
+            else:
+                yield from ({**cleared, **taken, **seen} for seen in self.sensors_see(taken, state))
+
+    def taken(self, place: Place, state: State) -> Iterator[Changes]:
+        """How a machine takes a command."""
+        name, action = self.machine_of(place), self.action(place)
+        at, has = f"at {name}", f"has {name}"
+        if isinstance(action, Stop):
+            yield {at: None}
+        elif state[at] is not None:
+            yield {OVERRUN: True}
+        elif isinstance(action, (Grasp, Put)):
+            right = state[f"hand {name}"] == self.where(place, "at")
+            right = right and (state[has] is None) == isinstance(action, Grasp)
+            yield {at: place.name} if right else {ACCIDENT: True}
+        elif isinstance(action, Carry) and state[has] is None:
+            there = state[f"has {action.source}"]
+            yield {ACCIDENT: True} if there is None else {at: place.name, has: there, f"has {action.source}": None}
+        elif isinstance(action, Process):
+            right = bool(state[f"clamped {action.station}"]) and state[f"has {action.station}"] == "raw"
+            yield {at: place.name} if right else {ACCIDENT: True}
+        else:
+            yield {at: place.name}
+
+    def done(self, place: Place, state: State) -> Iterator[Changes]:
+        """A machine is done with what it is at: the effect, what sensors see of it, and the completion."""
+        name = self.machine_of(place)
+        if state[f"at {name}"] != place.name:
+            return
+        for effect in self.effect(place, state):
+            for seen in self.sensors_see(effect, state):
+                changes: Changes = {f"at {name}": None, **effect, **seen}
+                yield from ({**changes, **formed} for formed in self.formed(place, _Overlaid(changes, state)))
+
+    def effect(self, place: Place, state: State) -> Iterator[Changes]:
+        """What a command does; nothing where it waits, or ends in an accident."""
+        name, action = self.machine_of(place), self.action(place)
+        match action:
+            case Move():
+                yield {f"hand {name}": self.where(place, "to")}
+            case Grasp():
+                station = self.model.machines[name].positions[self.where(place, "at")]
+                if station is not None and not (station in self.clamps and state[f"clamped {station}"]):
+                    yield from self.moves(station, name, state)
+            case Put():
+                station = self.model.machines[name].positions[self.where(place, "at")]
+                if station is not None:
+                    yield from self.moves(name, station, state)
+            case Carry(target=target):
+                yield from self.moves(name, target, state)
+            case Clamp(station=station):
+                if state[f"has {station}"] is not None:
+                    yield {f"clamped {station}": True}
+            case Process(station=station):
+                if state[f"has {station}"] is not None:
+                    yield {f"has {station}": "machined"}
+            case Release(station=station):
+                yield {f"clamped {station}": False}
+            case _:
+                yield {}
+
+    def moves(self, source: str, target: str, state: State) -> Iterator[Changes]:
+        """A workpiece goes from one to the other, where there is one, and the other has none."""
+        kind = state[f"has {source}"]
+        if kind is not None and state[f"has {target}"] is None:
+            yield {f"has {source}": None, f"has {target}": kind}
+
+    def spoils(self, place: Place, state: State) -> Iterator[Changes]:
+        """What a machine is at ends in an accident."""
+        name, action = self.machine_of(place), self.action(place)
+        if state[f"at {name}"] == place.name and self.goes_wrong(name, action, place, state):
+            yield {f"at {name}": None, ACCIDENT: True}
+
+    def goes_wrong(self, name: str, action: Action, place: Place, state: State) -> bool:
+        """Whether it does."""
+
+        def collides(station: str) -> bool:
+            return state[f"has {station}"] is not None and state[f"has {name}"] is not None
+
+        match action:
+            case Grasp():
+                station = self.model.machines[name].positions[self.where(place, "at")]
+                if station is None or state[f"has {station}"] is None:
+                    return True
+                return station in self.clamps and bool(state[f"clamped {station}"])
+            case Put(when_full=when_full):
+                station = self.model.machines[name].positions[self.where(place, "at")]
+                return station is None or (when_full == "collide" and collides(station))
+            case Carry(target=target, when_full=when_full):
+                return when_full == "collide" and collides(target)
+            case Clamp(station=station) | Process(station=station):
+                return state[f"has {station}"] is None
+        return False
+
+    def formed(self, place: Place, after: State) -> Iterator[Changes]:
+        """The completion of a command that is done: set if the sensor of its name agrees, else acknowledged."""
+        signal = place.completion
+        if signal is None:
+            yield {}
+            return
+        shared = sum(other.completion == signal for other in self.net.places) > 1
+        if after[f"signal {signal}"] or (signal in self.sensed and after[f"acknowledged {signal}"]):
+            if shared:
+                yield {}
+        elif signal in self.sensed and not self.seen(signal, after):
+            yield {f"acknowledged {signal}": True}
+        else:
+            yield {f"signal {signal}": True}
+
+    def sensors_see(self, effect: Changes, state: State) -> Iterator[Changes]:
+        """What sensors that are not exact show where a workpiece comes or goes; nothing where that cannot be."""
+        changes: Changes = {}
+        for name, sensor in self.model.sensors.items():
+            thing, bit = target_of(sensor), f"bit {name}"
+            if bit not in self.things or thing not in effect or (effect[thing] is None) == (state[thing] is None):
+                continue
+            came = effect[thing] is not None
+            if not came and sensor.may_linger:
+                continue  # it clears some time later
+            if bool(state[bit]) != came:
+                changes[bit] = came
+            elif not (sensor.may_linger if came else sensor.may_flicker):
+                return
+        yield changes
+
+    def comes_to_be_shown(self, name: str, state: State) -> Iterator[Changes]:
+        """The sensor of a completion that is acknowledged shows it."""
+        if state[f"acknowledged {name}"] and not state[f"signal {name}"] and self.seen(name, state):
+            yield {f"acknowledged {name}": False, f"signal {name}": True}
+
+    def arrives(self, state: State) -> Iterator[Changes]:
+        """A raw workpiece comes to the first station."""
+        entry = f"has {self.model.arrivals.station}"
+        if state[entry] is None:
+            yield from ({entry: "raw", **seen} for seen in self.sensors_see({entry: "raw"}, state))
+
+    def leaves(self, state: State) -> Iterator[Changes]:
+        """A finished workpiece is taken away from the last station; an unfinished one is an accident."""
+        last = f"has {self.model.departures.station}"
+        if state[last] == self.kinds[-1]:
+            yield from ({last: None, **seen} for seen in self.sensors_see({last: None}, state))
+        elif state[last] is not None:
+            yield {ACCIDENT: True}
+
+    def wavers(self, name: str, way: str, state: State) -> Iterator[Changes]:
+        """A sensor drops though something is there, comes back, or clears when it is gone."""
+        there, bit = state[target_of(self.model.sensors[name])] is not None, bool(state[f"bit {name}"])
+        if (there, bit) == {"drops": (True, True), "returns": (True, False), "clears": (False, True)}[way]:
+            yield {f"bit {name}": not bit}
+
+    def pressed(self, name: str, state: State) -> Iterator[Changes]:
+        """Somebody presses a key."""
+        if not state[f"key {name}"]:
+            yield {f"key {name}": True}
+
+    def released(self, name: str, state: State) -> Iterator[Changes]:
+        """A key is released while the machine that it is for is at a command."""
+        if state[f"key {name}"] and state[f"at {self.model.sensors[name].acknowledges}"] is not None:
+            yield {f"key {name}": False}
+
+    def over(self, timer: str, state: State) -> Iterator[Changes]:
+        """A time is over, while the token waits for a completion that has not come."""
+        place = self.timers[timer]
+        unsent = f"unsent {place.name}"
+        waits = state[f"token of {place.name}"] and not state[f"signal {place.completion}"]
+        if waits and not (unsent in self.things and state[unsent]) and not state[f"signal {timer}"]:
+            yield {f"signal {timer}": True}
+
+
+class _Overlaid(Mapping[str, Value]):
+    """A state after some changes."""
+
+    def __init__(self, changes: Changes, state: State) -> None:
+        self.changes, self.state = changes, state
+
+    def __getitem__(self, thing: str) -> Value:
+        return self.changes[thing] if thing in self.changes else self.state[thing]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.state)
+
+    def __len__(self) -> int:
+        return len(self.state)

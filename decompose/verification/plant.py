@@ -1,0 +1,163 @@
+"""What there is in a cell with its machines, read from the net and the plant file a second time.
+
+A machine *is at* a command or at none, a hand *is at* a position, a station or a hand *has* nothing, a raw or a
+machined workpiece; a signal, a bit, a clamp are so or not. Each such thing has a name here and one value in each state,
+and the places that the net of the loop has for it are named. What can happen to them is told in `happenings`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+from firable.nets.machines.plant_file import Action, Carry, Clamp, PlantModel, Process, Release, Sensor, Stop
+from firable.nets.net import Net, Place, SignalKind
+
+ACCIDENT: Final = "accident"
+OVERRUN: Final = "overrun"
+Value = str | bool | None
+State = Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class Things:
+    """A net with the machines of a plant file; each thing has a name here, and a value in each state."""
+
+    net: Net
+    model: PlantModel
+
+    # --- What there is, and what it is at the start
+
+    @cached_property
+    def things(self) -> dict[str, dict[Value, str]]:
+        """For each thing, the place of the loop that is marked in each value; the value False has none."""
+        found: dict[str, dict[Value, str]] = {f"token of {p.name}": {True: p.name} for p in self.net.places}
+        found |= {f"signal {name}": {True: name} for name in (*self.completions, *self.timers)}
+        for name, sensor in self.model.sensors.items():
+            if sensor.acknowledges is not None:
+                found[f"key {name}"] = {True: name, False: f"plant.{name}.released"}
+            elif sensor.may_flicker or sensor.may_linger:
+                found[f"bit {name}"] = {True: f"plant.{name}.sensor" if name in self.completions else name}
+        found |= {f"acknowledged {name}": {True: f"plant.{name}.acknowledged"} for name in self.sensed}
+        found |= {f"unsent {p.name}": {True: f"plant.unsent.{p.name}"} for p in self.commanding}
+        for name, machine in self.model.machines.items():
+            at: dict[Value, str] = {None: f"plant.{name}.idle"}
+            at |= {p.name: f"plant.{name}.at.{p.name}" for p in self.commanding if self.machine_of(p) == name}
+            found[f"at {name}"] = at
+            if machine.hand is not None:
+                hands: dict[Value, str] = {where: f"plant.{name}.hand_at.{where}" for where in machine.positions}
+                found[f"hand {name}"] = hands
+            if machine.hand is not None or any(isinstance(one, Carry) for one in machine.commands.values()):
+                kinds: dict[Value, str] = {kind: f"plant.{name}.holds_{kind}" for kind in self.kinds}
+                found[f"has {name}"] = {None: f"plant.{name}.holds_nothing"} | kinds
+        for name in self.model.stations:
+            lies: dict[Value, str] = {kind: f"plant.{name}.{kind}" for kind in self.kinds}
+            found[f"has {name}"] = {None: f"plant.{name}.empty"} | lies
+            if name in self.clamps:
+                found[f"clamped {name}"] = {True: f"plant.{name}.clamped"}
+        return found | {ACCIDENT: {True: "plant.accident"}, OVERRUN: {True: "plant.overrun"}}
+
+    @cached_property
+    def thing_of(self) -> dict[str, str]:
+        """The thing that each place of the loop is of."""
+        return {place: thing for thing, places in self.things.items() for place in places.values()}
+
+    def values(self, thing: str) -> list[Value]:
+        """The values that a thing may have; no machine is ever at a command that stops it."""
+        places = self.things[thing]
+        if all(isinstance(value, bool) for value in places):
+            return [False, True]
+        return [value for value in places if not isinstance(value, str) or value not in self.stops]
+
+    @cached_property
+    def start(self) -> State:
+        """All is at rest, and no workpiece has come; a token in M0 sends no command."""
+        first: dict[str, Value] = {thing: None if None in self.things[thing] else False for thing in self.things}
+        first |= {f"token of {p.name}": p.marked for p in self.net.places}
+        return first | {f"hand {name}": m.hand for name, m in self.model.machines.items() if m.hand is not None}
+
+    @cached_property
+    def commanding(self) -> tuple[Place, ...]:
+        """The places that send a command."""
+        return tuple(place for place in self.net.places if place.command is not None)
+
+    @cached_property
+    def stops(self) -> set[str]:
+        """Those whose command stops the machine."""
+        return {place.name for place in self.commanding if isinstance(self.action(place), Stop)}
+
+    @cached_property
+    def completions(self) -> tuple[str, ...]:
+        """The signals that drivers form."""
+        return tuple(signal.name for signal in self.net.signals if signal.kind is SignalKind.COMPLETION)
+
+    @cached_property
+    def sensed(self) -> tuple[str, ...]:
+        """The completions for which a sensor has to agree."""
+        return tuple(name for name in self.completions if name in self.model.sensors)
+
+    @cached_property
+    def timers(self) -> dict[str, Place]:
+        """The time limits that somebody reads besides the transition that takes the token when the time is over."""
+        of_faults = {(self.net.places[p].name, t) for p, t in self.net.fault_transitions.items()}
+        found = {}
+        for place in self.net.places:
+            for t, transition in enumerate(self.net.transitions if place.within is not None else ()):
+                reads = any(
+                    place.within is not None and gate.signal == place.within.timer for gate in transition.external
+                )
+                if reads and place.within is not None and (place.name, t) not in of_faults:
+                    found[place.within.timer] = place
+        return found
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """What a workpiece can be: machined only where some machine does that."""
+        machines = self.model.machines.values()
+        some = any(isinstance(action, Process) for machine in machines for action in machine.commands.values())
+        return ("raw", "machined") if some else ("raw",)
+
+    @cached_property
+    def clamps(self) -> set[str]:
+        """The stations with a clamp."""
+        actions = (action for machine in self.model.machines.values() for action in machine.commands.values())
+        return {action.station for action in actions if isinstance(action, (Clamp, Release, Process))}
+
+    def machine_of(self, place: Place) -> str:
+        """The machine that a place commands."""
+        assert place.command is not None
+        return place.command.machine
+
+    def action(self, place: Place) -> Action:
+        """What it commands."""
+        assert place.command is not None
+        return self.model.machines[place.command.machine].commands[place.command.command]
+
+    def where(self, place: Place, parameter: str) -> str:
+        """The position that the command of a place is about."""
+        assert place.command is not None
+        return dict(place.command.parameters)[parameter]
+
+    # --- What a signal shows
+
+    def shown(self, signal: str, state: State) -> bool:
+        """The value of a signal that somebody reads."""
+        if signal in self.completions or signal in self.timers:
+            return bool(state[f"signal {signal}"])
+        return self.seen(signal, state)
+
+    def seen(self, name: str, state: State) -> bool:
+        """What a sensor shows."""
+        sensor = self.model.sensors[name]
+        if sensor.acknowledges is not None:
+            return bool(state[f"key {name}"])
+        if sensor.may_flicker or sensor.may_linger:
+            return bool(state[f"bit {name}"])
+        return state[target_of(sensor)] is not None
+
+
+def target_of(sensor: Sensor) -> str:
+    """What a sensor looks at."""
+    return f"has {sensor.occupied or sensor.holding}"

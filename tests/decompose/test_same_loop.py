@@ -1,0 +1,210 @@
+"""The loop that O4 is asked of, held against a second reading of the plant file, and mutants of either."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import pytest
+
+from firable.decompose.verification.happenings import Plant
+from firable.decompose.verification.same_loop import DiffersError, by_happening, compare, compare_one
+from firable.nets.catalogue import catalogue_net, catalogue_plant
+from firable.nets.diagnostics import InputError
+from firable.nets.machines.closing import _Closing, close
+from firable.nets.machines.laws import Laws
+from firable.nets.machines.loop import ClosedLoop, Sending
+from firable.nets.machines.moment import Case
+from firable.nets.machines.plant_file import PlantModel
+from firable.nets.net import Net, Place, Transition
+
+CELLS = (
+    *("one_robot", "one_robot_mc_late", "one_robot_mc_late_capacity", "one_robot_timed"),
+    *("two_robots_shared", "two_robots_separate", "two_cells"),
+)
+
+
+@cache
+def closed(name: str) -> tuple[Net, PlantModel, ClosedLoop]:
+    net, model = catalogue_net(name), catalogue_plant(name)
+    return net, model, close(net, model, sending=Sending.LATE)
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_the_loop_of_every_cell_of_the_catalogue_is_what_its_plant_file_says(name: str) -> None:
+    assert compare(*closed(name)) > 5000
+
+
+def other_plants(model: PlantModel, seed: int) -> PlantModel:
+    """The plant with some sensors that flicker or linger, other ways to meet a full station, other commands."""
+    draw, data = random.Random(seed), model.model_dump(by_alias=True, exclude_defaults=True)
+    for sensor in data["sensors"].values():
+        if "acknowledges" not in sensor:
+            for key in ("may_flicker", "may_linger"):
+                if draw.random() < 0.25:
+                    sensor[key] = True
+    for machine in data["machines"].values():
+        for name, action in machine["commands"].items():
+            if action["does"] in {"put", "carry"}:
+                action["when_full"] = draw.choice(["collide", "wait"])
+            if draw.random() < 0.1:
+                machine["commands"][name] = draw.choice([{"does": "stop"}, {"does": "work", "takes_s": 1.0}])
+    return PlantModel.model_validate(data)
+
+
+def test_both_readings_agree_on_plants_of_every_kind() -> None:
+    count = 0
+    for seed in range(30):
+        net = catalogue_net(CELLS[seed % len(CELLS)])
+        model = other_plants(catalogue_plant(CELLS[seed % len(CELLS)]), seed)
+        try:
+            loop = close(net, model, sending=Sending.LATE)
+        except InputError:
+            continue  # a net that the plant does not fit
+        count += 1
+        assert compare(net, model, loop) > 1000
+    assert count > 15
+
+
+# --------------------------------------------------------------------------------------------------------------------
+# Mutants of the loop
+
+
+def test_every_transition_of_the_loop_that_is_left_out_is_missed() -> None:
+    net, model, loop = closed("one_robot")
+    plant = Plant(net, model)
+    groups = by_happening(plant, loop.net.transitions)
+    for t in loop.net.transitions:
+        (name,) = (name for name, some in groups.items() if t in some)
+        others = [other for other in groups[name] if other is not t]
+        if t.name.endswith("/twice") or t.name.endswith("/set-already"):
+            continue  # some ways of a completion that machines share are two transitions
+        with pytest.raises(DiffersError, match="does not go as the plant file says"):
+            pytest.fail(t.name) if compare_one(plant, name, others) else None
+
+
+def changed(t: Transition) -> Iterator[Transition]:
+    """The transition with each arc and gate left out, turned round, or made its opposite."""
+    opposite = {"inputs": "permissive", "permissive": "inputs", "outputs": "inhibitive", "inhibitive": "outputs"}
+    for kind, other in opposite.items():
+        for place in getattr(t, kind):
+            changes: dict[str, Any] = {kind: tuple(p for p in getattr(t, kind) if p != place)}
+            yield replace(t, **changes)
+            changes[other] = (*getattr(t, other), place)
+            yield replace(t, **changes)
+
+
+def test_every_change_of_an_arc_or_a_gate_of_the_loop_is_refused() -> None:
+    """But for those after which the loop does the same: another transition does already what is let in."""
+    net, model, loop = closed("two_robots_shared")
+    plant = Plant(net, model)
+    groups, count, same = by_happening(plant, loop.net.transitions), 0, set()
+    for name, some in groups.items():
+        for t in some[:1]:
+            for mutant in list(changed(t)):
+                count += 1
+                try:
+                    compare_one(plant, name, [mutant if one is t else one for one in some])
+                except DiffersError:
+                    continue
+                same.add(t.name)
+    assert count > 800
+    assert all(name.endswith("/clamped") for name in same), same  # an empty station is an accident of its own
+
+
+def test_a_loop_of_another_kind_is_refused() -> None:
+    net, model, loop = closed("one_robot")
+    others: tuple[tuple[ClosedLoop, str], ...] = (
+        (close(net, model), "is missing in the loop"),
+        (replace(loop, unsent={}), "still to be sent are others"),
+        (replace(loop, shown=dict(list(loop.shown.items())[1:])), "that show the signals are others"),
+        (replace(loop, net=with_token(loop.net, "plant.MC.idle")), "marked wrongly"),
+        (replace(loop, net=with_move(loop.net, "thieves/come")), "nothing happens in the plant as 'thieves/come'"),
+        (replace(loop, net=with_move(loop.net, "arrives/cv1_entry/again")), "may happen after an accident"),
+    )
+    for other, message in others:
+        with pytest.raises(DiffersError, match=message):
+            compare(net, model, other)
+
+
+def with_token(net: Net, name: str) -> Net:
+    return replace(net, places=tuple(replace(p, marked=not p.marked) if p.name == name else p for p in net.places))
+
+
+def with_move(net: Net, name: str) -> Net:
+    return replace(net, transitions=(*net.transitions, Transition(name, ("plant.MC.idle",))))
+
+
+# --------------------------------------------------------------------------------------------------------------------
+# Mutants of the texts
+
+
+def spoiling(change: Callable[[Case], Case | None]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """A law that gives each of its cases changed, or leaves it out."""
+
+    def spoil(law: Callable[..., Any]) -> Callable[..., Any]:
+        def spoiled(*of: Any) -> Iterator[Case]:
+            return (new for case in law(*of) if (new := change(case)) is not None)
+
+        return spoiled
+
+    return spoil
+
+
+WITHOUT_FIRST = spoiling(lambda case: replace(case, wants=case.wants[:-1], leaves=()) if case.leaves else case)
+NOTHING_LEFT = spoiling(lambda case: replace(case, leaves=()))
+NEVER = spoiling(lambda _: None)
+
+
+@pytest.mark.parametrize("law", ["sent", "refused", "done", "spoiled", "departs", "departs_raw"])
+@pytest.mark.parametrize("spoil", [WITHOUT_FIRST, NOTHING_LEFT, NEVER])
+def test_a_mistake_in_the_laws_is_found(
+    law: str, spoil: Callable[[Callable[..., Any]], Callable[..., Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    net, model, _ = closed("one_robot")
+    monkeypatch.setattr(Laws, law, spoil(getattr(Laws, law)))
+    with pytest.raises(DiffersError):
+        compare(net, model, close(net, model, sending=Sending.LATE))
+
+
+@pytest.mark.parametrize("step", ["cleared", "formed", "sent_late", "workpieces"])
+def test_a_mistake_in_the_closing_is_found(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    net, model, _ = closed("one_robot")
+    before = getattr(_Closing, step)
+    monkeypatch.setattr(_Closing, step, lambda *of: list(before(*of))[:1])
+    with pytest.raises(DiffersError):
+        compare(net, model, close(net, model, sending=Sending.LATE))
+
+
+def test_a_firing_that_does_not_wait_for_the_command_before_it_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, model, _ = closed("one_robot")
+    monkeypatch.setattr(_Closing, "applied", lambda *_: Case())
+    with pytest.raises(DiffersError):
+        compare(net, model, close(net, model, sending=Sending.LATE))
+
+
+@pytest.mark.parametrize("name", ["fires", "sent", "taken", "done", "effect", "spoils", "formed", "arrives", "leaves"])
+def test_a_mistake_in_the_second_reading_is_found(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Plant, name, lambda *_: iter(()))
+    with pytest.raises(DiffersError):
+        compare(*closed("one_robot"))
+
+
+def test_sensors_that_are_not_exact_are_read_twice_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    net, model = catalogue_net("one_robot"), other_plants(catalogue_plant("one_robot"), 3)
+    loop = close(net, model, sending=Sending.LATE)
+    compare(net, model, loop)
+    for name in ("sensors_see", "wavers"):
+        with monkeypatch.context() as patch:
+            patch.setattr(Plant, name, lambda *_: iter([{}]))
+            with pytest.raises(DiffersError):
+                compare(net, model, loop)
+
+
+def test_a_place_of_the_net_may_bear_any_name_that_the_plant_does_not() -> None:
+    net, model, loop = closed("one_robot")
+    assert Place("plant.MC.idle", "plant") not in net.places
+    assert set(Plant(net, model).thing_of) == {place.name for place in loop.net.places}
