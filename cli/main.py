@@ -38,6 +38,7 @@ from firable.cli import (
     takeover,
     verify,
 )
+from firable.cli.lsp import command as lsp
 from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
@@ -47,6 +48,7 @@ EXTRAS = {
     ),
     "mtkahypar": ("split", "what looks for owners of large nets"),
     **dict.fromkeys(("aiohttp", "prometheus_client"), ("serve", "what lets an operator act from elsewhere")),
+    **dict.fromkeys(("pygls", "lsprotocol"), ("lsp", "what serves net files to an editor")),
     "zenoh": ("zenoh", "the link between hosts over a network"),
     "serial": ("serial", "what serial lines need"),
     "pymodbus": ("modbus", "what Modbus devices need"),
@@ -93,6 +95,7 @@ for _command in (
     convert.convert,
     explain.explain,
     ci.ci,
+    lsp.lsp,
     schema.schema,
 ):
     firable.add_command(_command)

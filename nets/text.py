@@ -96,6 +96,11 @@ def parse_net(text: str, file: str = "<text>") -> Net:
     return _parse(source)[0]
 
 
+def parse_positioned(text: str, file: str) -> tuple[Net, Positions]:
+    """Read a net from text, and remember where everything stands; raises `InputError` as `parse_net` does."""
+    return _parse(Source(file, text))
+
+
 def _parse(source: Source) -> tuple[Net, Positions]:
     with without_cycle_search():
         return _parsed(source)

@@ -19,7 +19,17 @@ from typing import Final
 from firable.nets.diagnostics import Diagnostic, Span, Subject
 from firable.nets.source import Source
 from firable.nets.time_limits import fault_transition_name, timer_name
-from firable.nets.yaml_tree import Mapping, Node, Scalar, Sequence, node_span, nodes_along
+from firable.nets.yaml_tree import (
+    Node,
+    Scalar,
+    Sequence,
+    entries_of,
+    items_of,
+    node_span,
+    nodes_along,
+    scalars_of,
+    value_of,
+)
 
 DIAGNOSTICS_MAX: Final = 80
 
@@ -87,7 +97,7 @@ class Positions:
     @cached_property
     def whole(self) -> Span:
         """The span for what concerns the net as a whole: its name, or the first line."""
-        return node_span(self.source, _value(self.tree, "cell") or self.tree)
+        return node_span(self.source, value_of(self.tree, "cell") or self.tree)
 
     def in_formula(self, subject: Subject, column: int) -> Span:
         """The span of a character (from 0) of the formula whose text is the value at this path."""
@@ -115,57 +125,57 @@ class Positions:
         return first, second
 
     def _walk(self) -> Iterator[tuple[Subject, _Found]]:
-        for name, key, controller in _entries(self.tree, "controllers"):
+        for name, key, controller in entries_of(self.tree, "controllers"):
             yield ("controllers", name), key
-            if (under := _value(controller, "under")) is not None:
+            if (under := value_of(controller, "under")) is not None:
                 yield ("controllers", name, "under"), under
             yield from self._scope(controller, ("controllers", name), f"{name}.")
         yield from self._scope(self.tree, (), "")
-        for name, key, transition in _entries(self.tree, "transitions"):
+        for name, key, transition in entries_of(self.tree, "transitions"):
             yield ("transitions", name), key
             for which in ("from", "to", "if", "unless"):
-                for item in _names(transition, which):
+                for item in items_of(value_of(transition, which)):
                     yield ("transitions", name, which, item.text), item
-            if (number := _value(transition, "number")) is not None:
+            if (number := value_of(transition, "number")) is not None:
                 yield ("transitions", name, "number"), number
-        scopes = [(f"{name}.", node) for name, _, node in _entries(self.tree, "controllers")]
+        scopes = [(f"{name}.", node) for name, _, node in entries_of(self.tree, "controllers")]
         for prefix, scope in (*scopes, ("", self.tree)):
-            for local, _, place in _entries(scope, "places"):
-                yield from _fault(prefix + local, prefix, _value(place, "within"))
-        for name, key, arbiter in _entries(self.tree, "arbiters"):
+            for local, _, place in entries_of(scope, "places"):
+                yield from _fault(prefix + local, prefix, value_of(place, "within"))
+        for name, key, arbiter in entries_of(self.tree, "arbiters"):
             yield ("arbiters", name), key
-            if (among := _value(arbiter, "among")) is not None:
+            if (among := value_of(arbiter, "among")) is not None:
                 yield ("arbiters", name, "among"), among
-            for item in _names(arbiter, "among"):
+            for item in items_of(value_of(arbiter, "among")):
                 yield ("arbiters", name, "among", item.text), item
-        for name, key, body in _entries(self.tree, "properties"):
+        for name, key, body in entries_of(self.tree, "properties"):
             yield ("properties", name), key
-            for formula in _scalars(body):
+            for formula in scalars_of(body):
                 # A formula names its places between blanks, brackets, commas and quotes.
                 for match in re.finditer(r"[^\s()\[\],\"]+", formula.text):
                     yield ("properties", name, match.group()), _Within(formula, match.start(), len(match.group()))
 
-        for name, key, _ in _entries(self.tree, "expect"):
+        for name, key, _ in entries_of(self.tree, "expect"):
             yield ("expect", name), key
 
     def _scope(self, scope: Node, path: Subject, prefix: str) -> Iterator[tuple[Subject, _Found]]:
-        for item in _names(scope, "start"):
+        for item in items_of(value_of(scope, "start")):
             yield (*path, "start", item.text), item
-        for item in _names(scope, "inputs"):
+        for item in items_of(value_of(scope, "inputs")):
             yield ("signals", prefix + item.text), item
         declared: set[str] = set()
-        for local, key, place in _entries(scope, "places"):
+        for local, key, place in entries_of(scope, "places"):
             yield ("places", prefix + local), key
             for meaning in ("task", "opens"):
-                for part, _, value in _entries(place, meaning):
+                for part, _, value in entries_of(place, meaning):
                     yield ("places", prefix + local, meaning, part), value
-            until = _value(place, "until")
+            until = value_of(place, "until")
             if isinstance(until, Scalar):
                 yield ("places", prefix + local, "until"), until
                 if until.text not in declared:
                     yield ("signals", prefix + until.text), until
                 declared.add(until.text)
-            yield from _limit(prefix + local, prefix, _value(place, "within"))
+            yield from _limit(prefix + local, prefix, value_of(place, "within"))
 
 
 def bounded(problems: list[Diagnostic]) -> list[Diagnostic]:
@@ -202,9 +212,9 @@ def _limit(place: str, prefix: str, within: Node | None) -> Iterator[tuple[Subje
     subject: Subject = ("places", place, "within")
     yield subject, within
     for key in ("time", "to", "transition", "timer"):
-        if (value := _value(within, key)) is not None:
+        if (value := value_of(within, key)) is not None:
             yield (*subject, key), value
-    timer = _value(within, "timer")
+    timer = value_of(within, "timer")
     yield ("signals", prefix + timer.text if isinstance(timer, Scalar) else timer_name(place)), timer or within
 
 
@@ -212,39 +222,8 @@ def _fault(place: str, prefix: str, within: Node | None) -> Iterator[tuple[Subje
     """The fault transition that a time limit gives, and where it says to what place that leads."""
     if within is None:
         return
-    named, to = _value(within, "transition"), _value(within, "to")
+    named, to = value_of(within, "transition"), value_of(within, "to")
     subject: Subject = ("transitions", named.text if isinstance(named, Scalar) else fault_transition_name(place))
     yield subject, named or within
     if isinstance(to, Scalar):
         yield (*subject, "to", prefix + to.text), to
-
-
-def _value(node: Node, key: str) -> Node | None:
-    found = node.entries.get(key) if isinstance(node, Mapping) else None
-    return found[1] if found else None
-
-
-def _entries(node: Node, key: str) -> Iterator[tuple[str, Scalar, Node]]:
-    table = _value(node, key)
-    if isinstance(table, Mapping):
-        for name, (at, value) in table.entries.items():
-            yield name, at, value
-
-
-def _names(node: Node, key: str) -> Iterator[Scalar]:
-    value = _value(node, key)
-    for item in value.items if isinstance(value, Sequence) else [value]:
-        if isinstance(item, Scalar):
-            yield item
-
-
-def _scalars(node: Node) -> Iterator[Scalar]:
-    match node:
-        case Scalar():
-            yield node
-        case Sequence():
-            for item in node.items:
-                yield from _scalars(item)
-        case Mapping():
-            for _, value in node.entries.values():
-                yield from _scalars(value)

@@ -326,3 +326,37 @@ def nodes_along(node: Node, path: Path) -> Iterator[tuple[Scalar | None, Node]]:
 def node_span(source: Source, node: Node) -> Span:
     """The span at which a node begins, as long as it is where it is a scalar on one line."""
     return source.span(node.line, node.column, node.length if isinstance(node, Scalar) else 1)
+
+
+def value_of(node: Node, key: str) -> Node | None:
+    """The value of a key of a mapping; None where there is no such key, or no mapping."""
+    found = node.entries.get(key) if isinstance(node, Mapping) else None
+    return found[1] if found else None
+
+
+def entries_of(node: Node, key: str) -> Iterator[tuple[str, Scalar, Node]]:
+    """The entries of the table at a key: name, where the name stands, value."""
+    table = value_of(node, key)
+    if isinstance(table, Mapping):
+        for name, (at, value) in table.entries.items():
+            yield name, at, value
+
+
+def items_of(node: Node | None) -> Iterator[Scalar]:
+    """The strings of a list, or the one that stands in its place."""
+    for item in node.items if isinstance(node, Sequence) else [node]:
+        if isinstance(item, Scalar):
+            yield item
+
+
+def scalars_of(node: Node) -> Iterator[Scalar]:
+    """All strings below a node that are values."""
+    match node:
+        case Scalar():
+            yield node
+        case Sequence():
+            for item in node.items:
+                yield from scalars_of(item)
+        case Mapping():
+            for _, value in node.entries.values():
+                yield from scalars_of(value)

@@ -1,0 +1,1 @@
+"""The language server: net files in an editor."""

@@ -1,0 +1,269 @@
+"""A language server for net files, over standard input and output (Language Server Protocol 3.17, by pygls).
+
+What it tells is what the other commands tell: the diagnostics of the reader as one types, and the verdicts of `firable
+check` that matter, for a moment's budget, when a file is opened or saved. Names are found in the text as it stands, so
+going to a definition works in a net that is not well formed yet; hovering needs the net, and takes the last one that
+was. A rename is offered only where the text after it is a net again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+from typing import Final
+from urllib.parse import unquote, urlparse
+
+from lsprotocol import types as lsp
+from pygls.exceptions import JsonRpcInvalidParams
+from pygls.lsp.server import LanguageServer
+
+from firable import __version__
+from firable.cli.formats.alerts import alerts, ending, place_of
+from firable.cli.lsp.hover import hover
+from firable.cli.report import Report
+from firable.cli.text import reasons
+from firable.nets.diagnostics import Diagnostic, InputError, Span
+from firable.nets.net import Net
+from firable.nets.occurrences import Kind, Names, Occurrence
+from firable.nets.rules import rule_of
+from firable.nets.source import Source
+from firable.nets.text import parse_positioned
+
+SECONDS: Final = 5.0
+"""How long a net that was opened or saved is checked."""
+
+_SYMBOLS: Final = {
+    Kind.CONTROLLER: lsp.SymbolKind.Class,
+    Kind.PLACE: lsp.SymbolKind.Field,
+    Kind.SIGNAL: lsp.SymbolKind.Boolean,
+    Kind.TRANSITION: lsp.SymbolKind.Method,
+    Kind.ARBITER: lsp.SymbolKind.Operator,
+    Kind.PROPERTY: lsp.SymbolKind.Property,
+}
+_ITEMS: Final = {
+    Kind.CONTROLLER: lsp.CompletionItemKind.Class,
+    Kind.PLACE: lsp.CompletionItemKind.Field,
+    Kind.SIGNAL: lsp.CompletionItemKind.Value,
+    Kind.TRANSITION: lsp.CompletionItemKind.Method,
+}
+
+
+@dataclass
+class _Opened:
+    """A file in the editor: its last text that was a net, and what checking has told of the one it stands for."""
+
+    net: Net | None = None
+    verdicts: list[lsp.Diagnostic] = field(default_factory=list)
+
+
+class NetServer(LanguageServer):
+    """The server; `opened` holds the files of the editor by their URIs."""
+
+    def __init__(self) -> None:
+        super().__init__("firable", __version__)
+        self.opened: dict[str, _Opened] = {}
+
+    def source(self, uri: str) -> Source:
+        """The text of a file as it stands in the editor."""
+        return Source(unquote(urlparse(uri).path) or uri, self.workspace.get_text_document(uri).source)
+
+    def names(self, uri: str) -> Names | None:
+        """The names in a file; None while it is not YAML."""
+        try:
+            return Names(self.source(uri))
+        except InputError:
+            return None
+
+    def range(self, uri: str, line: int, column: int, length: int) -> lsp.Range:
+        """A part of a line (from 1) in the units of the client."""
+        document = self.workspace.get_text_document(uri)
+        start, end = lsp.Position(line - 1, column - 1), lsp.Position(line - 1, column - 1 + length)
+        return document.position_codec.range_to_client_units(document.lines, lsp.Range(start, end))
+
+    def of_span(self, uri: str, span: Span | None) -> lsp.Range:
+        """The range of a span; the first character where there is none."""
+        return self.range(uri, span.line, span.column, max(1, span.length)) if span else self.range(uri, 1, 1, 1)
+
+    def of(self, uri: str, one: Occurrence) -> lsp.Range:
+        """The range of a name."""
+        return self.range(uri, one.line, one.column, one.length)
+
+    def name_at(self, uri: str, position: lsp.Position) -> tuple[Names, Occurrence] | None:
+        """The name at a position of the client, and all names of the file."""
+        names = self.names(uri)
+        if names is None:
+            return None
+        document = self.workspace.get_text_document(uri)
+        here = document.position_codec.position_from_client_units(document.lines, position)
+        one = names.at(here.line + 1, here.character + 1)
+        return None if one is None else (names, one)
+
+    def publish(self, uri: str, found: list[lsp.Diagnostic]) -> None:
+        """Show what was found in a file."""
+        version = self.workspace.get_text_document(uri).version
+        self.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, found, version))
+
+    def read(self, uri: str) -> list[lsp.Diagnostic]:
+        """Read a file as it stands; what refuses it, or nothing, and then it is the net that is hovered over."""
+        opened = self.opened.setdefault(uri, _Opened())
+        source = self.source(uri)
+        try:
+            opened.net = parse_positioned(source.text, source.file)[0]
+        except InputError as error:
+            return [self.diagnostic(uri, one) for one in error.diagnostics]
+        return []
+
+    def diagnostic(self, uri: str, one: Diagnostic) -> lsp.Diagnostic:
+        """A diagnostic of a reader, with its hint."""
+        told = f"{one.message}\nhint: {one.hint}" if one.hint else one.message
+        severity = lsp.DiagnosticSeverity.Error if one.severity.value == "error" else lsp.DiagnosticSeverity.Warning
+        return lsp.Diagnostic(self.of_span(uri, one.span), told, severity, one.code, source="firable")
+
+    def checked(self, uri: str, source: Source) -> list[lsp.Diagnostic]:
+        """The verdicts on a net that matter and do not hold, for a moment's budget; takes seconds."""
+        from firable.analysis.check import check
+        from firable.analysis.spaces.reachability import Budget
+        from firable.nets.verdict import Status, held_to
+
+        try:
+            net, positions = parse_positioned(source.text, source.file)
+            verdicts = held_to(net.expected, check(net, budget=Budget(seconds=SECONDS)).verdicts)
+        except InputError as error:
+            return [self.diagnostic(uri, one) for one in error.diagnostics]
+        report = Report("check", source.file, net, verdicts, positions=positions)
+        found = []
+        for alert in alerts(report):
+            verdict = alert.verdict
+            if verdict.status is Status.UNKNOWN:
+                continue  # of a budget that nobody has asked for
+            severity = lsp.DiagnosticSeverity.Error if alert.is_error else lsp.DiagnosticSeverity.Warning
+            told = "\n".join((f"{verdict.name} {ending(verdict)}: {verdict.statement}", *reasons(net, verdict)))
+            at = self.of_span(uri, place_of(report, verdict))
+            found.append(lsp.Diagnostic(at, told, severity, rule_of(verdict), source="firable check"))
+        return found
+
+
+server = NetServer()
+
+
+async def _look(uri: str) -> None:
+    """Tell at once what the reader says, and soon what checking says, unless the text has changed meanwhile."""
+    found = server.read(uri)
+    opened = server.opened[uri]
+    opened.verdicts = []
+    server.publish(uri, found)
+    if found:
+        return
+    source = server.source(uri)
+    verdicts = await asyncio.to_thread(server.checked, uri, source)
+    if uri in server.opened and server.source(uri).text == source.text:
+        opened.verdicts = verdicts
+        server.publish(uri, verdicts)
+
+
+@server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
+async def did_open(params: lsp.DidOpenTextDocumentParams) -> None:
+    """Read and check a file that was opened."""
+    await _look(params.text_document.uri)
+
+
+@server.feature(lsp.TEXT_DOCUMENT_DID_SAVE)
+async def did_save(params: lsp.DidSaveTextDocumentParams) -> None:
+    """Read and check a file that was saved."""
+    await _look(params.text_document.uri)
+
+
+@server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
+def did_change(params: lsp.DidChangeTextDocumentParams) -> None:
+    """Read a file that is being changed; verdicts are of the text as it was saved, and told anew then."""
+    uri = params.text_document.uri
+    server.publish(uri, server.read(uri))
+
+
+@server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
+def did_close(params: lsp.DidCloseTextDocumentParams) -> None:
+    """Forget a file."""
+    server.opened.pop(params.text_document.uri, None)
+
+
+@server.feature(lsp.TEXT_DOCUMENT_HOVER)
+def hovered(params: lsp.HoverParams) -> lsp.Hover | None:
+    """Tell what the name is: of a transition, what it waits for."""
+    uri = params.text_document.uri
+    found, opened = server.name_at(uri, params.position), server.opened.get(uri)
+    if found is None or opened is None or opened.net is None or not (told := hover(opened.net, found[1])):
+        return None
+    return lsp.Hover(lsp.MarkupContent(lsp.MarkupKind.Markdown, told), server.of(uri, found[1]))
+
+
+@server.feature(lsp.TEXT_DOCUMENT_DEFINITION)
+def definition(params: lsp.DefinitionParams) -> lsp.Location | None:
+    """Go where a name is declared."""
+    uri = params.text_document.uri
+    found = server.name_at(uri, params.position)
+    return None if found is None else lsp.Location(uri, server.of(uri, found[0].definition(found[1])))
+
+
+@server.feature(lsp.TEXT_DOCUMENT_REFERENCES)
+def references(params: lsp.ReferenceParams) -> list[lsp.Location]:
+    """Show every place of a name."""
+    uri = params.text_document.uri
+    found = server.name_at(uri, params.position)
+    if found is None:
+        return []
+    wanted = [one for one in found[0].of(found[1]) if params.context.include_declaration or not one.defines]
+    return [lsp.Location(uri, server.of(uri, one)) for one in wanted]
+
+
+@server.feature(lsp.TEXT_DOCUMENT_PREPARE_RENAME)
+def prepare_rename(params: lsp.PrepareRenameParams) -> lsp.PrepareRenamePlaceholder | None:
+    """Say which name a rename would change, by its short form."""
+    uri = params.text_document.uri
+    found = server.name_at(uri, params.position)
+    if found is None:
+        return None
+    short = found[1].name.rpartition(".")[2] if found[1].kind in {Kind.PLACE, Kind.SIGNAL} else found[1].name
+    return lsp.PrepareRenamePlaceholder(server.of(uri, found[1]), short)
+
+
+@server.feature(lsp.TEXT_DOCUMENT_RENAME, lsp.RenameOptions(prepare_provider=True))
+def rename(params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
+    """Change a name wherever it stands, where the text is a net before and after."""
+    uri = params.text_document.uri
+    found = server.name_at(uri, params.position)
+    if found is None:
+        return None
+    document = server.workspace.get_text_document(uri)
+    try:
+        source = server.source(uri)
+        parse_positioned(source.text, source.file)
+        text = found[0].renamed(found[1], params.new_name)
+        parse_positioned(text, source.file)
+    except InputError as error:
+        raise JsonRpcInvalidParams(error.diagnostics[0].message) from None
+    end = lsp.Position(len(document.lines) + 1, 0)
+    return lsp.WorkspaceEdit(changes={uri: [lsp.TextEdit(lsp.Range(lsp.Position(0, 0), end), text)]})
+
+
+@server.feature(lsp.TEXT_DOCUMENT_COMPLETION)
+def completion(params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
+    """Offer the names of the net; keys are offered by what knows the JSON Schema."""
+    names = server.names(params.text_document.uri)
+    defined = {one.name: one for one in names.occurrences if one.defines} if names else {}
+    return [
+        lsp.CompletionItem(name, kind=_ITEMS[one.kind], detail=one.kind.value)
+        for name, one in defined.items()
+        if one.kind in _ITEMS
+    ]
+
+
+@server.feature(lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
+def symbols(params: lsp.DocumentSymbolParams) -> list[lsp.DocumentSymbol]:
+    """List what the file declares."""
+    uri = params.text_document.uri
+    names = server.names(uri)
+    return [
+        lsp.DocumentSymbol(one.name, _SYMBOLS[one.kind], server.of(uri, one), server.of(uri, one))
+        for one in (names.occurrences if names else ())
+        if one.defines
+    ]

@@ -1,0 +1,190 @@
+"""Where the names of a net stand in its file: each use and each definition, for editors that go to one or change all.
+
+`Positions` finds the place of a problem, the first one of its subject. An editor asks the other way round, from a place
+to the name that stands there, and wants every place of that name, in the form that is written there: inside its
+controller a place has its short name, elsewhere the full one. The names are read from the tree of the text alone, so
+that an editor can find its way in a net that is not well formed yet.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Final
+
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.source import Source
+from firable.nets.yaml_tree import Node, Scalar, entries_of, items_of, parse_tree, scalars_of, value_of
+
+_WORD: Final = re.compile(r"[^\s()\[\],\"]+")
+_LOCAL: Final = re.compile(r"[\w-]+")
+
+
+class Kind(StrEnum):
+    """What a name is the name of."""
+
+    CONTROLLER = "controller"
+    PLACE = "place"
+    SIGNAL = "signal"
+    TRANSITION = "transition"
+    ARBITER = "arbiter"
+    PROPERTY = "property"
+
+
+@dataclass(frozen=True, slots=True)
+class Occurrence:
+    """One place where a name stands: its full name, and line, column (from 1) and length of what is written there.
+
+    `prefix` is what the written form leaves out of the full name: `robot.` inside the controller.
+    """
+
+    kind: Kind
+    name: str
+    line: int
+    column: int
+    length: int
+    prefix: str = ""
+    defines: bool = False
+
+
+class Names:
+    """The names of a net file; raises `InputError` where the text is not YAML.
+
+    >>> text = "firable: 1\\ncell: c\\nplaces: {p: , q: }\\nstart: p\\ntransitions: {t: {from: p, to: q}}\\n"
+    >>> names = Names(Source("c.firable.yaml", text))
+    >>> found = names.at(5, 25)
+    >>> found.name, [(one.line, one.column) for one in names.of(found)]
+    ('p', [(3, 10), (4, 8), (5, 25)])
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.tree = parse_tree(source)
+
+    @cached_property
+    def occurrences(self) -> tuple[Occurrence, ...]:
+        """All of them, in the order of the text; a name that is declared nowhere has none."""
+        declared = list(self._declared())
+        kinds = {one.name: one.kind for one in declared}
+        found = {(one.line, one.column): one for one in declared}
+        for scalar, prefix, at, length in self._used():
+            word = scalar.text[at : at + length]
+            if (place := self._inside(scalar, at, length)) and (kind := kinds.get(prefix + word)):
+                found.setdefault(place, Occurrence(kind, prefix + word, *place, length, prefix))
+        return tuple(sorted(found.values(), key=lambda one: (one.line, one.column)))
+
+    def at(self, line: int, column: int) -> Occurrence | None:
+        """The name at a line and column (from 1), the column after its last character included."""
+        here = (one for one in self.occurrences if one.line == line and one.column <= column <= one.column + one.length)
+        return next(here, None)
+
+    def of(self, one: Occurrence) -> tuple[Occurrence, ...]:
+        """All places of the name that stands at one of them."""
+        return tuple(other for other in self.occurrences if (other.kind, other.name) == (one.kind, one.name))
+
+    def definition(self, one: Occurrence) -> Occurrence:
+        """Where a name is declared."""
+        return next(other for other in self.of(one) if other.defines)
+
+    def renamed(self, one: Occurrence, new: str) -> str:
+        """The text with a name changed wherever it stands; of a controller also in the full names of its parts.
+
+        `new` is the short name; the full one will do. Raises `InputError` F2012 where it is no name, F2001 where
+        something has it already.
+        """
+        prefix, _, old = one.name.rpartition(".") if one.kind in {Kind.PLACE, Kind.SIGNAL} else ("", "", one.name)
+        new = new.removeprefix(f"{prefix}.") if prefix else new
+        if not _LOCAL.fullmatch(new):
+            message = f"{new!r} is not a name"
+            raise InputError([Diagnostic("F2012", message, "use letters, digits, '_' and '-'")])
+        full = f"{prefix}.{new}" if prefix else new
+        taken = {other.name for other in self.occurrences if other.name != one.name}
+        if full in taken:
+            raise InputError([Diagnostic("F2001", f"there is a '{full}' already", "choose another name")])
+        edits = [(other.line, other.column + other.length - len(old), len(old)) for other in self.of(one)]
+        if one.kind is Kind.CONTROLLER:
+            edits += [
+                (other.line, other.column, len(old))
+                for other in self.occurrences
+                if not other.prefix and other.name.startswith(f"{old}.") and other.kind is not Kind.CONTROLLER
+            ]
+        lines = list(self.source.lines)
+        for line, column, length in sorted(edits, reverse=True):
+            text = lines[line - 1]
+            lines[line - 1] = text[: column - 1] + new + text[column - 1 + length :]
+        return "\n".join(lines)
+
+    def _declared(self) -> Iterator[Occurrence]:
+        for name, key, body in entries_of(self.tree, "controllers"):
+            yield from self._defined(Kind.CONTROLLER, key, name)
+            yield from self._declared_in(body, f"{name}.")
+        yield from self._declared_in(self.tree, "")
+        tables = {"transitions": Kind.TRANSITION, "arbiters": Kind.ARBITER, "properties": Kind.PROPERTY}
+        for table, kind in tables.items():
+            for name, key, _ in entries_of(self.tree, table):
+                yield from self._defined(kind, key, name)
+
+    def _declared_in(self, scope: Node, prefix: str) -> Iterator[Occurrence]:
+        for item in items_of(value_of(scope, "inputs")):
+            yield from self._defined(Kind.SIGNAL, item, prefix + item.text, prefix)
+        seen: set[str] = set()
+        for local, key, body in entries_of(scope, "places"):
+            yield from self._defined(Kind.PLACE, key, prefix + local, prefix)
+            until = value_of(body, "until")
+            if isinstance(until, Scalar) and until.text and until.text not in seen:
+                seen.add(until.text)
+                yield from self._defined(Kind.SIGNAL, until, prefix + until.text, prefix)
+            within = value_of(body, "within")
+            for part, kind in (("transition", Kind.TRANSITION), ("timer", Kind.SIGNAL)):
+                named = value_of(within, part) if within is not None else None
+                if isinstance(named, Scalar):
+                    given = prefix if kind is Kind.SIGNAL else ""
+                    yield from self._defined(kind, named, given + named.text, given)
+
+    def _defined(self, kind: Kind, at: Scalar, name: str, prefix: str = "") -> Iterator[Occurrence]:
+        if place := self._inside(at, 0, len(at.text)):
+            yield Occurrence(kind, name, *place, len(at.text), prefix, defines=True)
+
+    def _used(self) -> Iterator[tuple[Scalar, str, int, int]]:
+        """Scalars, the prefix of what they name, and the part of them that is a name."""
+        for name, _, body in entries_of(self.tree, "controllers"):
+            yield from _whole(items_of(value_of(body, "under")), "")
+            yield from self._used_in(body, f"{name}.")
+        yield from self._used_in(self.tree, "")
+        for _, _, body in entries_of(self.tree, "transitions"):
+            for part in ("from", "to", "if", "unless"):
+                yield from _whole(items_of(value_of(body, part)), "")
+        for _, _, body in entries_of(self.tree, "arbiters"):
+            yield from _whole(items_of(value_of(body, "among")), "")
+        for _, _, body in entries_of(self.tree, "properties"):
+            for scalar in scalars_of(body):
+                yield from ((scalar, "", m.start(), len(m.group())) for m in _WORD.finditer(scalar.text))
+        for name, key, _ in entries_of(self.tree, "expect"):
+            begin = len(name) - len(name.removeprefix("loop.").removeprefix("property."))
+            yield key, "", begin, len(name) - begin
+
+    def _used_in(self, scope: Node, prefix: str) -> Iterator[tuple[Scalar, str, int, int]]:
+        yield from _whole(items_of(value_of(scope, "start")), prefix)
+        for _, _, body in entries_of(scope, "places"):
+            yield from _whole(items_of(value_of(body, "until")), prefix)
+            if (within := value_of(body, "within")) is not None:
+                yield from _whole(items_of(value_of(within, "to")), prefix)
+            if (task := value_of(body, "task")) is not None:
+                yield from _whole(scalars_of(task), "")
+
+    def _inside(self, scalar: Scalar, at: int, length: int) -> tuple[int, int] | None:
+        """Line and column of a part of a scalar, where the scalar stands in the text letter by letter."""
+        if not length or not 0 < scalar.line <= len(self.source.lines):
+            return None
+        line = self.source.lines[scalar.line - 1]
+        begin = scalar.column - 1 + (0 if scalar.plain else 1)
+        if line[begin : begin + len(scalar.text)] != scalar.text:
+            return None
+        return scalar.line, begin + at + 1
+
+
+def _whole(scalars: Iterator[Scalar], prefix: str) -> Iterator[tuple[Scalar, str, int, int]]:
+    return ((scalar, prefix, 0, len(scalar.text)) for scalar in scalars)

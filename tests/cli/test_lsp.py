@@ -1,0 +1,169 @@
+"""The language server as an editor meets it: over pipes, with the messages of the protocol."""
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import pytest
+from lsprotocol import types as lsp
+from pygls.exceptions import JsonRpcException
+from pygls.lsp.client import LanguageClient
+
+from firable.nets.catalogue import catalogue_path
+
+LATE = catalogue_path("one_robot_mc_late").read_text("utf-8")
+T = TypeVar("T")
+
+
+class Editor:
+    """An editor with one file, which remembers what was published of it."""
+
+    def __init__(self, client: LanguageClient, path: Path) -> None:
+        self.client = client
+        self.uri = path.as_uri()
+        self.published: asyncio.Queue[lsp.PublishDiagnosticsParams] = asyncio.Queue()
+        self.document = lsp.TextDocumentIdentifier(self.uri)
+        self.version = 1
+
+    def open(self, text: str) -> None:
+        item = lsp.TextDocumentItem(self.uri, "yaml", self.version, text)
+        self.client.text_document_did_open(lsp.DidOpenTextDocumentParams(item))
+
+    def change(self, text: str) -> None:
+        self.version += 1
+        document = lsp.VersionedTextDocumentIdentifier(self.version, self.uri)
+        whole: list[Any] = [lsp.TextDocumentContentChangeWholeDocument(text)]
+        self.client.text_document_did_change(lsp.DidChangeTextDocumentParams(document, whole))
+
+    async def told(self, wanted: Callable[[list[lsp.Diagnostic]], bool]) -> list[lsp.Diagnostic]:
+        """The first list of diagnostics that is as wanted."""
+        while True:
+            found = list((await asyncio.wait_for(self.published.get(), 60)).diagnostics)
+            if wanted(found):
+                return found
+
+    def at(self, text: str, word: str, after: str = "") -> lsp.TextDocumentPositionParams:
+        """The position within a word, the first one after some text."""
+        offset = text.index(word, text.index(after)) + 1
+        line = text.count("\n", 0, offset)
+        return lsp.TextDocumentPositionParams(
+            self.document, lsp.Position(line, offset - text.rfind("\n", 0, offset) - 1)
+        )
+
+
+@asynccontextmanager
+async def editor(path: Path) -> AsyncIterator[Editor]:
+    client = LanguageClient("test", "1")
+    one = Editor(client, path)
+
+    listen: Callable[[Callable[[lsp.PublishDiagnosticsParams], None]], object]
+    listen = client.feature(lsp.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS)
+
+    def published(params: lsp.PublishDiagnosticsParams) -> None:
+        one.published.put_nowait(params)
+
+    listen(published)
+    stop: Callable[[], Awaitable[None]] = client.stop
+    await client.start_io(sys.executable, "-m", "firable.cli", "lsp")
+    await client.initialize_async(lsp.InitializeParams(lsp.ClientCapabilities()))
+    client.initialized(lsp.InitializedParams())
+    try:
+        yield one
+    finally:
+        await asyncio.wait_for(client.shutdown_async(None), 60)
+        client.exit(None)
+        await stop()
+
+
+def within(path: Path, act: Callable[[Editor], Awaitable[T]]) -> T:
+    async def whole() -> T:
+        async with editor(path) as one:
+            return await act(one)
+
+    return asyncio.run(whole())
+
+
+def test_diagnostics_follow_the_text_and_verdicts_the_file(tmp_path: Path) -> None:
+    async def act(one: Editor) -> None:
+        one.open(LATE)
+        verdicts = await one.told(bool)
+        by_code = {str(found.code): found for found in verdicts}
+        assert {"F3011", "F3012", "F3022"} <= set(by_code)
+        assert "15. t1-b" in by_code["F3011"].message
+        assert by_code["F3011"].severity is lsp.DiagnosticSeverity.Error
+        assert by_code["F3012"].severity is lsp.DiagnosticSeverity.Warning
+        one.change(LATE.replace("robot.put_mc, mc.free", "robot.putmc, mc.free"))
+        (wrong,) = await one.told(lambda found: len(found) == 1)
+        assert wrong.code == "F2002"
+        assert "did you mean 'robot.put_mc'?" in wrong.message
+        line = LATE.splitlines()[wrong.range.start.line]
+        assert line[wrong.range.start.character :].startswith("robot.put_mc")
+        one.change(LATE)
+        assert await one.told(lambda found: not found) == []
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_a_transition_tells_what_it_waits_for_and_names_lead_to_their_definition(tmp_path: Path) -> None:
+    async def act(one: Editor) -> None:
+        one.open(LATE)
+        await one.told(bool)
+        here = one.at(LATE, "G3")
+        hovered = await one.client.text_document_hover_async(lsp.HoverParams(here.text_document, here.position))
+        assert hovered is not None
+        assert isinstance(hovered.contents, lsp.MarkupContent)
+        assert "- `robot.grasp_cv1` holds a token, which it takes" in hovered.contents.value
+        assert "- `robot.touch` is 1: the completion of R GRASP" in hovered.contents.value
+        assert "- `conveyor.cv1` is empty, which it fills" in hovered.contents.value
+        assert "It is global: conveyor, robot take part." in hovered.contents.value
+        there = one.at(LATE, "robot.grasp_cv1", "transitions:")
+        found = await one.client.text_document_definition_async(lsp.DefinitionParams(one.document, there.position))
+        assert isinstance(found, lsp.Location)
+        assert LATE.splitlines()[found.range.start.line].strip().startswith("grasp_cv1:")
+        context = lsp.ReferenceContext(include_declaration=True)
+        uses = await one.client.text_document_references_async(
+            lsp.ReferenceParams(context, one.document, there.position)
+        )
+        assert len(uses or ()) == LATE.count("grasp_cv1")
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_a_rename_changes_the_text_or_says_why_not(tmp_path: Path) -> None:
+    async def act(one: Editor) -> None:
+        one.open(LATE)
+        await one.told(bool)
+        here = one.at(LATE, "robot.grasp_cv1", "transitions:").position
+        ready = await one.client.text_document_prepare_rename_async(lsp.PrepareRenameParams(one.document, here))
+        assert isinstance(ready, lsp.PrepareRenamePlaceholder)
+        assert ready.placeholder == "grasp_cv1"
+        edit = await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "take"))
+        assert edit is not None
+        assert edit.changes is not None
+        (change,) = edit.changes[one.uri]
+        assert change.new_text == LATE.replace("grasp_cv1", "take")
+        with pytest.raises(JsonRpcException, match=r"there is a 'robot\.free' already"):
+            await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "free"))
+        with pytest.raises(JsonRpcException, match="'on' is text for some YAML parsers"):
+            await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "on"))
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_names_and_symbols_are_offered_and_columns_are_those_of_the_client(tmp_path: Path) -> None:
+    text = 'firable: 1\ncell: "\U0001f916"\nplaces: {p: {description: "\U0001f916"}, q: }\nstart: p\n'
+
+    async def act(one: Editor) -> None:
+        one.open(text)
+        items = await one.client.text_document_completion_async(lsp.CompletionParams(one.document, lsp.Position(3, 7)))
+        assert isinstance(items, list)
+        assert {item.label for item in items} == {"p", "q"}
+        symbols = await one.client.text_document_document_symbol_async(lsp.DocumentSymbolParams(one.document))
+        (q,) = (symbol for symbol in symbols or () if isinstance(symbol, lsp.DocumentSymbol) and symbol.name == "q")
+        before = text.splitlines()[2].index("q:")
+        assert q.range.start.character == before + 1  # the robot is two units of UTF-16
+
+    within(tmp_path / "cell.firable.yaml", act)

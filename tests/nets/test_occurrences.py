@@ -1,0 +1,124 @@
+"""Names in a net file: every place of each, and a rename that changes all of them and nothing else."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.examples import examples
+
+from firable.nets.catalogue import catalogue_names, catalogue_path
+from firable.nets.diagnostics import InputError
+from firable.nets.interchange import net_to_json
+from firable.nets.occurrences import Kind, Names, Occurrence
+from firable.nets.source import Source
+from firable.nets.text import parse_net
+
+TEXTS = {name: catalogue_path(name).read_text("utf-8") for name in catalogue_names()}
+OWNED = {Kind.PLACE, Kind.SIGNAL}
+
+
+def names_in(text: str) -> Names:
+    return Names(Source("cell.firable.yaml", text))
+
+
+def written(names: Names, one: Occurrence) -> str:
+    return names.source.lines[one.line - 1][one.column - 1 : one.column - 1 + one.length]
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_every_name_of_a_net_is_declared_once_and_stands_where_it_is_said(name: str) -> None:
+    net, names = parse_net(TEXTS[name]), names_in(TEXTS[name])
+    defined = [(one.kind, one.name) for one in names.occurrences if one.defines]
+    assert len(set(defined)) == len(defined)
+    given_by_limits = {t.name for t in net.transitions} - {n for kind, n in defined if kind is Kind.TRANSITION}
+    assert all(name.endswith("_timeout") or "." in name for name in given_by_limits)
+    assert {n for kind, n in defined if kind is Kind.CONTROLLER} == {c.name for c in net.controllers}
+    assert {n for kind, n in defined if kind is Kind.PLACE} <= set(net.place_index)
+    assert {n for kind, n in defined if kind is Kind.ARBITER} == {a.name for a in net.arbiters}
+    assert {n for kind, n in defined if kind is Kind.PROPERTY} == {p.name for p in net.properties}
+    for one in names.occurrences:
+        assert one.prefix + written(names, one) == one.name
+        assert names.definition(one).defines
+
+
+@pytest.mark.parametrize("name", ["one_robot", "two_cells", "conceptual_two_robots"])
+def test_arcs_and_gates_are_all_found(name: str) -> None:
+    net, names = parse_net(TEXTS[name]), names_in(TEXTS[name])
+    for place in net.places:
+        touching = sum((*t.inputs, *t.outputs, *t.permissive, *t.inhibitive).count(place.name) for t in net.transitions)
+        found = [one for one in names.occurrences if one.name == place.name and not one.defines]
+        assert len(found) >= touching + place.marked
+
+
+@examples(60)
+@given(data=st.data())
+def test_a_rename_changes_every_place_of_a_name_and_nothing_else(data: st.DataObject) -> None:
+    text = data.draw(st.sampled_from(list(TEXTS.values())))
+    names = names_in(text)
+    one = data.draw(st.sampled_from(names.occurrences))
+    new_text = names.renamed(one, "brand_new")
+    prefix = one.name.rpartition(".")[0] if one.kind in OWNED else ""
+    new = f"{prefix}.brand_new" if prefix else "brand_new"
+    before, after = net_to_json(parse_net(text)), net_to_json(parse_net(new_text))
+    assert after != before
+    back = names_in(new_text)
+    (again,) = {other for other in back.occurrences if other.name == new and other.defines}
+    old = one.name.rpartition(".")[2] if one.kind in OWNED else one.name
+    assert back.renamed(again, old) == text
+    if one.kind is not Kind.CONTROLLER:
+        assert one.name not in {other.name for other in back.occurrences}
+
+
+def test_a_controller_is_renamed_in_the_full_names_of_its_parts() -> None:
+    text = TEXTS["one_robot"]
+    names = names_in(text)
+    robot = next(one for one in names.occurrences if (one.kind, one.name) == (Kind.CONTROLLER, "robot"))
+    net = parse_net(names.renamed(robot, "arm"))
+    assert [c.name for c in net.controllers] == [
+        "arm" if c.name == "robot" else c.name for c in parse_net(text).controllers
+    ]
+    assert "arm.free" in net.place_index
+    assert not any(place.name.startswith("robot.") for place in net.places)
+
+
+def test_a_name_that_is_taken_or_none_is_refused() -> None:
+    names = names_in(TEXTS["one_robot"])
+    free = next(one for one in names.occurrences if one.name == "robot.free")
+    for new, code in (
+        ("back", "F2001"),
+        ("robot.back", "F2001"),
+        ("a b", "F2012"),
+        ("", "F2012"),
+        ("mc.free", "F2012"),
+    ):
+        with pytest.raises(InputError, match=code):
+            names.renamed(free, new)
+    assert names.renamed(free, "robot.idle") == names.renamed(free, "idle")
+
+
+def test_names_are_found_in_a_net_that_is_not_well_formed() -> None:
+    names = names_in("firable: 1\ncell: c\nplaces: {p: , q: }\ntransitions:\n  t: {from: p, to: missing}\n")
+    here = names.at(5, 13)
+    assert here is not None
+    assert here.name == "p"
+    assert names.definition(here).line == 3
+    assert names.at(5, 20) is None
+
+
+def test_a_word_that_is_quoted_or_part_of_a_formula_is_found_where_it_stands() -> None:
+    text = (
+        'firable: 1\ncell: c\nplaces: {"p": , q: }\nstart: p\ntransitions:\n  t: {from: "p", to: q}\n'
+        "properties:\n  apart: {never: q and (not p)}\nexpect:\n  property.apart: violated\n"
+    )
+    names = names_in(text)
+    at = names.at(3, 11)
+    assert at is not None
+    assert [(one.line, one.column) for one in names.of(at)] == [(3, 11), (4, 8), (6, 14), (8, 29)]
+    changed = names.renamed(at, "place")
+    assert '  t: {from: "place", to: q}' in changed
+    assert "never: q and (not place)" in changed
+    no = names.at(10, 13)
+    assert no is not None
+    assert "  property.never_both: violated" in names.renamed(no, "never_both")
+    assert replace(no, line=8, column=3, defines=True) in names.of(no)
