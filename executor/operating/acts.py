@@ -231,6 +231,8 @@ class Acts:
     def _tick(self, machine: str) -> None:
         """Tell a controller the time, and see to it that it is told again when the next of its times is over."""
         controller = self.controllers[machine]
+        if not controller.timers.running and machine not in self.ticks:
+            return  # most machines have no time limits, and this is on the way of each signal
         self.act(machine, controller.tick(self.now_seconds()))
         if (earlier := self.ticks.pop(machine, None)) is not None:
             earlier.cancel()
