@@ -15,6 +15,7 @@ late, which the protocol must withstand anyway; and an end-to-end acknowledgemen
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -38,8 +39,16 @@ class Greeting:
     version: int = PROTOCOL_VERSION
 
 
+Arrival = tuple[str, str, Message]
+"""A message and who says it to whom."""
+
+
 class LinkListener(Protocol):
     """Whom a link tells, always on the event loop that it runs on."""
+
+    def arrived_together(self, messages: Sequence[Arrival]) -> None:
+        """Messages have come, as by `arrived`; the link is in the midst of nothing, and they are acted upon at once."""
+        ...
 
     def arrived(self, sender: str, receiver: str, message: Message) -> None:
         """A message has come; `sender` is a connected peer, `receiver` one of the own machines."""

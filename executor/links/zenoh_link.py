@@ -41,7 +41,7 @@ from urllib.parse import quote, unquote
 import zenoh
 
 from firable.executor.links.encoding import EncodingError, decode, encode
-from firable.executor.links.link import COORDINATOR, Greeting, LinkListener, cannot_open, objection
+from firable.executor.links.link import COORDINATOR, Arrival, Greeting, LinkListener, cannot_open, objection
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic, Severity
 from firable.nets.source import printable
@@ -53,7 +53,7 @@ _OPENING_SECONDS: Final = 2.0
 _NAMELESS: Final = "%"  # which no name is quoted to
 _REST: Final = "**"
 
-_Act = Callable[[str, bytes, bool], None]
+_Act = Callable[[str, bytes, bool], Sequence[Arrival]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,17 +189,29 @@ class ZenohLink:
         """Take all that has come; a callback of the loop has no caller: what fails in it ends `run`."""
         self.is_woken = False  # first: what comes from now on wakes the loop again
         try:
+            came: list[Arrival] = []
             for _ in range(len(self.samples)):
                 act, key, payload, gone = self.samples.popleft()
-                act(key, payload, gone)
+                if act == self._token:
+                    self._told(came)
+                    came = []
+                came += act(key, payload, gone)
+            self._told(came)
         except Exception as error:
             if self.broken is not None and not self.broken.done():
                 self.broken.set_exception(error)
 
-    def _token(self, key: str, _payload: bytes, gone: bool) -> None:
+    def _told(self, came: Sequence[Arrival]) -> None:
+        if came and self.listener is not None:
+            self.listener.arrived_together(came)
+
+    def _token(self, key: str, _payload: bytes, gone: bool) -> Sequence[Arrival]:
         """A host has come or gone."""
-        if self.listener is None:
-            return
+        if self.listener is not None:
+            self._host(self.listener, key, gone)
+        return ()
+
+    def _host(self, listener: LinkListener, key: str, gone: bool) -> None:
         _, version, digest, _, name, session = key.split("/")
         if session == self.identity:
             return
@@ -207,7 +219,7 @@ class ZenohLink:
         greeting = Greeting(_read(digest), (peer,), int(version) if version.isdecimal() else -1)
         if (problem := objection(self.greeting, greeting)) is not None:
             if not gone:
-                self.listener.refused(peer, problem)
+                listener.refused(peer, problem)
             return
         claims = self.claims.setdefault(peer, [])
         first = claims[:1]
@@ -217,25 +229,25 @@ class ZenohLink:
             claims.append(session)
             if len(claims) > 1:
                 twice = Greeting(greeting.digest, greeting.names)
-                self.listener.refused(peer, _required(objection(twice, twice)))
+                listener.refused(peer, _required(objection(twice, twice)))
         if claims[:1] != first:
             if first:
                 self.publishers = {to: kept for to, kept in self.publishers.items() if to[1:] != (peer, *first)}
-                self.listener.lost(peer)
+                listener.lost(peer)
             if claims:
-                self.listener.connected(peer)
+                listener.connected(peer)
 
-    def _message(self, key: str, payload: bytes, gone: bool) -> None:
+    def _message(self, key: str, payload: bytes, gone: bool) -> Sequence[Arrival]:
         receiver, peer, session = _parsed(key)
         # Only from the process that is known to run the machine: another one, or one not yet met, is not heard.
-        if self.listener is None or gone or self.claims.get(peer, [])[:1] != [session]:
-            return
+        if gone or self.claims.get(peer, [])[:1] != [session]:
+            return ()
         try:
             message = decode(payload)
         except EncodingError:
             self.damaged += 1
-            return
-        self.listener.arrived(peer, receiver, message)
+            return ()
+        return ((peer, receiver, message),)
 
 
 def open_to_the_network(addresses: Sequence[str]) -> tuple[Diagnostic, ...]:

@@ -150,6 +150,11 @@ class Acts:
         self.heard = True
         self.post(machine, item)
 
+    def hear_all(self, items: Collection[tuple[str, Item]]) -> None:
+        """The same of several, to be done by a caller who wakes nobody."""
+        self.heard = True
+        self.posted += items
+
     def group(self) -> None:
         """Acts until nothing is posted, or they are many."""
         for _ in range(ACTS_AT_ONCE_MAX):

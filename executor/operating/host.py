@@ -105,7 +105,7 @@ class Host:
         )
         self.coordinators, self.controllers = self.acts.coordinators, self.acts.controllers
         self.is_whole = link is None
-        self.peers = Peers(decomposition, self.acts, link, self.told, repeat_seconds)
+        self.peers = Peers(decomposition, self.acts, link, self.told, self._work_now, repeat_seconds)
         self.speed = speed
         self.begin_seconds = begin_seconds
         self.settle_seconds = settle_seconds
@@ -325,6 +325,12 @@ class Host:
         if not self.working and self.outcome is not None and not self.outcome.done():
             self.working = True
             asyncio.get_running_loop().call_soon(self._work)
+
+    def _work_now(self) -> None:
+        """Do a group at once, unless one is about to be done."""
+        if not self.working and self.outcome is not None and not self.outcome.done():
+            self.working = True
+            self._work()
 
     def _work(self) -> None:
         """One group: acts, then the journal, then what leaves; at quiescence, whether the run has ended."""

@@ -16,10 +16,10 @@ Where all machines are on one host there are no others, and this does nothing.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
-from firable.executor.links.link import Link, called
+from firable.executor.links.link import Arrival, Link, called
 from firable.executor.operating.acts import Acts
 from firable.executor.operating.waits import reached, waits
 from firable.executor.protocol.deciders import coordinators
@@ -34,7 +34,10 @@ MEET_SECONDS: Final = 3.0
 
 
 class Peers:
-    """The machines of other hosts, behind a link; `told` hears of them, by the kind of news and a sentence."""
+    """The machines of other hosts, behind a link; `told` hears of them, by the kind of news and a sentence.
+
+    `work` has done at once what has been posted.
+    """
 
     def __init__(
         self,
@@ -42,9 +45,11 @@ class Peers:
         acts: Acts,
         link: Link | None,
         told: Callable[[str, str], None],
+        work: Callable[[], None],
         repeat_seconds: float,
     ) -> None:
         self.acts = acts
+        self.work = work
         self.link = link
         self.told = told
         self.repeat_seconds = self.pause_seconds = repeat_seconds
@@ -103,12 +108,20 @@ class Peers:
 
     def arrived(self, sender: str, receiver: str, message: Message) -> None:
         """A message of another host; what its sender may not say is dropped."""
-        is_order = isinstance(message, ToController)
+        if self._may_say(sender, receiver, message):
+            self.acts.hear(receiver, message)
+
+    def arrived_together(self, messages: Sequence[Arrival]) -> None:
+        """The same of several, acted upon before this returns: to wait for a turn of the loop costs more."""
+        self.acts.hear_all([(to, message) for by, to, message in messages if self._may_say(by, to, message)])
+        self.work()
+
+    def _may_say(self, sender: str, receiver: str, message: Message) -> bool:
         way = (message.coordinator, message.controller)
-        if (sender, receiver) != (way if is_order else way[::-1]):
-            self.told("dropped", f"{called(sender)} sent a {type(message).__name__} that is not its to send")
-            return
-        self.acts.hear(receiver, message)
+        if (sender, receiver) == (way if isinstance(message, ToController) else way[::-1]):
+            return True
+        self.told("dropped", f"{called(sender)} sent a {type(message).__name__} that is not its to send")
+        return False
 
     def connected(self, peer: str) -> None:
         """A peer can be reached: what it has missed is said again."""

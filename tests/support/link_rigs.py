@@ -5,13 +5,13 @@ import os
 import pty
 import random
 import socket
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Greeting, Link
+from firable.executor.links.link import COORDINATOR, Arrival, Greeting, Link
 from firable.executor.links.serial_line import MASTER, SerialLink, addresses_on_a_line
 from firable.executor.links.zenoh_link import ZenohLink
 from firable.executor.protocol.messages import Message
@@ -29,6 +29,11 @@ class Heard:
     messages: list[tuple[str, str, Message]] = field(default_factory=list)
     problems: list[Diagnostic] = field(default_factory=list)
     waiters: list[asyncio.Future[None]] = field(default_factory=list)
+
+    def arrived_together(self, messages: Sequence[Arrival]) -> None:
+        """The same of several."""
+        for message in messages:
+            self.arrived(*message)
 
     def arrived(self, sender: str, receiver: str, message: Message) -> None:
         self.messages.append((sender, receiver, message))
