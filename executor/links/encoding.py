@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
+from functools import lru_cache
+from operator import attrgetter
 from types import UnionType
 from typing import Any, Final, get_args, get_origin, get_type_hints
 
@@ -51,8 +53,8 @@ def encode(message: Message) -> bytes:
     >>> encode(Acknowledgement("robot", 7, Readiness(3, frozenset({"G2", "G1"}))))[:60]
     b'{"Acknowledgement":{"controller":"robot","coordinator":"","r'
     """
-    kind = type(message)
-    return to_json({kind.__name__: _WRITERS[kind](message)})
+    template, write = _WRITERS[type(message)]
+    return (template % write(message)).encode()
 
 
 def decode(data: bytes) -> Message:
@@ -79,27 +81,75 @@ def decode(data: bytes) -> Message:
     return message
 
 
-def _writer(hint: Any) -> Callable[[Any], Any]:
-    """What turns a value of this type into JSON; raises `TypeError` for a type that no message may have.
+def _writer(kind: Any) -> Callable[[Any], str]:
+    """What turns a value of a dataclass into JSON; raises `TypeError` where it has a type that no message may have.
 
-    Made once for each kind, and not asked of each value: a message is on its way of every command.
+    Made once for each kind, as a template and what fills it, and not asked of each value: a message is on its way of
+    every command. The names in it are those of one net, and their texts are remembered.
     """
-    if is_dataclass(hint):
-        hints = get_type_hints(hint)
-        writers = [(name, _writer(hints[name])) for name in sorted(field.name for field in fields(hint))]
-        return lambda value: {name: write(getattr(value, name)) for name, write in writers}
+    template, paths, writers = _flat(kind, "")
+    get = attrgetter(*paths)
+
+    def write(value: Any) -> str:
+        parts = list(get(value))
+        for at, one in writers:
+            parts[at] = one(parts[at])
+        return template % tuple(parts)
+
+    return write
+
+
+def _flat(kind: Any, before: str) -> tuple[str, list[str], list[tuple[int, Callable[[Any], str]]]]:
+    """The template of a dataclass, its parts as paths of attributes, and what writes those that are no number."""
+    hints, texts, paths, writers = get_type_hints(kind), list[str](), list[str](), list[tuple[int, Any]]()
+    for name in sorted(field.name for field in fields(kind)):
+        if is_dataclass(hint := hints[name]):
+            text, inner, of_inner = _flat(hint, f"{before}{name}.")
+            writers += [(len(paths) + at, write) for at, write in of_inner]
+            paths += inner
+        else:
+            text = "%s"
+            if (write := _part(hint)) is not None:
+                writers.append((len(paths), write))
+            paths.append(before + name)
+        texts.append(f'"{name}":{text}')
+    return f"{{{','.join(texts)}}}", paths, writers
+
+
+def _part(hint: Any) -> Callable[[Any], str] | None:
+    if hint is int:
+        return None
     if get_origin(hint) is frozenset and get_args(hint) == (str,):
-        return sorted
+        return _set
     if get_origin(hint) is tuple and get_args(hint) == (str, ...):
-        return list
+        return _list
     parts = get_args(hint) if isinstance(hint, UnionType) else (hint,)
     if all(part in (str, int, bool, float, type(None)) for part in parts):
-        return _as_it_is
+        return _scalar
     raise TypeError(f"{hint} cannot be part of a message")
 
 
-def _as_it_is(value: Any) -> Any:
-    return value
+def _scalar(value: str | float | None) -> str:
+    return _name(value) if isinstance(value, str) else to_json(value).decode()
 
 
-_WRITERS: Final = {kind: _writer(kind) for kind in KINDS.values()}
+def _name(name: str) -> str:
+    return _remembered(name) if len(name) <= _NAME_MAX else to_json(name).decode()  # whatever a stranger may send
+
+
+@lru_cache(maxsize=4096)
+def _remembered(name: str) -> str:
+    return to_json(name).decode()
+
+
+def _set(names: frozenset[str]) -> str:
+    return _list(tuple(sorted(names)))
+
+
+def _list(names: tuple[str, ...]) -> str:
+    return f"[{','.join(map(_name, names))}]"
+
+
+_NAME_MAX: Final = 200
+
+_WRITERS: Final = {kind: (f'{{"{name}":%s}}', _writer(kind)) for name, kind in KINDS.items()}
