@@ -138,8 +138,9 @@ class PingPong:
     def stop(self) -> None:
         """Nothing to stop."""
 
-    def close(self) -> None:
+    def close(self) -> bool:
         """Nothing to close."""
+        return False
 
 
 def execution_with(driver: Driver) -> Host:

@@ -164,8 +164,9 @@ class BoundDriver:
             if self.listener is not None:
                 self.listener.emergency_stop(reason)
 
-    def close(self) -> None:
+    def close(self) -> bool:
         """Nothing: what comes into a real cell is not for its driver to say."""
+        return False
 
     def formed(self, completion: str, entry: int | None) -> None:
         """Tell of a completion that has been formed, if any has."""

@@ -138,8 +138,8 @@ class Driver(Protocol):
         """Drive the safe outputs: every machine stops where it is. Nothing is sent afterwards."""
         ...
 
-    def close(self) -> None:
-        """Let no new work into the cell, as far as the driver can."""
+    def close(self) -> bool:
+        """Let no new work into the cell, as far as the driver can; whether none comes any more."""
         ...
 
 

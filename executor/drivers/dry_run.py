@@ -68,5 +68,6 @@ class DryRunDriver:
         """Complete nothing any more."""
         self.is_stopped = True
 
-    def close(self) -> None:
+    def close(self) -> bool:
         """Nothing: workpieces come and go with the tokens."""
+        return False

@@ -128,9 +128,10 @@ class SimulatedDriver:
         """Stop every machine of the plant where it is."""
         self._input(self.clock.now_seconds() if self.clock is not None else 0.0, "stop")
 
-    def close(self) -> None:
+    def close(self) -> bool:
         """Let no more workpieces come."""
         self._input(self.clock.now_seconds() if self.clock is not None else 0.0, "close")
+        return True
 
     def _input(self, at_seconds: float, what: str, *arguments: str | int) -> None:
         """Do something to the cell, after it is in the log."""

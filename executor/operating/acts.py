@@ -177,6 +177,12 @@ class Acts:
         for machine in self.controllers:
             self.post(machine, None)
 
+    def forgo(self, names: Collection[str]) -> None:
+        """Let these transitions fire no more, nor be promised here."""
+        for machine, controller in self.controllers.items():
+            controller.forgo(names)
+            self.post(machine, None)
+
     def fire(self, machine: str) -> None:
         """Let a controller fire one local transition, although nothing may fire by itself."""
         controller = self.controllers[machine]

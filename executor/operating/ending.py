@@ -9,13 +9,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import takewhile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from firable.executor.operating import restart
 from firable.executor.operating.situation import Situation, State, blocked, blocked_parts
+from firable.executor.protocol.token_player import TokenPlayer
+from firable.nets.net import Net, SignalKind
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
+
+AT_THE_END: Final = "stopped at the end of the cycle"
 
 
 def situation(run: Host) -> Situation:
@@ -54,13 +58,41 @@ def ended(run: Host) -> Situation | None:
             return replace(situation(run), state=State.DONE, message=message)
         return situation(run)
     # What a pause holds back still has to fire before the cycle, or the work, is at its end.
-    if run.at_rest and run.draining and not run.paused:
-        return replace(situation(run), state=State.STOPPED, message="stopped at the end of the cycle")
+    if run.draining and run.at_rest and not run.paused:
+        return replace(situation(run), state=State.STOPPED, message=AT_THE_END)
     if run.at_rest and run.is_complete() and not (run.paused and run.operated):
         return replace(situation(run), state=State.DONE, blocked=())
     # With an operator present, a cell at rest is waited for: it may be paused, or be given work.
     is_stuck = run.at_rest and not run.operated
     return situation(run) if is_stuck or run.recorder.is_deadlock else None
+
+
+def is_home(run: Host) -> bool:
+    """Whether the machines here are as at the beginning, and nothing is awaited, timed or promised.
+
+    The end of a cycle of machines whose driver cannot tell when they rest.
+    """
+    at_home = all(each.marking == each.subnet.initial_marking for each in run.controllers.values())
+    awaits = run.alarms.timers or run.untaken or run.acts.ticks
+    return at_home and not awaits and run.acts.is_settled
+
+
+def beginnings(net: Net) -> tuple[str, ...]:
+    """The transitions by which work comes into a cell that is as at the beginning: an operator who ends the cycle bars
+    them.
+
+    They are firable in the initial marking, and a sensor opens them, which sees the workpiece that has come; of a net
+    in which none is, all that are firable there.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> beginnings(catalogue_net("one_robot")), beginnings(catalogue_net("two_cells"))
+    (('G1',), ('enter',))
+    """
+    player, initial = TokenPlayer.of(net), net.initial_marking
+    firable = [c.name for c in player.transitions.values() if c.openable and c.firable(initial, player.places)]
+    sensors = {signal.name for signal in net.signals if signal.kind is SignalKind.SENSOR}
+    seen = [name for name in firable if any(gate.signal in sensors for gate in net.transition(name).external)]
+    return tuple(seen or firable)
 
 
 def _nobody_waits(run: Host) -> bool:

@@ -129,6 +129,8 @@ class Host:
         self.paused = False
         self.stopping = False
         self.draining = False
+        self.ends_at_home = False
+        """Whether the cycle has ended when the machines are as at the beginning: their driver cannot tell."""
         self.is_safe = False
         """Whether the safe outputs are driven; commands that were issued and did not leave are asked after, later."""
         self.has_waited = False
@@ -258,7 +260,9 @@ class Host:
         if at_end_of_cycle:
             self.draining = True
             self.note("stopping at the end of the cycle")
-            self.driver.close()
+            if not self.driver.close():
+                self.acts.forgo(ending.beginnings(self.net))
+                self.ends_at_home = True
         elif not self.stopping:
             self.ended_by = self.ended_by or ("stopped by the operator" if self.is_whole else "")
             self._end_soon("stopped by the operator")
@@ -387,6 +391,10 @@ class Host:
             if not waiter.done():
                 waiter.set_result(None)
         self.quiet_waiters.clear()
+        if self.ends_at_home and not self.stopping and not self.paused and ending.is_home(self):
+            self.ended_by = ending.AT_THE_END if self.is_whole else ""
+            self._end_soon(ending.AT_THE_END)
+            return
         ended = ending.ended(self)
         if ended is not None and self.outcome is not None:
             if ended.state is State.DONE:

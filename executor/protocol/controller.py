@@ -46,7 +46,7 @@ repeated, and their decisions applied, with the commands owed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -150,6 +150,9 @@ class LocalController:
         self.untold: Word = 0
         """The sensors that have shown nothing since the restart."""
         self.held = False
+        self.forgone = 0
+        """The transitions that an operator lets fire no more, by their indexes."""
+        self.index_of = {row: t for t, row in self.rows.items()}
         self.epoch = 0
 
     @classmethod
@@ -244,7 +247,7 @@ class LocalController:
         """Fire one local transition, if one is enabled and disturbs no promise; no effect means that none is."""
         if self.held:
             return []
-        enabled = self.enabled.at(self.word) & self.local_mask
+        enabled = self.enabled.at(self.word) & self.local_mask & ~self.forgone
         if not enabled:
             return []
         found = self.arbiter.following(enabled, self._is_free) if self._is_bound() else self.arbiter.following(enabled)
@@ -256,6 +259,11 @@ class LocalController:
             self.kept_turns = self.arbiter.turns
             effects.append(Keep("turns", self.kept_turns))
         return effects
+
+    def forgo(self, names: Collection[str]) -> None:
+        """Neither fire nor promise these transitions any more; what is promised stays so. A restart forgets it."""
+        own = {self.rows.get(t, transition.name): t for t, transition in enumerate(self.transitions)}
+        self.forgone = sum(1 << own[name] for name in names if name in own)
 
     def report(self) -> list[Effect]:
         """Tell each coordinator which parts are enabled, if that has changed since it was last told."""
@@ -303,6 +311,7 @@ class LocalController:
             return  # an old copy: the round is decided
         if request.round not in self.promises:
             asked = [name for name in request.transitions if name in self.parts and not self.held]
+            asked = [name for name in asked if not self.forgone >> self.index_of[name] & 1]
             # The parts of one round may disturb each other: one of them is chosen. Those of other rounds may not.
             yes = [n for n in asked if self._is_enabled(self.parts[n]) and not self._disturbs_promises(self.parts[n])]
             self.promises[request.round] = self._promise(yes)
@@ -447,7 +456,7 @@ class LocalController:
         return _union(promise.reads | promise.writes for promise in self.promises.values())
 
     def _readiness(self, above: Above) -> Readiness:
-        ready = 0 if self.held else self.enabled.at(self.word) & above.mask
+        ready = 0 if self.held else self.enabled.at(self.word) & above.mask & ~self.forgone
         if self.untold or self.unsent:
             ready = sum(1 << t for t in bits(ready) if self._is_enabled(self.transitions[t]))
         if ready != above.ready_mask or above.readiness.sequence < self.epoch << EPOCH_BITS:

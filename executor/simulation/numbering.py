@@ -45,7 +45,7 @@ _CONTROLLER: Final = frozenset(
     {
         *("name", "subnet", "player", "parts", "transitions", "enabled", "rows", "local_mask", "arbiter", "kept_turns"),
         *("word", "kept_word", "promises", "closed", "coordinators", "above", "latched", "commands", "timers"),
-        *("unsent", "untold", "held", "epoch"),
+        *("unsent", "untold", "held", "forgone", "index_of", "epoch"),
     }
 )
 _COORDINATOR: Final = frozenset(

@@ -1,6 +1,7 @@
 """The hosts of a cell: alone, together, cut off, killed and started anew; their traces join to one of the net."""
 
 import asyncio
+import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -15,13 +16,16 @@ from firable.executor.journal.journal import MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.operating.host import Host
+from firable.executor.operating.peers import REPEAT_SECONDS, REPEAT_SECONDS_MAX
 from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.running import execute
 from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.messages import Decision, Stored, Vote, VoteRequest
+from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.net import Place
 from firable.nets.text import parse_net
-from firable.semantics.trace import Noted, read_trace
+from firable.semantics.trace import Fired, Noted, parse_trace, read_trace
 
 LAMP = """\
 firable: 1
@@ -370,5 +374,145 @@ def test_an_emergency_stop_of_a_host_is_safe_first_and_commands_nothing_more(tmp
         await cell.stop()
         notes = [event for event in read_trace(cell.path(ROBOT)).events if isinstance(event, Noted)]
         assert any(event.note == "emergency stop" for event in notes)
+
+    run_in_virtual_time(main())
+
+
+def test_a_cell_whose_driver_cannot_keep_work_out_ends_its_cycle_with_the_machines_as_at_the_beginning() -> None:
+    async def main() -> Host:
+        decomposition = split(catalogue_net("one_robot"))
+        recorder = Recorder(decomposition.net, "", None)
+        host = Host(decomposition, DryRunDriver(decomposition.subnets, 1.0), recorder)
+        ending = asyncio.create_task(host.main())
+        await asyncio.sleep(33)
+        assert host.recorder.marking != decomposition.net.initial_marking
+        host.stop(at_end_of_cycle=True)
+        begun = host.recorder.firings["G1"]
+        ended = await asyncio.wait_for(ending, 100)
+        assert (ended.state, ended.message) == (State.STOPPED, "stopped at the end of the cycle")
+        assert host.recorder.marking == decomposition.net.initial_marking
+        assert host.recorder.firings["G1"] == begun == host.recorder.firings["G9"]  # what was begun was ended
+        return host
+
+    run_in_virtual_time(main())
+
+
+def test_a_host_that_ends_its_cycle_takes_no_new_work_and_ends_alone(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(33)
+        host = cell.hosts[("conveyor",)]
+        host.stop(at_end_of_cycle=True)
+        situation = await asyncio.wait_for(cell.tasks[("conveyor",)], 100)
+        assert situation.state is State.STOPPED
+        controller = host.controllers["conveyor"]
+        assert controller.marking == controller.subnet.initial_marking
+        await cell.stop()
+        cell.replayed()
+
+    run_in_virtual_time(main())
+
+
+def test_every_vote_of_a_whole_run_stands_in_its_trace_before_what_it_decides() -> None:
+    stream = io.StringIO()
+    execute(split(catalogue_net("one_robot")), catalogue_plant("one_robot"), workpieces=2, trace=stream)
+    trace = parse_trace(stream.getvalue())
+    voted: dict[int, set[str]] = {}
+    for event in trace.events:
+        match event:
+            case Noted(_, "voted", {"round": number, "controller": controller}):
+                assert controller not in voted.setdefault(number, set()), "a vote is told once"
+                voted[number].add(controller)
+            case Fired(_, ("G2",), int(number)):
+                assert voted[number] == {"system", "robot", "mc", "conveyor"}
+    assert len(voted) >= 18
+
+
+def test_a_machine_that_never_comes_is_told_by_name_and_no_more_when_it_has_come(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path, (CENTRE, ("system", "mc", "conveyor")))
+        await asyncio.sleep(10)
+        centre = cell.hosts[CENTRE]
+        assert set(centre.peers.never_met) == {"robot"}
+        assert [sentence for kind, sentence in cell.told if kind == "never-met"] == [
+            "'robot' was never reached: is its host started, and the address right?"
+        ]
+        assert "'robot' was never reached" in centre.situation().message
+        cell.journals[ROBOT] = MemoryJournal()
+        cell.start(ROBOT)
+        await asyncio.sleep(20)
+        assert set(centre.peers.never_met) == set()
+        assert cell.firings() > 5
+        await cell.stop()
+        cell.replayed()
+
+    run_in_virtual_time(main())
+
+
+def test_what_nobody_answers_is_repeated_ever_more_seldom_and_soon_when_there_is_something_new(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(5.1)
+        cell.exchange.cut(cell.links[CENTRE])
+        robot = cell.hosts[ROBOT]
+        await asyncio.sleep(60)
+        before = robot.acts.repeats
+        await asyncio.sleep(32)
+        assert 0 < robot.acts.repeats - before <= 32 / REPEAT_SECONDS_MAX + 1
+        cell.exchange.mend(cell.links[CENTRE])
+        assert robot.peers.pause_seconds == REPEAT_SECONDS
+        await asyncio.sleep(30)
+        await cell.stop()
+        cell.replayed()
+
+    run_in_virtual_time(main())
+
+
+def test_an_operator_acts_on_one_host_and_its_machines_alone(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(12.3)
+        robot, centre = cell.hosts[ROBOT], cell.hosts[CENTRE]
+        robot.pause()
+        await asyncio.sleep(5)
+        stood = dict(robot.recorder.firings)
+        promised = dict(robot.controllers["robot"].promises)
+        await asyncio.sleep(30)
+        assert robot.recorder.firings == stood
+        assert not promised
+        assert robot.situation().state is State.PAUSED
+        assert any("waits for the vote of 'robot'" in sentence for sentence in centre.peers.waits())
+        assert robot.resume()
+        fired = cell.firings()
+        await asyncio.sleep(30)
+        assert cell.firings() > fired + 10
+        centre.pause()
+        await asyncio.sleep(10)
+        stepped = [await centre.step() for _ in range(40)]
+        assert len([name for name in stepped if name]) >= 1
+        assert centre.situation().state is State.PAUSED
+        centre.resume()
+        await cell.stop()
+        cell.replayed()
+
+    run_in_virtual_time(main())
+
+
+def test_an_emergency_stop_needs_neither_coordinator_nor_link(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(7.3)
+        await cell.kill(CENTRE)
+        cell.exchange.cut(cell.links[ROBOT])
+        robot = cell.hosts[ROBOT]
+        driver = robot.driver
+        assert isinstance(driver, DryRunDriver)
+        robot.emergency_stop("a person in the cell")
+        assert driver.is_stopped, "before it returns"
+        ended = await asyncio.wait_for(cell.tasks[ROBOT], 5)
+        assert ended.message == "emergency stop: a person in the cell"
+        cell.start(CENTRE)
+        await asyncio.sleep(1)
+        await cell.stop()
 
     run_in_virtual_time(main())
