@@ -32,7 +32,8 @@ from firable.nets.formula import (
 )
 from firable.nets.net import Net
 from firable.nets.source import Source, quoted, read_bytes
-from firable.nets.temporal import Logic, Temporal, atoms_in, format_temporal, logics, parse_temporal
+from firable.nets.temporal import Logic, Temporal, format_temporal, logics, parse_temporal
+from firable.nets.temporal_parts import atoms_in
 from firable.nets.text_positions import bounded
 from firable.nets.well_formed import FORBIDDEN_IN_NAMES
 

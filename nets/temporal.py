@@ -24,7 +24,6 @@ which are half of the characters of a place's name and which no engineer reads a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -32,15 +31,12 @@ from typing import Final
 from firable.nets.formula import (
     CONSTANT_ATOMS,
     And,
-    Firable,
     Formula,
     FormulaError,
     FormulaParser,
-    Holds,
     Not,
     Or,
     format_formula,
-    names_in,
 )
 
 
@@ -293,13 +289,13 @@ def logics(formula: Temporal) -> frozenset[Logic]:
     Raises `FormulaError` where it mixes them.
     """
     found: frozenset[Logic] = frozenset(Logic)
-    for part in _operands(formula):
+    for part in operands_of(formula):
         found &= logics(part)
     match formula:
         case Exists(path) | ForAll(path):
             if not isinstance(path, Next | Eventually | Globally | Until):
                 raise FormulaError("a quantifier of CTL stands before X, F, G or U", 0)
-            found = frozenset({Logic.CTL}) & frozenset.intersection(frozenset(Logic), *map(logics, _operands(path)))
+            found = frozenset({Logic.CTL}) & frozenset.intersection(frozenset(Logic), *map(logics, operands_of(path)))
         case Next() | Eventually() | Globally() | Until() | Release() | WeakUntil() | Fires():
             found &= {Logic.LTL}
     if not found:
@@ -307,8 +303,8 @@ def logics(formula: Temporal) -> frozenset[Logic]:
     return found
 
 
-def _operands(formula: Temporal) -> tuple[Temporal, ...]:
-    """The operands; none of a quantifier, whose formula is no formula by itself."""
+def operands_of(formula: Temporal) -> tuple[Temporal, ...]:
+    """The operands of a formula; none of a quantifier, whose formula is no formula by itself."""
     match formula:
         case TemporalAnd(operands) | TemporalOr(operands):
             return operands
@@ -359,46 +355,3 @@ def _format_in_brackets(formula: Temporal) -> str:
 
 _UNARY_WORD: Final = {of: word for word, of in _UNARY.items()}
 _BINARY_WORD: Final[dict[type, str]] = {of: word for word, of in _BINARY.items()}
-
-
-def atoms_in(formula: Temporal) -> Iterator[Holds | Firable | Fires]:
-    """The atoms of the formula that name a place or a transition, left to right."""
-    match formula:
-        case Fires():
-            yield formula
-        case Exists(path) | ForAll(path):
-            yield from atoms_in(path)
-        case _ if isinstance(formula, Formula):
-            yield from names_in(formula)
-        case _:
-            for operand in _operands(formula):
-                yield from atoms_in(operand)
-
-
-def with_states(formula: Temporal, changed: Callable[[Formula], Formula]) -> Temporal:
-    """The formula with each of its largest state formulas changed.
-
-    >>> format_temporal(with_states(parse_temporal("AG (p and q)"), Not))
-    'AG not (p and q)'
-    """
-    match formula:
-        case Fires():
-            return formula
-        case TemporalNot(operand):
-            return negated(with_states(operand, changed))
-        case TemporalAnd(operands):
-            return all_of(tuple(with_states(operand, changed) for operand in operands))
-        case TemporalOr(operands):
-            return any_of(tuple(with_states(operand, changed) for operand in operands))
-        case Next() | Eventually() | Globally():
-            return type(formula)(with_states(formula.operand, changed))
-        case Until() | Release() | WeakUntil():
-            return type(formula)(with_states(formula.left, changed), with_states(formula.right, changed))
-        case Exists() | ForAll():
-            return type(formula)(with_states(formula.path, changed))
-    return changed(formula)
-
-
-def has_events(formula: Temporal) -> bool:
-    """Whether the formula speaks of firings, and not of markings alone."""
-    return any(isinstance(atom, Fires) for atom in atoms_in(formula))

@@ -26,7 +26,8 @@ from firable.nets.net import (
     Transition,
     is_fault,
 )
-from firable.nets.temporal import Fires, atoms_in, logics
+from firable.nets.temporal import Fires, logics
+from firable.nets.temporal_parts import atoms_in
 from firable.nets.time_limits import limit_problems
 
 FORBIDDEN_IN_NAMES: Final = frozenset(" \t\r\n()[]{},:#&*!|>'\"%@`\\")

@@ -13,7 +13,7 @@ from dataclasses import replace
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import And, Compare, Count, Formula, Holds, Not, Or
 from firable.nets.net import Net, TemporalProperty, Transition
-from firable.nets.temporal import with_states
+from firable.nets.temporal_parts import with_states
 
 
 def complement(net: Net, place: str, *, new_name: str | None = None, flip_gates: bool = True) -> Net:

@@ -37,7 +37,8 @@ from firable.analysis.evidence.certificate import (
 from firable.analysis.evidence.claims import STATE_GOALS, TRUE, Claim, ClaimKind
 from firable.nets.formula import Formula, Holds, format_formula, parse_formula
 from firable.nets.net import Fairness, Net
-from firable.nets.temporal import Logic, Temporal, atoms_in, format_temporal, logics, parse_temporal
+from firable.nets.temporal import Logic, Temporal, format_temporal, logics, parse_temporal
+from firable.nets.temporal_parts import atoms_in
 
 DEPTH_MAX: Final = 1_000
 ROUNDS_MAX: Final = 1_000_000

@@ -9,9 +9,11 @@ A bound is found by halving: whether k tokens can be reached is a state formula.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.question import Answer, Question, listed, no, unknown, yes
 from firable.analysis.spaces.space import StateSpace, WitnessError
 from firable.analysis.temporal.automaton import TimeEndedError, TooLargeError
@@ -30,12 +32,13 @@ from firable.nets.temporal import (
     Globally,
     Temporal,
     format_temporal,
-    has_events,
 )
-from firable.nets.verdict import Verdict
+from firable.nets.temporal_parts import has_events
+from firable.nets.verdict import Verdict, Witness
 from firable.semantics.trace import Discipline
 
 S = TypeVar("S")
+_SHOWN_SHARE: Final = 0.25  # of the time that is left, for the run that shows an answer that is known
 
 
 def as_goal(formula: Temporal | None) -> tuple[Formula, bool] | None:
@@ -146,18 +149,33 @@ def _answered(space: StateSpace[Any], query: Query) -> Answer:
 
 
 def _goal(space: StateSpace[S], goal: Formula, *, holds: bool) -> Answer:
-    witness = space.witness(space.satisfying(goal), f"here ({format_temporal(goal)}) holds")
-    if witness is not None:
-        return yes(witness) if holds else no(witness=witness)
+    targets = space.satisfying(goal)
+    if space.count(targets):
+        return _decided(space, holds, lambda hurried: hurried.witness(targets, f"here ({format_temporal(goal)}) holds"))
     space.require_complete()
     return no() if holds else yes()
 
 
 def _ctl(space: StateSpace[S], formula: Temporal) -> Answer:
     ctl = Ctl(Sets(space))
-    if space.contains(ctl.of(formula), space.net.initial_marking):
-        return yes(shown(ctl, formula))
-    return no(witness=refuted(ctl, formula))
+    holds = space.contains(ctl.of(formula), space.net.initial_marking)
+
+    def show(hurried: StateSpace[S]) -> Witness | None:
+        ctl.sets.space = hurried
+        return shown(ctl, formula) if holds else refuted(ctl, formula)
+
+    return _decided(space, holds, show)
+
+
+def _decided(space: StateSpace[S], holds: bool, show: Callable[[StateSpace[S]], Witness | None]) -> Answer:
+    """An answer that is known, with what shows it: it must not be lost over the search for that."""
+    deadline, left = space.deadline, space.deadline.left_seconds
+    try:
+        return Answer(holds, witness=show(space if left is None else space.until(deadline.within(left * _SHOWN_SHARE))))
+    except BudgetExceeded:
+        return Answer(holds, hint="the run that shows it takes too long to be found")
+    finally:
+        space.until(deadline)
 
 
 def _ltl(space: StateSpace[S], formula: Temporal) -> Answer:

@@ -8,8 +8,10 @@ from support.dense_nets import dense_nets
 from support.naive_space import NaiveSpace
 from support.ring_nets import ring_nets
 
+import firable.analysis.temporal.queries as queries
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import Deadline
-from firable.analysis.spaces.reachability import Budget, explore
+from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.temporal.automaton import TimeEndedError, TooLargeError, automaton_of
 from firable.analysis.temporal.queries import answer, as_goal, upper_bound
 from firable.analysis.temporal.rewriting import positive
@@ -199,3 +201,20 @@ def test_a_property_that_is_a_goal_is_one(name: str, wanted: bool) -> None:
     assert NaiveSpace(net).satisfying(goal.formula) == {0}
     other = Net("n", properties=(TemporalProperty(name, Logic.CTL, parse_temporal("AG EF start")),))
     assert goals_of(other, f"property.{name}") is None
+
+
+@pytest.mark.parametrize("text", ["AG EF start", "EG not deadlock", "AF deadlock", "EF deadlock"])
+def test_what_is_known_is_not_lost_where_the_time_ends_over_what_shows_it(
+    monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    def too_long(*_: object) -> None:
+        raise BudgetExceeded("max_seconds is over")
+
+    space, query = explore(LATE, deadline=Deadline.after(60)), parse_query(text)
+    expected = answer(space, query)
+    for name in ("shown", "refuted"):
+        monkeypatch.setattr(queries, name, too_long)
+    monkeypatch.setattr(ReachabilityGraph, "witness", too_long)
+    found = answer(space, query)
+    assert (found.status, found.witness) == (expected.status, None)
+    assert "too long" in found.hint

@@ -12,12 +12,11 @@ from firable.nets.temporal import (
     Next,
     Temporal,
     Until,
-    atoms_in,
     format_temporal,
-    has_events,
     logics,
     parse_temporal,
 )
+from firable.nets.temporal_parts import atoms_in, has_events
 
 PLACES = ["robot.free", "a-b", "X", "E", "start"]
 

@@ -89,6 +89,14 @@ impl Naive {
         found
     }
 
+    fn endless(&self, within: &Set) -> Set {
+        let mut left = within.clone();
+        while let Some(&ended) = left.iter().find(|&&m| !self.successors(m).any(|next| left.contains(&next))) {
+            left.remove(&ended);
+        }
+        left
+    }
+
     fn backward(&self, all: &Set, targets: &Set, within: &Set) -> Set {
         let mut found = targets.clone();
         while let Some(&more) = all.iter().find(|&&m| {
@@ -179,6 +187,11 @@ fn every_operation_agrees_with_sets_of_masks() {
         let backward = both.naive.backward(&reach, &targets, &within);
         let found = watched(|watch| both.space.backward(&[], targets_node, within_node, watch));
         both.check(found, &backward, "backward within");
+        for (set, node) in [(&reach, root), (&within, within_node), (&targets, targets_node)] {
+            let endless = both.naive.endless(set);
+            let found = watched(|watch| both.space.endless(&[], node, watch));
+            both.check(found, &endless, "endless");
+        }
         let forward = both.naive.closure(&targets, |_| true);
         let found = watched(|watch| both.space.closure(&[], targets_node, ANY, false, watch));
         both.check(found, &forward, "forward");
@@ -259,6 +272,71 @@ fn a_thousand_philosophers_have_three_to_the_thousand_markings_and_two_deadlocks
     let alive = watched(|watch| space.all(&[], reach, Events::Tests, watch));
     let deadlocks = watched(|watch| space.binary(&[], Binary::Difference, reach, alive, watch));
     assert_eq!(watched(|watch| space.count(deadlocks, watch))[0], 2);
+}
+
+/// Rings that turn for ever and chains that come to an end, side by side; some steps are gated by a place elsewhere.
+fn rings_and_chains(numbers: &mut Numbers) -> Naive {
+    let (mut places, mut transitions, mut initial) = (0, Vec::new(), Vec::new());
+    for _ in 0..3 {
+        let (length, ring) = (2 + numbers.below(4) as u32, numbers.below(2) == 0);
+        for k in 0..if ring { length } else { length - 1 } {
+            let gate: Vec<u32> = if places > 0 && numbers.below(4) == 0 {
+                vec![numbers.below(u64::from(places)) as u32]
+            } else {
+                vec![]
+            };
+            let (permissive, inhibitive) = if numbers.below(2) == 0 { (gate, vec![]) } else { (vec![], gate) };
+            let (from, to) = (places + k, places + (k + 1) % length);
+            transitions.push(Transition::new(&[from], &[to], &permissive, &inhibitive, &[]));
+        }
+        initial.push(places);
+        places += length;
+    }
+    Naive { places, transitions, initial }
+}
+
+#[test]
+fn runs_that_go_on_for_ever_are_told_from_those_that_a_set_or_a_chain_ends() {
+    let mut numbers = Numbers(0x0fed_cba9_8765_4321);
+    for _ in 0..3000 {
+        let naive = rings_and_chains(&mut numbers);
+        let (places, transitions, initial) = (naive.places as usize, naive.transitions.clone(), naive.initial.clone());
+        let space = watched(|watch| Symbolic::explore(places, transitions, initial, 1 << 24, None, watch));
+        let mut both = Both { naive, space };
+        let mut set = both.naive.closure(&[mask(&both.naive.initial)].into(), |_| true);
+        // Without the markings in which two places, now and then one, are full together.
+        for _ in 0..numbers.below(5) {
+            let both_full = mask(&[0, 1].map(|_| numbers.below(places as u64) as u32));
+            set.retain(|&marking| marking & both_full != both_full);
+        }
+        let node = both.set(&set);
+        let endless = both.naive.endless(&set);
+        let found = watched(|watch| both.space.endless(&[], node, watch));
+        both.check(found, &endless, "endless");
+    }
+}
+
+/// Counters that come to their end after as many steps as they have places, and beside them a ring that never does.
+fn counters_and_ring(counters: u32, length: u32) -> (usize, Vec<Transition>, Vec<u32>) {
+    let arc = |from: u32, to: u32| Transition::new(&[from], &[to], &[], &[], &[]);
+    let first = |counter: u32| 2 + counter * length;
+    let steps = (0..counters).flat_map(|i| (1..length).map(move |k| (first(i) + k - 1, first(i) + k)));
+    let transitions = [(0, 1), (1, 0)].into_iter().chain(steps).map(|(from, to)| arc(from, to)).collect();
+    let initial = (0..counters).map(first).chain([0]).collect();
+    (2 + (counters * length) as usize, transitions, initial)
+}
+
+#[test]
+fn what_goes_on_for_ever_beside_long_ways_to_an_end_is_found_without_a_round_for_each_of_their_steps() {
+    let (places, transitions, initial) = counters_and_ring(40, 50);
+    let mut space = watched(|watch| Symbolic::explore(places, transitions, initial, 1 << 28, None, watch));
+    let reach = space.reach;
+    assert_eq!(watched(|watch| space.endless(&[], reach, watch)), reach);
+    // Where the ring stands still every run ends, after 40 times 49 steps at most: as many rounds of sets that are large.
+    let still = watched(|watch| space.having(&[], reach, &[0], &[], watch));
+    let begun = space.diagram().cache.work;
+    assert_eq!(watched(|watch| space.endless(&[], still, watch)), EMPTY);
+    assert!(space.diagram().cache.work - begun < 200_000);
 }
 
 #[test]

@@ -31,8 +31,8 @@ from firable.nets.temporal import (
     Until,
     WeakUntil,
     format_temporal,
-    has_events,
 )
+from firable.nets.temporal_parts import has_events
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import Player, holds_in

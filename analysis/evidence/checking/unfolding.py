@@ -37,8 +37,8 @@ from firable.nets.temporal import (
     all_of,
     any_of,
     format_temporal,
-    has_events,
 )
+from firable.nets.temporal_parts import has_events
 from firable.semantics.trace import Discipline
 
 Owed = frozenset[Temporal]

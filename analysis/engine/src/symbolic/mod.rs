@@ -4,7 +4,7 @@
 //! is the method for such nets: zero-suppressed decision diagrams (`zdd`, `algebra`, `cache`), one place a level in an
 //! order that keeps neighbours together (`order`, `race`), transitions as lists of literals (`events`), reachability by
 //! saturation (`saturation`, `firing`), which takes several places at once (`blocks`, `values`, `parts`), one step of all
-//! transitions (`image`), exact numbers (`count`), firing sequences (`walk`), sets as rows for others to read (`listing`),
+//! transitions (`image`), runs that go on for ever (`endless`), exact numbers (`count`), firing sequences (`walk`), sets as rows for others to read (`listing`),
 //! and what is found of a net as one value (`space`, `ordered`).
 //!
 //! Everything is written with stacks of its own, because nets have half a million levels, and everything that grows
@@ -15,6 +15,7 @@ pub mod algebra;
 mod blocks;
 pub mod cache;
 pub mod count;
+mod endless;
 pub mod events;
 mod firing;
 mod hubs;

@@ -208,20 +208,6 @@ impl Symbolic {
         self.binary(&[roots, &[set]].concat(), Binary::Intersection, all, self.reach, watch)
     }
 
-    /// The markings of a set from which a run can go on for ever inside it (EG over infinite runs).
-    pub fn endless(&mut self, roots: &[Node], set: Node, watch: &mut Watch<'_>) -> Result<Node, Stop> {
-        let mut left = set;
-        loop {
-            let held = [roots, &[left]].concat();
-            let before = self.before(&held, left, watch)?;
-            let fewer = self.binary(&held, Binary::Intersection, left, before, watch)?;
-            if fewer == left {
-                return Ok(left);
-            }
-            left = fewer;
-        }
-    }
-
     fn levels_of(&self, marked: &[u32]) -> Vec<u32> {
         let mut levels: Vec<u32> = marked.iter().map(|&place| self.ordered.level_of[place as usize]).collect();
         levels.sort_unstable();

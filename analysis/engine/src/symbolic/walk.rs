@@ -44,9 +44,10 @@ pub struct Walk {
 }
 
 /// A marking: for each level from 1 whether its place holds a token.
-type Marking = Vec<bool>;
+pub(super) type Marking = Vec<bool>;
 
-fn holds(store: &Store, set: Node, marking: &Marking, tokens: usize) -> bool {
+/// Whether a set holds a marking of so many tokens.
+pub(super) fn holds(store: &Store, set: Node, marking: &Marking, tokens: usize) -> bool {
     let (mut node, mut met) = (set, 0);
     while store.level(node) != TERMINAL {
         if marking[store.level(node) as usize] {
@@ -59,15 +60,43 @@ fn holds(store: &Store, set: Node, marking: &Marking, tokens: usize) -> bool {
     node != EMPTY && met == tokens
 }
 
-fn tokens(marking: &Marking) -> usize {
+/// How many tokens there are.
+pub(super) fn tokens(marking: &Marking) -> usize {
     marking.iter().filter(|&&token| token).count()
 }
 
 /// The moves of a net by level; a transition that never fires has none.
-struct Moves(Vec<Option<Vec<(u32, Kind)>>>);
+pub(super) struct Moves(Vec<Option<Vec<(u32, Kind)>>>);
 
 impl Moves {
-    fn fires(&self, t: usize, marking: &Marking) -> bool {
+    /// The moves of a space's net.
+    pub(super) fn of(space: &Symbolic) -> Self {
+        Moves(space.transitions.iter().map(|t| literals(t, space.level_of(), Sense::Forward)).collect())
+    }
+
+    /// How many transitions there are.
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// The levels that a transition has to do with.
+    pub(super) fn levels(&self, t: usize) -> impl Iterator<Item = u32> + '_ {
+        self.0[t].iter().flatten().map(|&(level, _)| level)
+    }
+
+    /// The levels that its firing changes.
+    pub(super) fn flipped(&self, t: usize) -> impl Iterator<Item = u32> + '_ {
+        self.0[t].iter().flatten().filter(|(_, kind)| kind.wants() != kind.leaves()).map(|&(level, _)| level)
+    }
+
+    /// Whether a transition takes a token that another one puts.
+    pub(super) fn follows(&self, t: usize, other: usize) -> bool {
+        let puts = |level| self.0[other].iter().flatten().any(|&(at, kind)| at == level && kind == Kind::Put);
+        self.0[t].iter().flatten().any(|&(level, kind)| kind == Kind::Take && puts(level))
+    }
+
+    /// Whether a transition may fire.
+    pub(super) fn fires(&self, t: usize, marking: &Marking) -> bool {
         self.0[t].as_ref().is_some_and(|all| all.iter().all(|&(level, kind)| marking[level as usize] == kind.wants()))
     }
 
@@ -76,7 +105,7 @@ impl Moves {
     }
 
     /// Fires a transition, or takes a firing back: both are the same exclusive or.
-    fn flip(&self, t: usize, marking: &mut Marking) {
+    pub(super) fn flip(&self, t: usize, marking: &mut Marking) {
         let all = self.0[t].iter().flatten();
         all.filter(|(_, kind)| kind.wants() != kind.leaves()).for_each(|&(level, _)| marking[level as usize] ^= true);
     }
@@ -94,8 +123,7 @@ impl Symbolic {
         if targets == EMPTY {
             return Ok(None);
         }
-        let moves = self.transitions.iter().map(|t| literals(t, self.level_of(), Sense::Forward)).collect();
-        let moves = Moves(moves);
+        let moves = Moves::of(self);
         if let Some(walk) = self.by_layers(roots, targets, &moves, self.layers_work, watch)? {
             return Ok(Some(walk));
         }
