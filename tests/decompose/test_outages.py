@@ -7,7 +7,10 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.checking.checker import check_document
 from firable.analysis.evidence.document import document_from_text
 from firable.analysis.goal import Limits
+from firable.decompose.protocol.building import protocol_net
+from firable.decompose.protocol.faulty import GO_ON, KINDS, budget
 from firable.decompose.protocol.outages import Outage, outage_text, outage_verdict, outages
+from firable.decompose.protocol.variant import ANY_FAULTS, ONE_OF_EACH, PROTOCOL
 from firable.decompose.protocol.verdicts import document, protocol_verdicts
 from firable.decompose.splitting.cut import split
 from firable.nets.net import Command, Controller, Net, Place, Transition
@@ -152,6 +155,21 @@ def test_a_diagram_says_what_a_table_says(monkeypatch: pytest.MonkeyPatch) -> No
 def test_net_without_coordinated_transitions_has_no_coordinator_to_lose() -> None:
     net = Net("n", (Place("a.p", "a", marked=True),), (Transition("l", ("a.p",)),), (), (A,))
     assert [outage.who for outage in outages(split(net))] == ["a"]
+
+
+@pytest.mark.parametrize("name", ["ring", "local_conflict", "cell1"])
+def test_one_fault_of_each_kind_is_a_case_of_any_number_of_them(name: str) -> None:
+    """Each step of the one net is one of the other, which demands of its other places the same, or less."""
+    one, many = (protocol_net(split(load_net(name)), PROTOCOL, faults) for faults in (ONE_OF_EACH, ANY_FAULTS))
+    spent = {budget(kind) for kind in KINDS}
+    assert {place.name for place in one.net.places} - spent == {place.name for place in many.net.places} - {GO_ON}
+    for t in one.net.transitions:
+        u = many.net.transition(t.name)
+        assert {*t.inputs} - spent == {*u.inputs}
+        assert {*t.outputs} == {*u.outputs}
+        assert {*t.permissive} == {*u.permissive} - {GO_ON}  # which holds a token until faults cease
+        assert {*t.inhibitive} == {*u.inhibitive}
+    assert {u.name for u in many.net.transitions} - {t.name for t in one.net.transitions} == {"cease"}
 
 
 @pytest.mark.parametrize("name", ["ring", "local_conflict", "remote_gate"])

@@ -25,11 +25,9 @@ def net_mutants(net: Net) -> Iterator[tuple[str, Callable[[], Net]]]:
             for how, changed in _listed(items, i, _changes(net, item)):
                 yield f"{kind} {getattr(item, 'name', i)}: {how}", _with(net, kind, changed)
     yield "another name", _with(net, "name", f"{net.name}x")
-    yield (
-        "another transition",
-        _with(net, "transitions", (*net.transitions, Transition("extra", (net.places[0].name,)))),
-    )
-    owner = net.places[0].owner
+    owner = net.places[0].owner if net.places else net.controllers[0].name  # a coordinator may own nothing
+    extra = Transition("extra", (net.places[0].name,) if net.places else ())
+    yield "another transition", _with(net, "transitions", (*net.transitions, extra))
     yield "another place", _with(net, "places", (*net.places, Place(f"{owner}.extra", owner)))
     yield "another signal", _with(net, "signals", (*net.signals, Signal(f"{owner}.sextra", owner)))
 
@@ -65,6 +63,8 @@ def _changes(net: Net, item: Any) -> Iterator[tuple[str, Any]]:
             if hasattr(item, "coordinator"):
                 yield "coordinator", replace(item, coordinator=not item.coordinator)
                 yield "words", replace(item, description=f"{item.description}.")
+                others = [c.name for c in net.controllers if c.name != item.name]
+                yield from ((f"under {c}", replace(item, under=c)) for c in (None, *others) if c != item.under)
             if hasattr(item, "among"):
                 yield "order", replace(item, among=item.among[::-1])
                 yield "fewer", replace(item, among=item.among[1:])
@@ -111,7 +111,7 @@ def _place_changes(net: Net, p: Place) -> Iterator[tuple[str, Place]]:
     else:
         yield "no command", replace(p, command=None, completion=None)
         yield "machine", replace(p, command=replace(p.command, machine="M"))
-        yield "command", replace(p, command=replace(p.command, command="GO"))
+        yield "command", replace(p, command=replace(p.command, command=f"{p.command.command}x"))
         yield "parameters", replace(p, command=replace(p.command, parameters=(*p.command.parameters, ("n", "1"))))
     yield from (
         ("completion", replace(p, completion=signal.name)) for signal in net.signals if signal.name != p.completion
@@ -149,6 +149,8 @@ def _row_changes(row: Coordinated, rows: Sequence[Coordinated]) -> Iterator[tupl
     yield "number", replace(row, number=None if row.number is not None else 77)
     yield "number", replace(row, number=99)
     yield "layer", replace(row, at="nobody" if row.at is None else None)
+    layers = {other.at for other in rows} - {row.at, None}
+    yield from ((f"layer {at}", replace(row, at=at)) for at in sorted(map(str, layers)))
     yield "words", replace(row, description=f"{row.description}.")
     others = [part for other in rows for part in other.parts if part not in row.parts]
     for i, part in enumerate(row.parts):
@@ -160,6 +162,7 @@ def _row_changes(row: Coordinated, rows: Sequence[Coordinated]) -> Iterator[tupl
 def _group_changes(group: ArbitrationGroup, bundle: Bundle) -> Iterator[tuple[str, ArbitrationGroup]]:
     yield "renamed", replace(group, name=f"{group.name}x")
     yield "layer", replace(group, at="nobody" if group.at is None else None)
+    yield from ((f"layer {c.name}", replace(group, at=c.name)) for c in bundle.net.controllers if c.name != group.at)
     yield from (("rule", replace(group, by=by)) for by in ArbitrationRule if by is not group.by)
     deciders = [None, *(c.name for c in bundle.net.controllers), "nobody"]
     yield from ((f"decided by {c}", replace(group, controller=c)) for c in deciders if c != group.controller)
