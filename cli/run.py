@@ -117,7 +117,11 @@ def run(
     if serve is not None and _SPEEDS[speed] is None and options.bind is None and not options.is_one_of_several:
         raise click.UsageError("in virtual time a run is over before anybody acts: with --serve, name --speed 1 or 10")
     if options.is_one_of_several and (plant is not None or watch == "stop" or step):
-        raise click.UsageError("--plant, --watch and --step are of a whole run, and not of one host among others")
+        raise click.UsageError(
+            "--plant, --watch and --step are of a whole run: what the machines of one host should do depends on those "
+            "of the others, which it does not see; hold the joined traces against the plant file, with "
+            "`firable replay ... -o FILE` and `firable replay FILE --machines PLANT`"
+        )
 
     def make() -> Report:
         from firable.cli.stepping import stepping

@@ -7,12 +7,15 @@ before nobody waits for a word of it, as far as that comes in time.
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Collection
 from dataclasses import replace
 from itertools import takewhile
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.operating import restart
 from firable.executor.operating.situation import Situation, State, blocked, blocked_parts
+from firable.executor.operating.uncut import uncut
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.net import Net, SignalKind
 
@@ -26,9 +29,9 @@ def situation(run: Host) -> Situation:
     """What a host is doing, and what waits for what; exact at quiescence, as far as its machines know."""
     others = "; ".join(sentence for sentence in run.peers.waits() if run.taking_up is None or "is held" not in sentence)
     if run.is_whole:
-        waiting = tuple(blocked(run.recorder.player, run.recorder.word, run.untaken))
+        waiting = tuple(blocked(run.recorder.player, run.recorder.word, run.dispatch.untaken))
     else:
-        waiting = tuple(one for each in run.controllers.values() for one in blocked_parts(each, run.untaken))
+        waiting = tuple(one for each in run.controllers.values() for one in blocked_parts(each, run.dispatch.untaken))
     if run.fault:
         return Situation(State.FAULT, run.marking, waiting, run.fault)
     if run.stopping:
@@ -67,13 +70,35 @@ def ended(run: Host) -> Situation | None:
     return situation(run) if is_stuck or run.recorder.is_deadlock else None
 
 
+async def close(run: Host, tasks: Collection[asyncio.Task[None]]) -> list[str]:
+    """Drive the safe outputs, and end what runs beside the host; returns what had to be given up."""
+    if run.taking_up is None or run.stopping:  # to look at a run that is held changes nothing
+        run.make_safe()
+    for task in tasks:
+        task.cancel()
+    hanging = await uncut(tasks, run.patience)
+    run.acts.end()
+    run.dispatch.end()
+    if run.watching is not None:
+        run.watching.end()
+    return hanging
+
+
+def with_hanging(ended: Situation, hanging: Collection[str]) -> Situation:
+    """The end of a run of which that much did not end: a fault, whatever it was before."""
+    if not hanging:
+        return ended
+    message = f"{' and '.join(hanging)} did not end in time: look at the machines, they may not be safe"
+    return replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, message))))
+
+
 def is_home(run: Host) -> bool:
     """Whether the machines here are as at the beginning, and nothing is awaited, timed or promised.
 
     The end of a cycle of machines whose driver cannot tell when they rest.
     """
     at_home = all(each.marking == each.subnet.initial_marking for each in run.controllers.values())
-    awaits = run.alarms.timers or run.untaken or run.acts.ticks
+    awaits = run.dispatch.timers or run.dispatch.untaken or run.acts.ticks
     return at_home and not awaits and run.acts.is_settled
 
 

@@ -30,20 +30,19 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Collection, Mapping
-from dataclasses import replace
 from typing import Final
 
-from firable.executor.drivers.driver import Driver, withdraw
+from firable.executor.drivers.driver import Driver
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.link import Link
 from firable.executor.operating import ending, restart
-from firable.executor.operating.acts import Acts, CommandTaken, SignalRead
-from firable.executor.operating.alarms import Alarms
+from firable.executor.operating.acts import Acts, SignalRead
 from firable.executor.operating.clock import RunClock
+from firable.executor.operating.dispatch import Dispatch
 from firable.executor.operating.figures import Figures
 from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence, Monitor
-from firable.executor.operating.peers import REPEAT_SECONDS, Peers
+from firable.executor.operating.peers import Peers
 from firable.executor.operating.recorder import TRACE, Recorder
 from firable.executor.operating.single_step import step
 from firable.executor.operating.situation import Situation, State
@@ -89,8 +88,6 @@ class Host:
         monitor: Monitor | None = None,
         stop_at_divergence: bool = False,
         figures: Figures | None = None,
-        settle_seconds: float = SETTLE_SECONDS,
-        repeat_seconds: float = REPEAT_SECONDS,
         patience: Patience | None = None,
         log: Log | None = None,
     ) -> None:
@@ -100,15 +97,14 @@ class Host:
         self.journal = journal or MemoryJournal()
         self.deciding = coordinators(decomposition)
         everything = (*self.deciding, *(subnet.name for subnet in decomposition.subnets))
-        self.acts = Acts(
-            decomposition, machines or everything, self.journal, recorder, figures, self._wake, self._part_fired
-        )
+        self.dispatch = Dispatch(self, overdue_seconds)
+        here = everything if machines is None else machines
+        self.acts = Acts(decomposition, here, self.journal, recorder, figures, self._wake, self.dispatch.left)
         self.coordinators, self.controllers = self.acts.coordinators, self.acts.controllers
         self.is_whole = link is None
-        self.peers = Peers(decomposition, self.acts, link, self.told, self._work_now, repeat_seconds)
+        self.peers = Peers(decomposition, self.acts, link, self.told, self._work_now)
         self.speed = speed
         self.begin_seconds = begin_seconds
-        self.settle_seconds = settle_seconds
         self.is_complete = is_complete
         self.operator = operator
         self.operated = operator is not None
@@ -139,9 +135,6 @@ class Host:
         self.ended_by = ""
         self.fault = ""
         self.patience = patience or Patience()
-        self.alarms = Alarms(self.net, overdue_seconds, self._fail)
-        self.untaken: set[str] = set()
-        """The places whose command has no completion, and is with the driver."""
         self.turn = 0
         self.working = False
         """Whether a group is done, or about to be."""
@@ -174,18 +167,8 @@ class Host:
             self.acts.start()
             ended = await self._outcome(self.outcome)
         finally:
-            if self.taking_up is None or self.stopping:  # to look at a run that is held changes nothing
-                self._make_safe()
-            for task in tasks:
-                task.cancel()
-            hanging = await uncut(tasks, self.patience)
-            self.acts.end()
-            self.alarms.end()
-            if self.watching is not None:
-                self.watching.end()
-        if hanging:
-            self.fault = f"{' and '.join(hanging)} did not end in time: look at the machines, they may not be safe"
-            ended = replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, self.fault))))
+            hanging = await ending.close(self, tasks)
+        ended = ending.with_hanging(ended, hanging)
         if self.left_nothing_open:
             self.recorder.end(self.now_seconds(), self.marking, ended.state.value)
         else:
@@ -210,9 +193,9 @@ class Host:
     def at_rest(self) -> bool:
         """Whether nothing is pending: no message under way, no event in the cell to come, nothing awaited or timed.
 
-        Then time alone changes nothing; only the operator, by a step or a resume, may let something fire.
+        Then time changes nothing; only the operator, by a step or a resume, may let something fire.
         """
-        return self.is_quiet and self.driver.at_rest and not self.alarms.timers and not self.acts.ticks
+        return self.is_quiet and self.driver.at_rest and not self.dispatch.timers and not self.acts.ticks
 
     @property
     def marking(self) -> tuple[str, ...]:
@@ -240,11 +223,7 @@ class Host:
         if self.stopping or restart.uncertain(self):
             return False
         if self.taking_up is not None:
-            self.taking_up = None
-            self.note("taken up")
-            for name, controller in self.controllers.items():
-                self.acts.act(name, controller.resume())
-                self.acts.post(name, None)
+            restart.release(self)
         if self.paused:
             self.paused = False
             self.note("resumed")
@@ -269,7 +248,7 @@ class Host:
 
     def emergency_stop(self, reason: str) -> None:
         """Drive the safe outputs at once, before anything is written or said; the run ends, and can be taken up."""
-        self._make_safe()
+        self.make_safe()
         self.ended_by = f"emergency stop: {reason}"
         self._end_soon("emergency stop", reason=reason)
 
@@ -281,7 +260,7 @@ class Host:
         """Say what became of a command that was under way when the host was restarted."""
         self.acts.act(controller, self.controllers[controller].answer(place, entry, answer))
         if answer is Answer.WORKING:
-            self._watch(place)
+            self.dispatch.watch(place)
 
     async def quiet(self) -> None:
         """Wait until nothing is posted."""
@@ -300,20 +279,16 @@ class Host:
     def signal(self, name: str, value: bool, entry: int | None) -> None:
         """A signal has a new value."""
         if entry is not None:
-            self.alarms.over(name)
+            self.dispatch.over(name)
         self.acts.hear(self.owner_of[name], SignalRead(name, value, entry))
 
     def taken(self, place: str, entry: int) -> None:
-        """A machine has the command of a place; a token without completion has waited for that."""
-        sender = self.net.place(place)
-        if sender.completion is None:
-            self.untaken.discard(place)
-            self.alarms.over(place)
-            self.acts.hear(str(sender.owner), CommandTaken(place, entry))
+        """A machine has the command of a place."""
+        self.dispatch.taken(place, entry)
 
     def driver_fault(self, machine: str, message: str) -> None:
         """A machine has failed: nothing fires any more."""
-        self._fail(f"{machine}: {message}" if machine else message)
+        self.fail(f"{machine}: {message}" if machine else message)
 
     def driver_note(self, machine: str, message: str) -> None:
         """What a driver says of a machine or its link stands in the trace."""
@@ -343,7 +318,7 @@ class Host:
             self._leave()
             if self.acts.firings_at_once > FIRINGS_AT_ONCE_MAX:
                 last = self.acts.fired_at_once[0]
-                self._fail(f"'{last}' and others fire without end, and no time passes: no gate ever holds them")
+                self.fail(f"'{last}' and others fire without end, and no time passes: no gate ever holds them")
             self.working = False
             if self.acts.posted or self.acts.unsynced:
                 self._wake()
@@ -360,30 +335,7 @@ class Host:
             if not isinstance(effect, Sending):
                 self.peers.send(effect)
             elif not self.is_safe:
-                self._send(effect.place, effect.entry)
-
-    def _send(self, place: str, entry: int) -> None:
-        sender = self.net.place(place)
-        if sender.completion is not None:
-            self._watch(place)
-            self.driver.send(sender, entry)
-            return
-        self.untaken.add(place)
-        self.driver.send(sender, entry)
-        if place in self.untaken:  # it waits for a line
-            self._watch(place)
-
-    def _watch(self, place: str) -> None:
-        if self.clock is not None:
-            self.alarms.watch(place, self.clock)
-
-    def _part_fired(self, controller: str, transition: str) -> None:
-        """Give up what a controller's tokens have left behind: no machine moves by it when its link comes back."""
-        places = [
-            place for place in map(self.net.place, self.net.transition(transition).inputs) if place.owner == controller
-        ]
-        for place in withdraw(self.driver, places, self.acts.leaving):
-            self.recorder.note(self.now_seconds(), "withdrawn", place=place)
+                self.dispatch.send(effect.place, effect.entry)
 
     def _settle(self) -> None:
         """At quiescence, wake who waits for it, and end the run if nothing will happen."""
@@ -415,19 +367,20 @@ class Host:
         self.recorder.note(found.at_seconds, "divergence", message=str(found))
         self._wake()
         if self.stop_at_divergence:
-            self._fail(f"the machines are not as they are modelled: {found}")
+            self.fail(f"the machines are not as they are modelled: {found}")
 
     # The end
 
-    def _fail(self, message: str) -> None:
+    def fail(self, message: str) -> None:
+        """End the run by a fault, with the machines stopped where they are."""
         if not self.fault:
             self.fault = message
-            self._make_safe()
+            self.make_safe()
             self._end_soon("fault", message=message)
             if self.tell is not None:
                 self.tell("fault", message)
 
-    def _make_safe(self) -> None:
+    def make_safe(self) -> None:
         """Stop the driver: what it is handed from now on it drops, so nothing is, and no command counts as sent."""
         self.is_safe = True
         try:
@@ -446,7 +399,7 @@ class Host:
         self.stopping = True
         self._halt(note, **data)
         if self.clock is not None and not self.is_whole:
-            self.clock.loop.call_later(self.settle_seconds, self._wait_no_longer)
+            self.clock.loop.call_later(SETTLE_SECONDS, self._wait_no_longer)
 
     def _wait_no_longer(self) -> None:
         self.has_waited = True

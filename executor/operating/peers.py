@@ -46,7 +46,7 @@ class Peers:
         link: Link | None,
         told: Callable[[str, str], None],
         work: Callable[[], None],
-        repeat_seconds: float,
+        repeat_seconds: float = REPEAT_SECONDS,
     ) -> None:
         self.acts = acts
         self.work = work

@@ -65,6 +65,15 @@ async def take_up(run: Host, found: TakingUp) -> None:
     run.moved()
 
 
+def release(run: Host) -> None:
+    """End the hold: what is owed is sent, and what is enabled fires."""
+    run.taking_up = None
+    run.note("taken up")
+    for name, controller in run.controllers.items():
+        run.acts.act(name, controller.resume())
+        run.acts.post(name, None)
+
+
 def uncertain(run: Host) -> list[str]:
     """The places with a command of which nobody knows what became of it."""
     return [place for controller in run.controllers.values() for place, _ in controller.commands.questions]

@@ -17,6 +17,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from firable.executor.links.link import called
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.token_player import TokenPlayer, Word
 
@@ -45,12 +46,16 @@ class Blocked:
     """Signals with the value that is wanted."""
     untaken: tuple[str, ...] = ()
     """Places whose command no machine is known to have, and which has no completion to wait for."""
+    decided_by: str | None = None
+    """The coordinator of a transition of which only a part is seen."""
 
     def __str__(self) -> str:
         reasons = [f"a token on {place}" for place in self.empty]
         reasons += [f"{place} to become empty" for place in self.full]
         reasons += [f"{signal}" if wanted else f"not {signal}" for signal, wanted in self.gates]
         reasons += [f"the machine to take the command of {place}" for place in self.untaken]
+        if not reasons and self.decided_by is not None:
+            return f"{self.transition} is ready here, and is decided by {called(self.decided_by)}"
         return f"{self.transition} waits for {', '.join(reasons)}" if reasons else f"{self.transition} is enabled"
 
 
@@ -102,5 +107,7 @@ def blocked(player: TokenPlayer, word: Word, untaken: Collection[str] = ()) -> I
 def blocked_parts(controller: LocalController, untaken: Collection[str] = ()) -> Iterator[Blocked]:
     """The same of one controller, as far as it knows: a part of a coordinated transition bears its name."""
     row_of = {part.name: row for row, part in controller.parts.items()}
+    decided_by = {row: above.name for above in controller.above.values() for row in above.parts}
     for one in blocked(controller.player, controller.word, untaken):
-        yield replace(one, transition=row_of.get(one.transition, one.transition))
+        row = row_of.get(one.transition, one.transition)
+        yield replace(one, transition=row, decided_by=decided_by.get(row))

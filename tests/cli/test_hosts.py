@@ -1,6 +1,7 @@
 """`firable run --controller`: hosts of a cell as processes, and what is refused before one starts."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -50,6 +51,10 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
             "{bundle}",
         ],
         "cell.bundle is no certificate of an authority",
+    ),
+    "machines held against their model": (
+        ["--controller", "robot", "--dry-run", "1", "--join", "tcp/[::1]:1", "--watch", "stop"],
+        "depends on those of the others",
     ),
     "one file for two": (["--controller", "mc", "--trace", "{bundle}", "--journal", "x"], "overwrite"),
 }
@@ -118,3 +123,41 @@ def test_a_host_with_another_bundle_is_refused_by_name(bundle: str, tmp_path: Pa
         for process in (here, there):
             process.kill()
             process.communicate()
+
+
+def test_an_operator_stops_the_machines_of_one_host_although_its_coordinator_never_came(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    token = str(tmp_path / "token")
+    arguments = [
+        "--controller",
+        "robot",
+        "--join",
+        f"tcp/127.0.0.1:{free_port()}",
+        "--dry-run",
+        "0",
+        "--format",
+        "json",
+    ]
+    serve = ["--serve", "127.0.0.1:0", "--token-file", token]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "firable.cli", "run", bundle, *arguments, *serve],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stderr is not None
+        told = re.search(r"http://\S+", process.stderr.readline())
+        assert told is not None
+        assert "never-met: the coordinator was never reached" in process.stderr.readline()
+        assert main(["operate", told.group(), "situation", "--token-file", token]) == 0
+        assert "G2 is ready here, and is decided by the coordinator" in capsys.readouterr().out
+        assert main(["operate", told.group(), "emergency-stop", "--token-file", token]) == 0
+        out, _ = process.communicate(timeout=60)
+    finally:
+        process.kill()
+        process.wait()
+    assert process.returncode == 3, "whether it would have left nothing open is not known"
+    run = json.loads(out)["reports"][0]["run"]
+    assert (run["state"], run["message"], run["never_met"]) == ("stopped", "emergency stop: by token", [""])

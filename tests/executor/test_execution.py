@@ -223,7 +223,7 @@ def test_cell_is_at_rest_when_nothing_is_pending_and_not_while_a_completion_is_a
         host.pause()
         while await host.step() is not None or not host.at_rest:
             await asyncio.sleep(0.5)
-        assert not host.alarms.timers
+        assert not host.dispatch.timers
         host.resume()
 
     report, _ = run_cell("one_robot", 1, operator=operator, disturbances=[disturbance])

@@ -153,7 +153,7 @@ def test_an_overdue_command_ends_its_host_and_the_others_see_it_lost(tmp_path: P
     async def main() -> None:
         cell = Cell(tmp_path)
         host = cell.hosts[ROBOT]
-        host.alarms.overdue_seconds = 0.5
+        host.dispatch.overdue_seconds = 0.5
         situation = await cell.tasks[ROBOT]
         assert situation.state is State.FAULT
         assert "is overdue" in situation.message

@@ -1,0 +1,87 @@
+"""Commands on their way between a host and its driver: handed over, taken, overdue, given up.
+
+A net cannot tell a slow machine from a dead one; only time does. So a command that is not over in time is a fault: one
+with a completion is over when that has come, one without when its machine has taken it. A place with `within` says in
+the net what follows when its time is over (`time_limits.py`), and needs no alarm.
+
+When a token leaves a place before its command was over, what has not reached the machine is given up: no machine moves
+by it when its line is back.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from firable.executor.drivers.driver import withdraw
+from firable.executor.operating.acts import CommandTaken
+
+if TYPE_CHECKING:
+    from firable.executor.operating.host import Host
+
+
+class Dispatch:
+    """The commands of one host."""
+
+    def __init__(self, run: Host, overdue_seconds: float) -> None:
+        self.run = run
+        self.overdue_seconds = overdue_seconds
+        self.timers: dict[str, asyncio.TimerHandle] = {}
+        """The alarm of each command that is awaited, by its completion or, without one, its place."""
+        self.untaken: set[str] = set()
+        """The places whose command has no completion, and is with the driver."""
+
+    def send(self, place: str, entry: int) -> None:
+        """Hand the command of a place to the driver."""
+        sender = self.run.net.place(place)
+        if sender.completion is not None:
+            self.watch(place)
+            self.run.driver.send(sender, entry)
+            return
+        self.untaken.add(place)
+        self.run.driver.send(sender, entry)
+        if place in self.untaken:  # it waits for a line
+            self.watch(place)
+
+    def taken(self, place: str, entry: int) -> None:
+        """A machine has the command of a place; a token without completion has waited for that."""
+        sender = self.run.net.place(place)
+        if sender.completion is None:
+            self.untaken.discard(place)
+            self.over(place)
+            self.run.acts.hear(str(sender.owner), CommandTaken(place, entry))
+
+    def left(self, controller: str, transition: str) -> None:
+        """Give up what the tokens of a controller have left behind."""
+        inputs = map(self.run.net.place, self.run.net.transition(transition).inputs)
+        places = [place for place in inputs if place.owner == controller]
+        for name in withdraw(self.run.driver, places, self.run.acts.leaving):
+            self.run.recorder.note(self.run.now_seconds(), "withdrawn", place=name)
+
+    def watch(self, place: str) -> None:
+        """Await the end of a place's command from now on."""
+        sender, clock = self.run.net.place(place), self.run.clock
+        if sender.within is None and clock is not None:
+            awaited = sender.completion or place
+            self.over(awaited)
+            delay = self.overdue_seconds / clock.speed
+            self.timers[awaited] = clock.loop.call_later(delay, self._overdue, place, clock.now_seconds())
+
+    def over(self, awaited: str) -> None:
+        """Await a completion, or the command of a place, no more."""
+        if (timer := self.timers.pop(awaited, None)) is not None:
+            timer.cancel()
+
+    def end(self) -> None:
+        """Await nothing."""
+        for timer in self.timers.values():
+            timer.cancel()
+
+    def _overdue(self, place: str, sent_at: float) -> None:
+        sender = self.run.net.place(place)
+        self.timers.pop(sender.completion or place, None)
+        awaited = f"'{sender.completion}' has not come" if sender.completion else "its machine has not taken it"
+        self.run.fail(
+            f"'{sender.command}' of '{place}', sent at {sent_at:.1f} s, is overdue: "
+            f"{awaited} within {self.overdue_seconds:g} s"
+        )
