@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from firable.nets.bundle import Bundle
     from firable.nets.verdict import Verdict
 
+_BLOCKED_SHOWN = 6
+"""So many transitions are told of, and what they waited for when somebody stopped the run."""
+
 
 def run_bound_of(
     path: str,
@@ -72,6 +75,9 @@ def show_bound(report: Report) -> None:
     click.echo(f"  {done['state']} after {done['seconds']:,.0f} s on the machines of {done['binding']}")
     if done["message"]:
         click.echo(f"  {done['message']}")
+    if done["state"] == "stopped":
+        for line in done["blocked"][:_BLOCKED_SHOWN]:
+            click.echo(f"    {line}")
     click.echo(
         f"  {text.counted(sum(done['firings'].values()), 'firing')}, {text.counted(done['commands'], 'command')} to "
         f"machines, {text.counted(done['messages'], 'message')} between coordinator and controllers"

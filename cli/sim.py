@@ -53,7 +53,8 @@ def sim(
     The machines are dealt out to the protocols that are named, on ports of this host, and where everything is stands in
     the binding that is written. Without protocols, --bind is read, and what it leads to on this host is served.
 
-    It ends by Ctrl-C, or when something collides. N in --drop and --hang says which time, from 1.
+    It ends by Ctrl-C. When something collides its machines stand, and show that they have failed at what they did; the
+    exit code is 1 then. N in --drop and --hang says which time, from 1.
     """
     import asyncio
 
@@ -135,7 +136,7 @@ def _refuse_what_is_not_ours(path: str) -> None:
 async def _serve(
     binding: Binding, net: Net, plant: Plant, ends: dict[str, FarEnd], speed: float, seconds: float | None
 ) -> str:
-    """Serve until something collides, whose sentence is returned, or until it is cancelled or the time is over."""
+    """Serve until it is cancelled or the time is over; returns what has collided by then, in a sentence."""
     import asyncio
 
     from firable.executor.drivers.far_side.cell import CellServer
@@ -156,6 +157,9 @@ async def _serve(
             await asyncio.wait_for(cell.run(), seconds)
         except TimeoutError:
             click.echo(f"the time is over: {len(plant.delivered)} carried out, {len(plant.inside)} inside")
+        except asyncio.CancelledError:
+            if not cell.fault:
+                raise
     finally:
         await cell.stop()
     return cell.fault

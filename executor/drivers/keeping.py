@@ -213,7 +213,8 @@ class Kept:
 
     async def _write(self, connection: Connection) -> None:
         if not self.started and not self.stopping:
-            await connection.write(self.safe)
+            if self.safe:
+                await connection.write(self.safe)
             self.started = True
         self.connections += 1
         self.served.ready()
@@ -238,7 +239,8 @@ class Kept:
                 await self.awake.wait()
                 if timer is not None:
                     timer.cancel()
-        await connection.write(self.safe)
+        if self.safe:
+            await connection.write(self.safe)
         self.is_safe = True
 
     async def _put(self, connection: Connection, some: Writes) -> None:

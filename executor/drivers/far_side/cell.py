@@ -111,10 +111,11 @@ class CellServer:
             await device.end.stop()
 
     async def run(self) -> None:
-        """Let the plant's events happen when they are due, until cancelled or until something collides."""
-        while not self.fault:
-            self._report(self.plant.advance(self.now_seconds()))
-            due = self.plant.next_seconds
+        """Let the plant's events happen when they are due, until cancelled; none does once something has collided."""
+        while True:
+            if not self.fault:
+                self._report(self.plant.advance(self.now_seconds()))
+            due = None if self.fault else self.plant.next_seconds
             delay = None if due is None else max(0.0, due - self.now_seconds()) / self.speed
             self.awake.clear()
             try:
@@ -187,6 +188,9 @@ class CellServer:
                 case PlantFault(machine, message):
                     self.fault = f"{machine}: {message}" if machine else message
                     self.tell(self.now_seconds(), self.fault)
+                    for device in self.devices.values():
+                        self._stop(device, "what has happened")
+                    self.awake.set()
         if len(self.plant.delivered) > self.delivered:
             self.delivered = len(self.plant.delivered)
             self.tell(self.now_seconds(), f"workpiece {self.plant.delivered[-1].id} is carried out")
