@@ -4,6 +4,7 @@ Points are `coil N`, `discrete N`, `input N` and `holding N`, with addresses fro
 `holding N.B` or `input N.B` for a bit of a register, from 0. Modbus has no events, so the points are polled: those next
 to each other in one request, never with a gap, because a device may refuse what is not there. What is written together
 and lies together goes out in one request, so that a command and its number reach the device in one piece.
+The line takes one request at a time, and a command goes before the next poll.
 
 A request that is not answered in time ends the connection (`retries=0`). Frames over TCP carry a transaction number and
 pymodbus looks at it, frames of RTU carry none: there a late answer *is* the answer to the next question.
@@ -30,6 +31,8 @@ TABLES: Final = ("coil", "discrete", "input", "holding")
 BITS: Final = ("coil", "discrete")
 WRITTEN: Final = ("coil", "holding")
 ADDRESS_MAX: Final = 65_535
+_TURNS: Final = 2
+"""Turns of the loop from what was polled to the command that follows from it: the host acts, the writer begins."""
 AT_ONCE_MAX: Final = {"coil": 1968, "discrete": 2000, "input": 125, "holding": 123}
 """How many a request may carry, by the standard."""
 
@@ -115,6 +118,9 @@ class ModbusConnection:
         self.points: dict[Address, list[Point]] = {}
         self.blocks: tuple[_Block, ...] = ()
         self.due_seconds = 0.0
+        self.is_free = asyncio.Event()
+        """Set while nothing is being written."""
+        self.is_free.set()
 
     def want(self, points: Sequence[Point]) -> None:
         """Say what is to be read."""
@@ -126,6 +132,9 @@ class ModbusConnection:
         """All points, when it is time to poll them again."""
         loop = asyncio.get_running_loop()
         await asyncio.sleep(max(0.0, self.due_seconds - loop.time()))
+        for _ in range(_TURNS):
+            await asyncio.sleep(0)
+        await self.is_free.wait()
         self.due_seconds = loop.time() + self.every_s
         shown: dict[tuple[str, int], int] = {}
         for block in self.blocks:
@@ -138,7 +147,13 @@ class ModbusConnection:
 
     async def write(self, writes: Writes) -> None:
         """Write values in their order, neighbours together."""
-        pending = [(address(point), value) for point, value in writes]
+        self.is_free.clear()
+        try:
+            await self._write_all([(address(point), value) for point, value in writes])
+        finally:
+            self.is_free.set()
+
+    async def _write_all(self, pending: list[tuple[Address, Value]]) -> None:
         while pending:
             (first, _), count = pending[0], 1
             while (
