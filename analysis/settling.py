@@ -29,15 +29,16 @@ from firable.analysis.race import SLICES_SECONDS, Contestant, Outcome, T, race
 from firable.analysis.spaces.space import WitnessError
 from firable.analysis.temporal.queries import question_of
 from firable.analysis.verdicts.behaviour import QUESTIONS
+from firable.analysis.verdicts.bounds import greatest
 from firable.analysis.verdicts.combined import combined, is_combined
 from firable.analysis.verdicts.consequences import consequences
 from firable.analysis.verdicts.goals import Goal, goals_of, query_goals
 from firable.analysis.verdicts.starvation import STARVATION
-from firable.nets.formula import Formula
+from firable.nets.formula import Count, Formula, format_count
 from firable.nets.net import Net, TemporalProperty
 from firable.nets.queries import Query, QueryKind
 from firable.nets.temporal import Logic, Temporal
-from firable.nets.verdict import Cost, Status, Verdict
+from firable.nets.verdict import Cost, Status, Verdict, Witness
 from firable.semantics.algebra import BOOL
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import holds_in
@@ -130,6 +131,7 @@ class Settling:
     def _by_formula(self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float]) -> None:
         """Settle the verdict on a formula of CTL or LTL."""
         if (found := self._formula_of(verdict.name)) is None:
+            self._by_halving(verdict, lanes, deadline, slices_seconds)
             return
         formula, logic = found
         if is_combined(formula, branching=logic is Logic.CTL):
@@ -147,6 +149,29 @@ class Settling:
         if (known := outcome.answer) is not None:
             question = Question(verdict.name, verdict.statement, verdict.weight)
             self._settle(question, known.answer, known.method, known.cost)
+
+    def _by_halving(self, verdict: Verdict, lanes: Lanes, deadline: Deadline, slices_seconds: Sequence[float]) -> None:
+        """Settle the verdict on an upper bound of tokens."""
+        bounds = (query for query in self.queries if query.kind is QueryKind.BOUND)
+        query = next((query for query in bounds if f"query.{query.name}" == verdict.name), None)
+        if query is None:
+            return
+
+        def reached(goal: Formula) -> Finding | None:
+            return self._race(
+                verdict.name, Goal(goal, lambda _: ((), ""), wanted=True), lanes, deadline, slices_seconds
+            )
+
+        if (found := greatest(self.net, query.places, reached)) is None:
+            return
+        bound, findings = found
+        shown = [finding.witness for finding in findings if finding.reachable and finding.witness is not None]
+        witness = shown[-1] if shown else Witness((), (), self.net.names(self.net.initial_marking))
+        method = "; ".join(dict.fromkeys(finding.method for finding in findings)) or "the initial marking"
+        cost = Cost(seconds=sum(finding.cost.seconds or 0.0 for finding in findings))
+        question = Question(verdict.name, f"{verdict.statement} is {bound}", verdict.weight)
+        counted = format_count(Count(query.places))
+        self._settle(question, yes(replace(witness, note=f"here {counted} = {bound}")), method, cost)
 
     def _combine(
         self,
