@@ -413,6 +413,8 @@ class Host:
         """End the run by an error; the machines are stopped on the way out."""
         if self.outcome is not None and not self.outcome.done():
             self.outcome.set_exception(error)
+            if self.log is not None:
+                self.log.broke(error)
 
     def note(self, note: str, **data: str) -> None:
         """Have the trace tell something, durably."""

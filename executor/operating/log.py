@@ -73,6 +73,10 @@ class Log:
         blocked = {"blocked": list(map(str, situation.blocked))} if wrong else {}
         self._tell(logging.ERROR if wrong else logging.INFO, "ended", {**data, **blocked})
 
+    def broke(self, error: BaseException) -> None:
+        """The host ends by an error: a disk is full, a link cannot be opened, or the program is wrong."""
+        self._tell(logging.ERROR, "broke", {"message": str(error)})
+
     def _tell(self, level: int, event: str, data: Mapping[str, object]) -> None:
         # One mapping as the only argument: `logging` hands it to the formatter as it is.
         self.logger.handle(self.logger.makeRecord(self.logger.name, level, "", 0, event, (data,), None))

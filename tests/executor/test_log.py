@@ -91,3 +91,19 @@ def test_the_command_writes_the_log_that_it_is_asked_for(tmp_path: Path, capsys:
     assert main(["run", bundle, "--workpieces", "1", "--log", str(tmp_path / "run.log")]) == 0
     capsys.readouterr()
     assert [line["event"] for line in lines((tmp_path / "run.log").read_text())] == ["began", "ended"]
+
+
+def test_a_run_that_an_error_ends_says_so_in_its_log() -> None:
+    class Full(io.StringIO):
+        def write(self, line: str) -> int:
+            if "G1" in line:
+                raise OSError("no space left")
+            return super().write(line)
+
+    stream = io.StringIO()
+    log = Log(logger_to(logging.StreamHandler(stream)))
+    with pytest.raises(OSError, match="no space left"):
+        execute(decomposition_of("one_robot"), plant_of("one_robot"), workpieces=1, trace=Full(), log=log)
+    assert [(line["event"], line.get("message")) for line in lines(stream.getvalue())][1:] == [
+        ("broke", "no space left")
+    ]
