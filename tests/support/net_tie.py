@@ -167,10 +167,7 @@ class NetTie:
     def _act(self, actor: str, was: Marking, now: Marking, step: Step, rounds: Rounds, later: Rounds) -> None:
         fired = [effect.transition for effect in step.effects if isinstance(effect, Firing)]
         is_crash = step.kind.endswith("crash")
-        forgets = ("noted", "heard") if is_crash else ("heard",)
-        forgotten = (
-            was & ~now & self.net.marking(p.name for p in self.net.places if p.name.partition("/")[0] in forgets)
-        )
+        forgotten = was & ~now & (self.passing if is_crash else self.net.marking(self._undecided(now)))
         met = rounds.get(getattr(step.about, "round", -1))
         mine = -1 if met is None else self.parts.group_of[met.transitions[0]]
         alive = {self.parts.group_of[opened.transitions[0]] for opened in (*rounds.values(), *later.values())}
@@ -204,6 +201,12 @@ class NetTie:
             return controller == actor
         whole = name.split("/")[1]
         return self.decider[self.parts.groups[int(whole)][0] if name.startswith("close-round/") else whole] == actor
+
+    def _undecided(self, now: Marking) -> Iterator[str]:
+        """The votes that may have been heard in rounds that are not decided."""
+        for (t, _), part in self.part.items():
+            if self.net.marking([asked(t)]) & now and not self.net.marking([decided(self.parts, t)]) & now:
+                yield at("heard", part)
 
     def _memory(self, group: Sequence[str]) -> Iterator[str]:
         for t in group:
