@@ -388,8 +388,10 @@ class LocalController:
             if not self.player.signal_bit(signal) & self._locked_reads():
                 del self.latched[signal]
                 timed = self.timers.signals.get(signal)
-                if timed is None or self.timers.waits(timed.name, self.word):  # it may have come in time after all
+                if timed is None or self.timers.waits(timed.name, self.word):
                     yield from self._take(signal, value)
+                else:  # the completion has come in time after all
+                    self.timers.enter(timed.name)
 
     def _take(self, signal: str, value: bool) -> list[Effect]:
         effects: list[Effect] = []

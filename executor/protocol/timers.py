@@ -66,8 +66,10 @@ class Timers:
         """The places whose time is over, each once; times that have not begun begin now."""
         for name, due in list(self.running.items()):
             limit = self.places[name].within
-            if limit is None or not self.waits(name, word):
+            if limit is None or not word & self._waits[name][0]:
                 del self.running[name]
+            elif not self.waits(name, word):
+                continue  # another command may share the completion, and clear it before the token has gone on
             elif due == -inf:
                 self.running[name] = now_seconds + limit.milliseconds / 1000
             elif due <= now_seconds + RESOLUTION_SECONDS:

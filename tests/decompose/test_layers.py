@@ -17,7 +17,6 @@ from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.proving import prove
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.table import table_text
-from firable.executor.simulation.network import Network, Simulation
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
@@ -30,7 +29,6 @@ from firable.nets.printing import format_net
 from firable.nets.right_to_run import required_verdicts, unproved
 from firable.nets.text import parse_net
 from firable.nets.verdict import Status
-from firable.semantics.replaying import replay
 
 TWO_CELLS = catalogue_net("two_cells")
 
@@ -212,14 +210,6 @@ def test_controllers_without_a_coordinator_stand_under_the_one_of_the_whole_net(
     assert layers.up("m1") == ("m1", "c1", "line1", COORDINATOR)
     assert list(layers.coordinators()) == [COORDINATOR, "line1", "line2", "c1"]
     assert not Layers(catalogue_net("one_robot")).several
-
-
-@pytest.mark.parametrize("network", [Network(), Network(loss=0.2, duplication=0.2)], ids=str)
-def test_three_coordinators_run_the_two_cells_as_the_central_net(network: Network) -> None:
-    decomposition = split(TWO_CELLS)
-    firings = [replay(TWO_CELLS, Simulation(decomposition, seed, network).run(400)).firings for seed in range(4)]
-    assert min(firings) > 0
-    assert sum(firings) > 15
 
 
 def test_arbiters_over_layers_decide_as_in_one_layer() -> None:

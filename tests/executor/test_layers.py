@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter, deque
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from support.examples import seeds
 from support.hosts import Cell
 from support.layered_nets import cells_in_a_line, contending, left_below, shared_robot
-from support.owned_nets import owned_net
 from support.planted_layers import PLANTED_LAYERS
+from support.rehearsals import BAD, ORDERLY, rehearsed
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
@@ -35,24 +34,19 @@ from firable.executor.protocol.messages import (
     VoteRequest,
 )
 from firable.executor.simulation.campaign import Failed, Passed, Run, rehearse
+from firable.executor.simulation.drawn import layered_net
+from firable.executor.simulation.faults import Faults
 from firable.executor.simulation.judge import Subject
-from firable.executor.simulation.network import Network, Simulation
+from firable.executor.simulation.world import Machines, World
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Net
-from firable.semantics.replaying import replay
 from firable.semantics.trace import Fired
 
 TWO_CELLS = split(catalogue_net("two_cells"))
 LINE = split(cells_in_a_line())
-BAD = Network(loss=0.2, duplication=0.3)
 CELL_A, CELL_B = "coordinator cell_a", "coordinator cell_b"
-
-
-def layered(net: Net, under: dict[str, str]) -> Net:
-    return replace(net, controllers=tuple(replace(c, under=under.get(c.name)) for c in net.controllers))
 
 
 def test_each_coordinator_decides_what_is_its_own() -> None:
@@ -69,24 +63,16 @@ def test_each_coordinator_decides_what_is_its_own() -> None:
 
 
 @pytest.mark.seeds
-@pytest.mark.parametrize("network", [Network(), BAD], ids=str)
-def test_layers_run_as_the_central_net(network: Network) -> None:
+@pytest.mark.parametrize("kinds", [ORDERLY, BAD], ids=str)
+def test_layers_run_as_the_central_net(kinds: tuple[str, ...]) -> None:
     for decomposition, steps in ((TWO_CELLS, 1500), (LINE, 600)):
-        firings = [
-            replay(decomposition.net, Simulation(decomposition, s, network).run(steps)).firings for s in seeds(3)
-        ]
-        assert min(firings) > 0
+        assert min(rehearsed(decomposition, s, kinds, steps).counts["firings"] for s in seeds(3)) > 0
 
 
 @pytest.mark.seeds
 def test_random_nets_in_layers_run_as_the_central_net() -> None:
-    fired = 0
-    for seed in seeds(30):
-        net = owned_net(seed)
-        names = [controller.name for controller in net.controllers if not controller.coordinator]
-        layers = layered(net, dict(zip(names[1:], names, strict=False)))
-        fired += replay(layers, Simulation(split(layers), seed, BAD).run(300)).firings
-    assert fired > 50
+    nets = (split(layered_net(seed)) for seed in seeds(30))
+    assert sum(rehearsed(net, seed, BAD).counts["firings"] for seed, net in enumerate(nets)) > 50
 
 
 @pytest.mark.seeds
@@ -127,12 +113,10 @@ def dead(name: str) -> type[Coordinator]:
 
 
 def fired_while_dead(name: str, steps: int = 3000) -> set[str]:
-    simulation = Simulation(LINE, 1, coordinator=dead(name))
-    for controller in simulation.controllers.values():
-        simulation._perform(controller.report())
-    for _ in range(steps):
-        simulation._something()
-    events = [event for event in simulation.events if isinstance(event, Fired)]
+    world = World(Subject(LINE), 1, Faults.none(), Machines(coordinator=dead(name)))
+    world.begin()
+    world.run(steps)
+    events = [event for event in world.events if isinstance(event, Fired)]
     late = [t for event in events[len(events) // 2 :] for t in event.transitions]
     return {t for t in late if late.count(t) > 3}
 

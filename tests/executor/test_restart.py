@@ -1,14 +1,11 @@
 """Machines that crash and are restored from what they kept: nothing is lost, nothing done twice, nothing moves."""
 
-from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from support.examples import examples, seeds
-from support.owned_nets import owned_net, owned_nets
+from support.owned_nets import owned_net
 from support.reference import load_net
+from support.rehearsals import forgetting
 
 from firable.decompose.splitting.cut import split
 from firable.executor.protocol.commands import Answer
@@ -21,21 +18,19 @@ from firable.executor.protocol.messages import (
     Firing,
     Hello,
     Keep,
-    Message,
     ProtocolError,
     Readiness,
     Report,
     Sending,
     Stored,
     Taken,
-    ToController,
     Vote,
     VoteRequest,
 )
-from firable.executor.simulation.network import Network, ProgressLostError, Simulation
+from firable.executor.simulation.campaign import Failed, Run, rehearse
+from firable.executor.simulation.judge import Subject
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
-from firable.nets.diagnostics import InputError
 from firable.nets.net import (
     Arbiter,
     ArbitrationRule,
@@ -48,7 +43,6 @@ from firable.nets.net import (
     Transition,
 )
 from firable.nets.text import parse_net
-from firable.semantics.replaying import replay
 
 Machine = LocalController | Coordinator
 
@@ -62,214 +56,26 @@ def store(storage: dict[str, Stored], effects: Iterable[Effect]) -> None:
             storage[effect.key] = effect.value
 
 
-class Crashing(Simulation):
-    """A simulation in which each machine may crash after any act, before or while what the act does leaves it.
-
-    Stable storage here loses nothing: an act is stored whole. Commands that were issued are in the trace, and may or
-    may not have reached the machine, which knows them by their entry.
-    """
-
-    def __init__(
-        self,
-        decomposition: Decomposition,
-        seed: int,
-        network: Network,
-        coordinator: Callable[[Decomposition, str], Coordinator] = Coordinator,
-        controller: Callable[[Decomposition, str], LocalController] = LocalController,
-        crashes: float = 0.02,
-        forgets: tuple[str, str] = ("nobody", ""),
-    ) -> None:
-        super().__init__(decomposition, seed, network, coordinator, controller)
-        self.decomposition = decomposition
-        self.crashes = crashes
-        self.forgets = forgets
-        """Whose stable storage loses what: "coordinator" or "controllers", and how the key begins."""
-        self.crashed = 0
-        self.kept: dict[str, dict[str, Stored]] = {name: {} for name in (*self.coordinators, *self.controllers)}
-        self.issued: Counter[tuple[str, int]] = Counter()
-        self.received: set[tuple[str, int]] = set()
-        self.acting = ""
-        for name in self.kept:
-            self._act(name, self._machine(name).start())
-
-    def _machine(self, name: str) -> Machine:
-        return self.controllers[name] if name in self.controllers else self.coordinators[name]
-
-    def _act(self, name: str, effects: list[Effect]) -> None:
-        self.acting = name
-        self._perform(effects)
-
-    def _turn(self, controller: LocalController) -> None:
-        if controller.held and self.random.random() < 0.3:
-            self._resume(controller)
-        self.acting = controller.name
-        super()._turn(controller)
-
-    def _something(self) -> None:
-        choice, controller = self.random.random(), self.random.choice(list(self.controllers.values()))
-        if self.late and choice < 0.03:
-            self.in_flight.append(self.late.pop(self.random.randrange(len(self.late))))
-        if choice < 0.55 and self.in_flight:
-            self._deliver()
-        elif choice < 0.80:
-            self._turn(controller)
-        elif choice < 0.87 and self.completing:
-            self._read(*self.completing.pop(self.random.randrange(len(self.completing))))
-        elif choice < 0.96 and self.sensors:
-            signal = self.random.choice(self.sensors)
-            self.values[signal] = not self.values[signal]
-            self._read(signal)
-        elif choice >= 0.96:
-            for name in self.kept:
-                self._act(name, self._machine(name).resend())
-        if self.random.random() < self.crashes:
-            self._crash(self.random.choice(list(self.kept)))
-
-    def _read(self, signal: str, entry: int | None = None) -> None:
-        owner = self.owner_of[signal]
-        self._act(owner, self.controllers[owner].read(signal, entry is not None or self.values[signal], entry))
-
-    def _receive(self, message: Message) -> None:
-        self.acting = message.controller if isinstance(message, ToController) else message.coordinator
-        super()._receive(message)
-
-    def _perform(self, effects: list[Effect]) -> None:
-        storage = self.kept[self.acting]
-        store(storage, (effect for effect in effects if isinstance(effect, Keep) and not self._is_forgotten(effect)))
-        cut = self.random.random() < self.crashes / 3
-        for effect in effects:
-            if isinstance(effect, Sending):
-                if not effect.again:
-                    self.issued[effect.place, effect.entry] += 1
-                if not cut:
-                    assert (effect.place, effect.entry) not in self.received, "a machine gets a command twice"
-                    self.received.add((effect.place, effect.entry))
-        before = len(self.completing)
-        told = [e for e in effects if not (isinstance(e, Sending) and e.again)]
-        super()._perform([e for e in told if not cut or isinstance(e, Firing | Taken | Sending)])
-        if cut:
-            del self.completing[before:]
-            self._crash(self.acting)
-        for effect in effects:
-            if isinstance(effect, Sending) and effect.again and not cut:
-                self._completes(effect.place, effect.entry)
-        for effect in effects:
-            if isinstance(effect, Sending) and not cut:
-                taken = self.controllers[self.acting].sent(effect.place, effect.entry)
-                store(storage, (e for e in taken if isinstance(e, Keep) and not self._is_forgotten(e)))
-
-    def _sent(self, place: str, entry: int) -> None:
-        """It is done where the command is known to have left."""
-
-    def _is_forgotten(self, write: Keep) -> bool:
-        whose, prefix = self.forgets
-        return whose == ("controllers" if self.acting in self.controllers else "coordinator") and write.key.startswith(
-            prefix
-        )
-
-    def _completes(self, place: str, entry: int) -> None:
-        if completion := self.net.place(place).completion:
-            self.completing.append((completion, entry))
-
-    def _crash(self, name: str) -> None:
-        self.crashed += 1
-        kept = self.kept[name]
-        if name in self.coordinators:
-            self.coordinators[name] = type(self.coordinators[name]).restored(self.decomposition, kept, name)
-        else:
-            before = self.controllers[name]
-            self.controllers[name] = after = type(before).restored(self.decomposition, name, kept)
-            after.held = True  # also where nothing is left of what it kept
-        self._act(name, self._machine(name).start())
-        if name in self.controllers:
-            for signal in self.controllers[name].subnet.signals:
-                if signal.name in self.values and self.random.random() < 0.7:
-                    self._read(signal.name)
-
-    def _resume(self, controller: LocalController) -> None:
-        """The operator resumes: the driver is asked first, and knows what it received."""
-        self.acting = controller.name
-        for place, entry in controller.commands.questions:
-            answer = Answer.WORKING if (place, entry) in self.received else Answer.NOT_RECEIVED
-            if (place, entry) in self.received and self.random.random() < 0.5:
-                answer = Answer.DONE
-            self._perform(controller.answer(place, entry, answer))
-        if self.controllers[controller.name] is controller:
-            self._perform(controller.resume())
-
-    def _quieten(self, *, fire: bool) -> None:
-        self.crashes = 0.0
-        for controller in list(self.controllers.values()):
-            if controller.held:
-                self._resume(controller)
-        for signal in self.sensors:
-            self._read(signal)
-        for name in self.coordinators:
-            self._act(name, self.coordinators[name].permit(None if fire else 0))
-        before = self._firings()
-        for _ in range(1000):
-            for name, controller in self.controllers.items():
-                self._act(name, [*(controller.fire() if fire else []), *controller.report(), *controller.resend()])
-            for name in self.coordinators:
-                self._act(name, self.coordinators[name].resend())
-            for _ in range(100):  # not all: what is asked again at once, and refused, waits for what is repeated above
-                if self.in_flight:
-                    self._receive(self.in_flight.pop(0))
-            if (not self.in_flight and all(each.idle for each in self.coordinators.values())) or (
-                fire and self._firings() > before
-            ):
-                return
-
-    def finished(self, steps: int) -> int:
-        """Run, replay on the central net, and return the number of firings."""
-        trace = self.run(steps)
-        assert not [command for command, times in self.issued.items() if times > 1]
-        return replay(self.net, trace).firings
-
-
-NETWORKS = [Network(), Network(loss=0.3), Network(duplication=0.4), Network(loss=0.2, duplication=0.2)]
 SMALL = ["local_conflict", "local_gate", "local_output_conflict", "read_before_order", "remote_gate", "ring"]
-
-
-@pytest.mark.seeds
-@pytest.mark.parametrize("network", NETWORKS, ids=str)
-def test_traces_through_crashes_are_traces_of_the_central_net(network: Network) -> None:
-    for name in SMALL:
-        assert sum(Crashing(split(load_net(name)), seed, network).finished(150) for seed in seeds(15)) >= 15
-
-
-@pytest.mark.seeds
-@pytest.mark.parametrize("cell", ["one_robot", "two_robots_separate"])
-def test_cells_go_on_through_crashes(cell: str) -> None:
-    for seed in seeds(2):
-        simulation = Crashing(split(catalogue_net(cell)), seed, NETWORKS[3], crashes=0.01)
-        assert simulation.finished(4000) > 10
-        assert simulation.crashed > 10
-
-
-@examples(150)
-@given(owned_nets(), st.integers(0, 2**16), st.sampled_from(NETWORKS))
-def test_random_nets_go_on_through_crashes(net: Net, seed: int, network: Network) -> None:
-    Crashing(split(net), seed, network).finished(300)
+CRASHES = ("crash", "duplication", "delay")
 
 
 @pytest.mark.parametrize(
-    "forgets",
+    ("whose", "prefix"),
     [
         *(("controllers", key) for key in ("word", "promise/", "closed", "command/", "epoch")),
-        *(("coordinator", key) for key in ("round/", "epoch")),
+        *(("coordinators", key) for key in ("round/", "epoch")),
     ],
     ids="-".join,
 )
-def test_nothing_that_is_kept_is_kept_for_nothing(forgets: tuple[str, str]) -> None:
-    decompositions = [split(catalogue_net("one_robot")), *(split(load_net(name)) for name in SMALL)]
-    decompositions += [split(owned_net(seed)) for seed in range(20)]
-    for seed in range(20):
-        for decomposition in decompositions:
-            try:
-                Crashing(decomposition, seed, NETWORKS[3 - seed % 4], forgets=forgets).finished(400)
-            except (InputError, ProtocolError, ProgressLostError, AssertionError):
-                return
+def test_nothing_that_is_kept_is_kept_for_nothing(whose: str, prefix: str) -> None:
+    subjects = [
+        Subject(split(net)) for net in (catalogue_net("one_robot"), *map(load_net, SMALL), *map(owned_net, range(9)))
+    ]
+    for seed in range(400):
+        run = Run(seed, CRASHES, 400)
+        if isinstance(rehearse(subjects[seed % len(subjects)], run, forgetting(whose, prefix)), Failed):
+            return
     pytest.fail("no run shows that it was forgotten")
 
 

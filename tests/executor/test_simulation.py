@@ -66,6 +66,12 @@ def test_runs_of_drawn_nets_through_faults_are_traces_of_them_and_go_on() -> Non
 
 
 @pytest.mark.seeds
+def test_runs_of_drawn_nets_in_layers_through_faults_are_traces_of_them_and_go_on() -> None:
+    done = campaign(lambda seed: drawn(seed // 10, "drawn-layered"), map(Run, seeds(200)))
+    assert not done.failed, shown(done)
+
+
+@pytest.mark.seeds
 def test_runs_with_time_limits_through_faults_are_traces_of_the_net_and_keep_the_limits() -> None:
     timed = (Subject(split(TWO_TIMES)), cell("one_robot_timed"))
     done = campaign(lambda seed: (*timed, drawn(seed // 20, "drawn-timed"))[seed % 3], map(Run, seeds(600)))
@@ -162,11 +168,23 @@ REGRESSIONS = [
     # A token entered and left a place without a completion between two syncs, and a crash lost its command.
     (10584, Run(105840, ("delay", "crash", "torn", "unsynced", "disk", "stuck"), 66)),
 ]
+TIMED_REGRESSIONS = [
+    # A completion that two commands share was cleared by the other one, and the time of the first was forgotten.
+    (463, Run(4633, ("loss", "drift", "stuck", "step", "stop"), 154)),
+    (463, Run(4635, ("duplication", "reordering", "torn", "late", "stuck", "flapping", "stale"), 284)),
+    (3, Run(38, ("reordering", "torn", "unsynced", "disk", "standstill", "stuck", "queued", "pause"), 135)),
+]
 
 
 @pytest.mark.parametrize(("number", "run"), REGRESSIONS, ids=str)
 def test_what_was_found_once_is_not_found_again(number: int, run: Run) -> None:
     found = rehearse(drawn(number), run)
+    assert isinstance(found, Passed), found
+
+
+@pytest.mark.parametrize(("number", "run"), TIMED_REGRESSIONS, ids=str)
+def test_what_was_found_once_of_time_limits_is_not_found_again(number: int, run: Run) -> None:
+    found = rehearse(drawn(number, "drawn-timed"), run)
     assert isinstance(found, Passed), found
 
 

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples, seeds
 from support.hosts import Cell
+from support.rehearsals import BAD, ORDERLY, rehearsed
 from support.timed_nets import HANDOVER, timed_nets
 
 from firable.decompose.splitting.cut import split
@@ -25,14 +26,13 @@ from firable.executor.protocol.messages import Decision, Effect, Firing, Keep, S
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.executor.simulation.campaign import Passed, Run, rehearse
 from firable.executor.simulation.judge import Subject
-from firable.executor.simulation.network import Network, Simulation
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.decomposition import Decomposition
 from firable.nets.machines.plant_file import parse_plant
 from firable.nets.net import Net
 from firable.nets.text import parse_net
 from firable.semantics.replaying import replay
-from firable.semantics.trace import CommandSent, Fired, SignalChanged, Trace, parse_trace
+from firable.semantics.trace import CommandSent, SignalChanged, Trace, parse_trace
 
 OVER = Taken("a.go_overdue", value=True)
 
@@ -102,6 +102,25 @@ def test_a_completion_that_comes_after_the_timeout_is_not_taken_for_that_of_the_
     assert {Taken("a.there", value=False), Taken("a.go_overdue", value=False), Sending("a.go", 2)} == set(effects[1:])
     assert controller.read("a.there", value=True, entry=1) == []
     assert controller.deadline() == -inf
+
+
+def test_a_time_goes_on_where_another_command_clears_the_completion_that_both_share() -> None:
+    text = HANDOVER.replace(
+        "inputs: key, places: {free: ,",
+        "inputs: key, places: {free: , rest: , other: {send: {machine: B, command: GO}, until: there},",
+    )
+    text = text.replace("start: free", "start: [free, rest]").replace(
+        "  use:", "  begin: {from: a.rest, to: a.other, if: a.key}\n  use:"
+    )
+    controller = LocalController(split(parse_net(text)), "a")
+    controller.fire()
+    controller.tick(0.0)
+    controller.read("a.there", value=True, entry=1)
+    assert controller.tick(0.5) == []
+    controller.read("a.key", value=True)
+    assert Firing("begin") in controller.fire()
+    assert controller.deadline() == 1.0
+    assert controller.tick(1.0) == [OVER]
 
 
 def test_a_clock_that_stands_still_or_jumps_back_sets_no_timer() -> None:
@@ -201,22 +220,17 @@ def test_a_timer_that_was_set_before_a_crash_is_not_set_after_it() -> None:
 
 
 @examples(60)
-@given(timed_nets(), st.integers(0, 2**16), st.sampled_from([Network(), Network(loss=0.2, duplication=0.2)]))
+@given(timed_nets(), st.integers(0, 2**16), st.sampled_from([ORDERLY, BAD]))
 def test_joint_traces_of_nets_with_time_limits_are_traces_of_the_central_net(
-    net: Net, seed: int, network: Network
+    net: Net, seed: int, kinds: tuple[str, ...]
 ) -> None:
-    simulation = Simulation(split(net), seed, network)
-    replay(simulation.net, simulation.run(300))
+    rehearsed(split(net), seed, kinds)
 
 
 @pytest.mark.seeds
 def test_timeouts_and_tries_after_them_happen_on_a_bad_network() -> None:
-    fired: set[str] = set()
-    for seed in seeds(6):
-        simulation = Simulation(split(catalogue_net("one_robot_timed")), seed, Network(loss=0.2, duplication=0.2))
-        trace = simulation.run(1500)
-        replay(simulation.net, trace)
-        fired |= {name for event in trace.events if isinstance(event, Fired) for name in event.transitions}
+    timed = split(catalogue_net("one_robot_timed"))
+    fired = {name for seed in seeds(12) for name in rehearsed(timed, seed, (*BAD, "stuck"), 1500).fired}
     assert {name for name in fired if name.endswith("_timeout")}
     assert fired & {"t1-e", "t1-f", "t1-g", "t1-h", "t1-i"}
 

@@ -191,6 +191,20 @@ class VotesFromMemory(LocalController):
         yield from self._fire(self.parts[str(decision.committed)])
 
 
+class AppliesBlindly(NoLock):
+    """The naive system of the paper: no promise at the vote, no check at the order."""
+
+    def _apply(self, decision: Decision, _promise: Promise | None) -> Iterator[Effect]:
+        yield from self._fire(self.parts[str(decision.committed)])
+
+
+class ForgetsVotes(LocalController):
+    """The request of a decided round locks once more."""
+
+    def _is_closed(self, number: int) -> bool:
+        return number in self.closed and number not in self.promises and number % 2 == 0
+
+
 class ReportsOnce(LocalController):
     """A report that is lost stays lost."""
 
@@ -415,6 +429,8 @@ CONTROLLERS: tuple[type[LocalController], ...] = (
     ForgetsSignals,
     AppliesTwice,
     VotesFromMemory,
+    AppliesBlindly,
+    ForgetsVotes,
     ReportsOnce,
 )
 COORDINATORS: tuple[type[Coordinator], ...] = (
