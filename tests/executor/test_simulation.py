@@ -170,7 +170,6 @@ REGRESSIONS = [
 ]
 TIMED_REGRESSIONS = [
     # A completion that two commands share was cleared by the other one, and the time of the first was forgotten.
-    (463, Run(4633, ("loss", "drift", "stuck", "step", "stop"), 154)),
     (463, Run(4635, ("duplication", "reordering", "torn", "late", "stuck", "flapping", "stale"), 284)),
     (3, Run(38, ("reordering", "torn", "unsynced", "disk", "standstill", "stuck", "queued", "pause"), 135)),
 ]
