@@ -15,9 +15,9 @@ from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import KEY, TRACE, Recorder, TraceFile, size_bytes_of
 from firable.executor.operating.situation import Situation
 from firable.nets.catalogue import catalogue_net
-from firable.semantics.joining import join
+from firable.semantics.joining import VOTED, join
 from firable.semantics.replaying import Replay, replay
-from firable.semantics.trace import read_trace
+from firable.semantics.trace import Noted, read_trace
 
 ONE_EACH = ((COORDINATOR,), ("system",), ("robot",), ("mc",), ("conveyor",))
 TOGETHER = (("system", COORDINATOR), ("robot", "mc"), ("conveyor",))
@@ -98,7 +98,13 @@ class Cell:
 
     def replayed(self) -> Replay:
         """What the joined trace did, as the reference player judges it; it must be whole."""
-        joined = join(self.net, [read_trace(self.path(machines)) for machines in self.hosts])
+        traces = [read_trace(self.path(machines)) for machines in self.hosts]
+        notes = [
+            event.data for trace in traces for event in trace.events if isinstance(event, Noted) and event.note == VOTED
+        ]
+        votes = [(data["controller"], data["round"]) for data in notes]
+        assert len(set(votes)) == len(votes), "a vote is told once, however often it is given"
+        joined = join(self.net, traces)
         done = replay(self.net, joined)
         assert done.complete
         return done
