@@ -8,7 +8,9 @@ a link.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection
+import gc
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -62,12 +64,26 @@ def run_to_the_end(
     work = terminable(host) if service is None or figures is None else _serving(host, service, figures)
     guard = Guard(host.patience.seconds)
     try:
-        with asyncio.Runner() as runner:
+        with _short_collections(), asyncio.Runner() as runner:
             ended = runner.run(work)
             guard.begin()  # a thread of a driver that hangs keeps the event loop from being closed
     finally:
         guard.end()
     return ended
+
+
+@contextmanager
+def _short_collections() -> Iterator[None]:
+    """Let the garbage collector look at what the run makes, and not at all that is loaded.
+
+    Now and then it looks at everything, which takes tens of milliseconds, in which no signal is read.
+    """
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 async def terminable(host: Host) -> Situation:

@@ -1,6 +1,7 @@
 """Running a bundle: its right to run, and the trace that is left of the run."""
 
 import asyncio
+import gc
 import subprocess
 import sys
 from dataclasses import replace
@@ -149,3 +150,16 @@ print(sorted(heavy & set(sys.modules)))
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+def test_run_in_real_time_keeps_what_is_loaded_from_the_collector_and_gives_it_back() -> None:
+    frozen: list[int] = []
+
+    async def operator(host: Host) -> None:
+        frozen.append(gc.get_freeze_count())
+        host.stop()
+
+    assert gc.get_freeze_count() == 0
+    run(proved_bundle(), plant_of("one_robot"), workpieces=1, speed=100.0, operator=operator)
+    assert frozen[0] > 10_000
+    assert gc.get_freeze_count() == 0
