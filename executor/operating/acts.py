@@ -227,8 +227,9 @@ class Acts:
         self._tick(machine)
         if not self.halted and (fired := controller.fire()):
             self.act(machine, fired)
-            self.posted.append((machine, None))
             self._tick(machine)
+            if controller.may_fire:
+                self.posted.append((machine, None))
         self.act(machine, controller.report())
 
     def _receive(self, machine: str, controller: LocalController, item: ToController) -> None:

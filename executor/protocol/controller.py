@@ -243,6 +243,11 @@ class LocalController:
         """When it has to be told the time next; minus infinity for at once, None while nothing is timed."""
         return self.timers.deadline(self.word) if self.timers.running and not self.held else None
 
+    @property
+    def may_fire(self) -> bool:
+        """Whether a local transition is enabled by the word; what else keeps it, `fire` knows."""
+        return self.enabled.at(self.word) & self.local_mask != 0
+
     def fire(self) -> list[Effect]:
         """Fire one local transition, if one is enabled and disturbs no promise; no effect means that none is."""
         if self.held:
