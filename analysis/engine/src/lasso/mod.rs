@@ -16,7 +16,7 @@
 //! Rejected: nested depth-first search (Courcoubetis, Vardi, Wolper, Yannakakis 1992), which knows one mark only, so
 //! the automaton would have to be copied for each, and finds the cycle later; it would save the number of a vertex, four
 //! bytes beside a marking and its slot. A search that keeps sets of transitions stubborn needs the formula to be blind
-//! for stuttering and a proviso on cycles; what it left over of our nets did not pay for them.
+//! for stuttering and a proviso on cycles, and is not tried.
 
 pub mod automaton;
 mod product;
