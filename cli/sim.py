@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,9 +13,12 @@ from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_text
 if TYPE_CHECKING:
     from firable.executor.cell.plant import Disturbance, Plant
     from firable.executor.drivers.binding import Binding
+    from firable.executor.drivers.far_side.cell import CellServer
     from firable.executor.drivers.far_side.end import FarEnd
     from firable.nets.machines.plant_file import PlantModel
     from firable.nets.net import Net
+
+_PRESSED_SECONDS = 1.0
 
 
 @click.command(short_help="Serve the simulated cell over real protocols.")
@@ -31,6 +35,9 @@ if TYPE_CHECKING:
 @click.option("--stuck", metavar="SIGNAL=0|1[@S]", multiple=True, help="A sensor that shows one value, from a time on.")
 @click.option("--drop", metavar="MACHINE.COMMAND[#N]", multiple=True, help="What is held falls as this ends.")
 @click.option("--hang", metavar="MACHINE.COMMAND[#N]", multiple=True, help="A command that is taken and never done.")
+@click.option(
+    "--press", type=click.FloatRange(min=0), metavar="SECONDS", help="Press the emergency stop then, for a second."
+)
 @click.option("--for", "seconds", type=click.FloatRange(min=0), metavar="SECONDS", help="End by itself after so long.")
 def sim(
     net: str,
@@ -46,6 +53,7 @@ def sim(
     stuck: tuple[str, ...],
     drop: tuple[str, ...],
     hang: tuple[str, ...],
+    press: float | None,
     seconds: float | None,
 ) -> int:
     """Serve the machines of NET, with workpieces and jitter, to whoever connects: `firable run BUNDLE --bind FILE`.
@@ -80,7 +88,7 @@ def sim(
             if problems := binding_misfits(binding, loaded):
                 raise InputError(problems)
             cell = Plant(model, workpieces=workpieces, seed=seed, disturbances=disturbances)
-            return await _serve(binding, loaded, cell, ends, speed, seconds)
+            return await _serve(binding, loaded, cell, ends, speed, press, seconds)
 
     try:
         fault = asyncio.run(served())
@@ -134,7 +142,13 @@ def _refuse_what_is_not_ours(path: str) -> None:
 
 
 async def _serve(
-    binding: Binding, net: Net, plant: Plant, ends: dict[str, FarEnd], speed: float, seconds: float | None
+    binding: Binding,
+    net: Net,
+    plant: Plant,
+    ends: dict[str, FarEnd],
+    speed: float,
+    press: float | None,
+    seconds: float | None,
 ) -> str:
     """Serve until it is cancelled or the time is over; returns what has collided by then, in a sentence."""
     import asyncio
@@ -153,6 +167,10 @@ async def _serve(
             hint = "end what else serves there, or name other ports in a binding of your own, with --bind alone"
             raise InputError([Diagnostic("F5104", f"the cell cannot be served: {error}", hint)]) from None
         click.echo(f"serving '{net.name}'; Ctrl-C ends it")
+        if press is not None:
+            loop = asyncio.get_running_loop()
+            for pressed, after in ((True, press / speed), (False, press / speed + _PRESSED_SECONDS)):
+                loop.call_later(after, partial(_pressed, cell, pressed=pressed))
         try:
             await asyncio.wait_for(cell.run(), seconds)
         except TimeoutError:
@@ -163,6 +181,11 @@ async def _serve(
     finally:
         await cell.stop()
     return cell.fault
+
+
+def _pressed(cell: CellServer, *, pressed: bool) -> None:
+    cell.press(pressed=pressed)
+    click.echo(f"{cell.now_seconds():8.1f} s  the emergency stop is {'pressed' if pressed else 'released'}")
 
 
 def _plant_file(net: Net, argument: str | None) -> Path:

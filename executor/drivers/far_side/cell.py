@@ -99,9 +99,13 @@ class CellServer:
                 device.end.show(device.document.heartbeat.tripped, value=False)
         for signal in self.plant.shown:
             self._sensor(signal)
-        for contact in self.binding.document.emergency_stop.values():
-            self.devices[contact.device].end.show(contact.read, not contact.invert)
+        self.press(pressed=False)
         self.begun_seconds = asyncio.get_running_loop().time()
+
+    def press(self, *, pressed: bool) -> None:
+        """Let every button of the emergency stop be pressed, or not any more."""
+        for contact in self.binding.document.emergency_stop.values():
+            self.devices[contact.device].end.show(contact.read, (not pressed) ^ contact.invert)
 
     async def stop(self) -> None:
         """End, and close all connections."""

@@ -68,6 +68,10 @@ class _Layout:
             return f"read: discrete {i + 1}"
         return f"read: {self._named(f'sensors/{name}')}{', force: true' if self.protocol != 'serial' else ''}"
 
+    def button(self, sensors: int) -> Point:
+        """Where the contact of the emergency stop is read, behind so many sensors."""
+        return f"discrete {sensors + 1}" if self.protocol == "modbus" else self._named("device/button")
+
     def _named(self, name: str) -> Point:
         return {"opcua": f"ns=2;s={name}", "mqtt": f"cell/{name}"}.get(self.protocol, name)
 
@@ -95,6 +99,11 @@ def binding_text(net: Net, ports: Mapping[str, str], sensed: Collection[str]) ->
         for name, i in own.items():
             points = ", ".join(f"{part}: {layout.machine(name, i, part)}" for part in layout.parts)
             lines.append(f"      {name}: {{{points}}}")
+    # A broker shows nothing of a device that is lost, so no contact is read there.
+    direct = [layout for layout in layouts if layout.protocol != "mqtt"]
+    for layout in direct[:1]:
+        read = layout.button(len(net.signals))
+        lines += ["", "emergency_stop:", f"  button: {{device: {layout.protocol}, read: {read}}}"]
     lines += ["", "signals:"]
     for i, signal in enumerate(net.signals):
         at = owners.get(signal.owner, layouts[0])

@@ -112,6 +112,17 @@ def test_machines_that_know_no_numbers_lose_and_double_no_workpiece_either() -> 
     asyncio.run(main())
 
 
+def test_button_of_the_cell_ends_the_run_with_every_machine_stopped() -> None:
+    async def main() -> None:
+        async with served(1) as one:
+            asyncio.get_running_loop().call_later(1.5, lambda: one.cell.press(pressed=True))
+            situation = await executed(one, lambda: False)
+            assert (situation.state, situation.message) == (State.STOPPED, "emergency stop: modbus: 'button' is open")
+            await until(lambda: not one.cell.at, "all machines stand")
+
+    asyncio.run(main())
+
+
 def test_machine_that_hangs_is_a_fault_and_the_others_are_stopped() -> None:
     async def main() -> None:
         async with served(2, NeverCompletes("R", "GRASP")) as one:
@@ -139,7 +150,8 @@ def test_host_of_some_machines_takes_from_the_binding_what_is_its_own() -> None:
         async with served(0) as one:
             (mc,) = [subnet for subnet in DECOMPOSITION.subnets if subnet.name == "mc"]
             driver = bound_driver(one.binding, NET, mc)
-            assert set(driver.devices) == {"serial"}
-            assert set(driver.readings()) == {"mc.part_present"}
+            assert set(driver.devices) == {"modbus", "serial"}
+            assert set(driver.readings()) == {"mc.part_present", "emergency stop button"}
+            assert not driver.devices["modbus"].document.safe  # which is another's to drive
 
     asyncio.run(main())
