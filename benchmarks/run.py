@@ -13,6 +13,7 @@ from typing import Final
 
 import executing
 import explicit
+import lasting
 import linking
 import protocols
 import public_nets
@@ -32,6 +33,7 @@ BENCHMARKS: Final = {
     "public_nets": public_nets.tables,
     "executing": executing.tables,
     "reacting": reacting.tables,
+    "lasting": lasting.tables,
 }
 
 BUSY: Final = (
