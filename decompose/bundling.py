@@ -4,13 +4,14 @@ The obligations of the decomposition are proved here; what exploring the net sho
 `firable.analysis.check`, because verdicts alone do not say of which net they are: those on a good net would let any
 other run. So the net that is bundled is the one in the report. What is demanded of both is what the executor will
 demand when it reads the bundle: both ask `unproved`, so that no bundle is made that could not run. Which votes are
-persistent goes with them for information: nothing that runs rests on it. The evidence on all of it goes along, so that
-the bundle can be checked again without anything that made it (`firable.decompose.verification`).
+persistent goes with them, and which parts are free of promise for it: those that the bundle shows to be. The evidence
+on all of it goes along, so that the bundle can be checked again without anything that made it
+(`firable.decompose.verification`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -24,7 +25,7 @@ from firable.decompose.protocol.outages import sealed_outages
 from firable.decompose.protocol.shown import proved_without_exploring
 from firable.decompose.refinement.sealing import Origin, sealed
 from firable.decompose.splitting.cut import split
-from firable.decompose.splitting.persistence import persistence
+from firable.decompose.splitting.persistence import Persistence, persistence
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.machines.plant_file import parse_plant
@@ -56,8 +57,9 @@ def make_bundle(
     `limits` are for each kind of evidence anew: what of the report cannot be shown in that time is only claimed.
     `firable verify` will say so of a warning; a verdict that is required is no reason to run without evidence. With
     `protocol` and `faults` the bundle holds the verdicts on the protocol of this very net, too, proved by an
-    invariant. With the text of a `plant` file, the bundle holds it and that its machines keep what votes rely on (O4);
-    with an `origin`, the conceptual net and the tasks of which the net is made, and that it does what that one does.
+    invariant; these are on the protocol in which every part promises, so no part of that bundle is free of promise.
+    With the text of a `plant` file, the bundle holds it and that its machines keep what votes rely on (O4); with an
+    `origin`, the conceptual net and the tasks of which the net is made, and that it does what that one does.
 
     Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the report is not that of exploring
     this net by interleaving, which is how it will be executed, and for everything that must be proved and is not, or
@@ -72,7 +74,10 @@ def make_bundle(
     seconds = SECONDS if limits is None else limits.deadline.left_seconds
     decomposition = split(report.net)
     proof = prove(decomposition, timeout_ms=timeout_ms)
-    voted, shown = persistence(decomposition, report.space).with_evidence()
+    found = persistence(decomposition, report.space)
+    voted, shown = found.with_evidence()
+    if not protocol and not faults:
+        decomposition = replace(decomposition, free=_free(found, voted))
     document = evidence_of_report(report, (), _anew(limits, seconds))
     named = {record.name for record in document.records if not record.lacking}
     on_the_net = (replace(v, evidence=(*v.evidence, EVIDENCE)) if v.name in named else v for v in report.verdicts)
@@ -98,6 +103,16 @@ def _anew(limits: Limits | None, seconds: float | None) -> Limits:
     """So many seconds from now on, and the memory of these limits."""
     deadline = NEVER if seconds is None else Deadline.after(seconds)
     return Limits(deadline) if limits is None else replace(limits, deadline=deadline)
+
+
+def _free(found: Persistence, verdicts: Iterable[Verdict]) -> tuple[tuple[str, str], ...]:
+    """The parts that may leave out the promise, as far as the bundle shows it."""
+    may = set(found.free_of_promise)
+    return tuple(
+        (vote.transition, vote.controller)
+        for vote, verdict in zip(found.votes, verdicts, strict=True)
+        if vote.part in may and (verdict.evidence or not vote.accused)
+    )
 
 
 def _unbundled(problem: Diagnostic, lacking: Mapping[str, str]) -> Diagnostic:

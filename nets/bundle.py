@@ -154,7 +154,7 @@ def _bundle(members: Mapping[str, bytes]) -> Bundle:
     if changed := sorted(name for name, sha in judged.of.items() if _sha256(files.get(name, b"")) != sha):
         raise _DamageError(f"'{changed[0]}' is not the one that the verdicts are about")
     return Bundle(
-        Decomposition(net, subnets, table.rows(), table.arbitration_groups()),
+        Decomposition(net, subnets, table.rows(), table.arbitration_groups(), table.free),
         judged.read(),
         {name.removeprefix("evidence/"): _text(files, name) for name in files if name.startswith("evidence/")},
     )

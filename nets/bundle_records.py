@@ -60,6 +60,7 @@ class TableRecord(_Record):
 
     coordinated: tuple[_CoordinatedRecord, ...]
     groups: tuple[_GroupRecord, ...]
+    free: tuple[tuple[str, str], ...] = ()
 
     def rows(self) -> tuple[Coordinated, ...]:
         """The transitions that the coordinator decides."""
@@ -100,6 +101,7 @@ def table_to_json(decomposition: Decomposition) -> dict[str, Any]:
             }
             for group in decomposition.groups
         ],
+        **({"free": [list(pair) for pair in decomposition.free]} if decomposition.free else {}),
     }
 
 

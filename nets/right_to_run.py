@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.evidence_names import named_as_proved
+from firable.nets.free_parts import unfounded
 from firable.nets.joining import join
 from firable.nets.layers import Layers
 from firable.nets.net import Net, Transition
@@ -91,7 +92,8 @@ def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
 
     Required is what the net requires, and whatever else a verdict of the bundle says that it does. Verdicts on the net
     must be on interleaving, by which it is executed, and a document of evidence must have a record on each; obligations
-    must bring what another solver can check; and the subnets must join into the very net.
+    must bring what another solver can check; and the subnets must join into the very net. Parts free of promise must
+    disturb nobody, and their votes be proved persistent (`firable.nets.free_parts`).
     """
     problems = []
     on_the_net = set(required_of_the_net(bundle.net))
@@ -124,7 +126,10 @@ def unproved(bundle: Bundle) -> tuple[Diagnostic, ...]:
                 if file not in bundle.evidence:
                     message = f"the evidence '{file}' for '{name}' is missing"
                     problems.append(Diagnostic("F5002", message, _REMEDY, subject))
-    if not _joins(bundle.decomposition):
+    joins = _joins(bundle.decomposition)
+    for transition, message in unfounded(bundle.decomposition, by_name) if joins else ():
+        problems.append(Diagnostic("F5002", message, _REMEDY, ("transitions", transition)))
+    if not joins:
         message = "the subnets do not make the net together, of which the verdicts are"
         problems.append(Diagnostic("F5002", message, _REMEDY, ("subnets",)))
     return (*problems, *_undecided_conflicts(bundle.decomposition))

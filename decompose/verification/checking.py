@@ -12,7 +12,8 @@ them anew. So everything is derived a second time, by code that shares nothing w
    made, they are opened anew, and both nets related (`refinement`);
 4. where the bundle names machines, the loop that they close is closed anew, and its document must show of it that they
    keep each gate that a vote relies on (`machines`); the verdicts on the central net must be those that its documents
-   of evidence show (`documents`);
+   of evidence show (`documents`), and each part that is free of promise must be one by the arcs, and its vote shown to
+   be persistent (`free_parts`);
 5. nothing is left over: no file that nobody needs, no verdict that nobody knows; and nothing is left out: each verdict
    that every net has is there, warnings too.
 
@@ -28,6 +29,7 @@ from typing import Final
 from firable.decompose.verification.checked import CheckedVerdict, Examination
 from firable.decompose.verification.documents import check_verdicts_on_the_net
 from firable.decompose.verification.explored import check_explored
+from firable.decompose.verification.free_parts import check_free_parts
 from firable.decompose.verification.machines import check_machines
 from firable.decompose.verification.obligations import check_obligations
 from firable.decompose.verification.outages import check_outages
@@ -101,6 +103,7 @@ def _judge_all(
     check_refinement(examination, solver, answers, timeout_ms)
     begins("the evidence on the net")
     check_verdicts_on_the_net(examination, answers, timeout_ms)
+    check_free_parts(examination, cut)
     for verdict in list(examination.unjudged()):
         raise NotShownError(f"nobody knows what '{verdict.name}' is on", "verdicts", verdict.name)
     if unused := sorted(set(bundle.evidence) - examination.used):

@@ -22,7 +22,7 @@ def waits(
             if opened.decided and opened.committed is None:
                 continue  # nothing has fired, and nothing needs to
             what = opened.committed or " or ".join(opened.transitions)
-            for name in opened.participants:
+            for name in coordinator.ordered(opened) if opened.decided else opened.participants:
                 if opened.decided and name not in opened.acknowledged:
                     yield f"{what} has fired, and waits for {reached(name, away)} to apply it"
                 elif not opened.decided and name not in opened.votes:

@@ -9,6 +9,13 @@ the process image and taken in when the lock is released. So an external gate th
 the image, at the commit, and the commit always finds its part enabled. (The signal itself may have dropped meanwhile:
 Eq. (8) then means "each true at its own vote", which SEMANTICS O4 accepts for gates that no command clears.)
 
+A part that is *free of promise* votes by what the controller reports: when it is enabled and no promise here disturbs
+it. The vote stands until the order comes, and nothing waits for it; then the part finds its inputs full and its outputs
+empty, but its gates may have changed since the decision. Two things are kept for its sake. The completions that it
+awaits fall by a command only: what a driver says else is not taken in. And what it rests on, the marking and these
+completions, is in stable storage before any report leaves, as all of `word` is; so it stands after a restart, though
+the controller does not know any more that it has told of it.
+
 A token that enters a place with a command does three things in one act: the marking is changed, the completion signal
 of the place and its timer are cleared in the image, and the command is sent (O7). Nothing reads the image in between.
 
@@ -128,6 +135,11 @@ class LocalController:
         """The coordinated transition of each part, by the index of the part."""
         self.local_mask = sum(1 << t for t in range(len(self.transitions)) if t not in self.rows)
         """The transitions that it fires by itself."""
+        self.free = frozenset(row for row, controller in decomposition.free if controller == name)
+        """The transitions of which the part here is free of promise."""
+        self.free_mask = sum(1 << t for t, row in self.rows.items() if row in self.free)
+        self.lasting = _union(self.parts[row].needs for row in self.free) & ~self.player.places
+        """The completions that these wait for."""
         self.arbiter = Arbiter(self.subnet, (group for group in decomposition.groups if group.controller == name))
         self.kept_turns = self.arbiter.turns
         self.word = self.subnet.initial_marking
@@ -217,6 +229,8 @@ class LocalController:
         an earlier command is stale, and dropped.
         """
         if entry is not None and entry != self.commands.entry(signal):
+            return []
+        if not value and self.player.signal_bit(signal) & self.lasting:
             return []
         if self.promises and self.player.signal_bit(signal) & self._locked_reads():
             self.latched[signal] = value
@@ -315,7 +329,7 @@ class LocalController:
         if self._is_closed(request.round):
             return  # an old copy: the round is decided
         if request.round not in self.promises:
-            asked = [name for name in request.transitions if name in self.parts and not self.held]
+            asked = [n for n in request.transitions if n in self.parts and n not in self.free and not self.held]
             asked = [name for name in asked if not self.forgone >> self.index_of[name] & 1]
             # The parts of one round may disturb each other: one of them is chosen. Those of other rounds may not.
             yes = [n for n in asked if self._is_enabled(self.parts[n]) and not self._disturbs_promises(self.parts[n])]
@@ -340,6 +354,11 @@ class LocalController:
 
     def _apply(self, decision: Decision, promise: Promise | None) -> Iterator[Effect]:
         part = self.parts[str(decision.committed)]
+        if decision.committed in self.free:
+            if self.word & part.takes != part.takes or self.word & part.puts:
+                raise ProtocolError(f"{self.name}: '{part.name}' is free of promise, and its tokens have been moved")
+            yield from self._fire(part)
+            return
         if promise is None or decision.committed not in promise.promised:
             raise ProtocolError(f"{self.name}: '{part.name}' is committed without a promise")
         if not part.enabled(self.word):  # the signals it reads are in the image as they were at the vote
@@ -466,10 +485,14 @@ class LocalController:
         ready = 0 if self.held else self.enabled.at(self.word) & above.mask & ~self.forgone
         if self.untold or self.unsent:
             ready = sum(1 << t for t in bits(ready) if self._is_enabled(self.transitions[t]))
-        if ready != above.ready_mask or above.readiness.sequence < self.epoch << EPOCH_BITS:
+        if self.promises and ready & self.free_mask:
+            disturbing = (t for t in bits(ready & self.free_mask) if self._disturbs_promises(self.transitions[t]))
+            ready &= ~sum(1 << t for t in disturbing)
+        known = above.readiness
+        if ready != above.ready_mask or known.sequence < self.epoch << EPOCH_BITS or known.epoch != above.epoch:
             above.ready_mask = ready
             names = frozenset(self.rows[t] for t in bits(ready))
-            above.readiness = Readiness(above.readiness.sequence + 1, names)
+            above.readiness = Readiness(known.sequence + 1, names, above.epoch)
         return above.readiness
 
     def _told(self, above: Above) -> Readiness:

@@ -13,6 +13,13 @@ The decision is the moment at which a coordinated transition fires: from then on
 participants do before they have applied it commutes with it (O1). A round stays open, and keeps what it would disturb
 from being asked for, until all participants have acknowledged.
 
+*Parts free of promise* are not asked, and get no abort. Their votes are what their controllers report, and stand until
+an order is applied. One counts (a) if its report is newer than the acknowledgement of the last order of its transition,
+for until then it may be a vote from before that firing: the round of it is open until all have acknowledged, and an
+acknowledgement brings a report along; and (b) if the report is of this epoch of the coordinator, for who has restarted
+knows nothing of the acknowledgements before, and any report from then may come late. `Hello` is repeated until there is
+a report of this epoch. A round in which nobody has to promise is decided when it is opened.
+
 A pure machine, as the controllers are. What is kept in stable storage, and the fault that would show if it were not:
 
 - `round/<number>`, what was asked and what is committed, from the decision until all have acknowledged: a transition
@@ -59,7 +66,10 @@ from firable.nets.decomposition import Decomposition
 
 @dataclass(slots=True)
 class Round:
-    """A round that is not closed: the votes so far, and after the decision the acknowledgements."""
+    """A round that is not closed: the votes so far, and after the decision the acknowledgements.
+
+    The participants are those who are asked for a promise.
+    """
 
     number: int
     group: int
@@ -87,7 +97,12 @@ class Coordinator:
             for row in decomposition.coordinated
             if coordinator_at(row.at) == name
         }
-        """For each transition that it decides, who has to promise it: those who own a gate of it alone, too (O3)."""
+        """For each transition that it decides, who takes part: those who own a gate of it alone, too (O3)."""
+        free = {t: frozenset(c for name, c in decomposition.free if name == t) for t, _ in decomposition.free}
+        self.free = {t: free.get(t, frozenset()) for t in self.participants}
+        """For each of them, those whose part is free of promise."""
+        self.of_free = {c: frozenset(t for t in self.free if c in self.free[t]) for at in free.values() for c in at}
+        """For each controller, the transitions of which its part is."""
         ours = [g for g in decomposition.groups if g.controller is None and coordinator_at(g.at) == name]
         self.arbiter = Arbiter(decomposition.net, ours)
         self.kept_turns = self.arbiter.turns
@@ -100,6 +115,9 @@ class Coordinator:
         self.group_of = {name: g for g, group in enumerate(self.groups) for name in group}
         self.seen: dict[str, int] = {subnet.name: -1 for subnet in decomposition.subnets}
         self.ready: dict[str, frozenset[str]] = {subnet.name: frozenset() for subnet in decomposition.subnets}
+        """What each controller has reported; of its free parts, those of which the vote counts but for (a)."""
+        self.lately: dict[str, bool] = dict.fromkeys(self.of_free, False)
+        """Whether the newest report of each controller with free parts is of this epoch."""
         self.waiting: dict[int, None] = {}
         """The groups that may be asked for, in the order in which they became ready."""
         self.rounds: dict[int, Round] = {}
@@ -157,22 +175,35 @@ class Coordinator:
         effects: list[Effect] = []
         if self.epoch:
             for controller in dict.fromkeys(c for took_part in self.participants.values() for c in took_part):
-                if self.seen[controller] < 0:
+                if self.seen[controller] < 0 or not self.lately.get(controller, True):
                     effects.append(Hello(controller, self.closed_below, -1, self.epoch, self.name))
         for open_round in self.rounds.values():
-            for controller in open_round.participants:
-                if open_round.decided and controller not in open_round.acknowledged:
+            for controller in self.ordered(open_round):
+                if controller not in open_round.acknowledged:
                     effects.append(self._decision(controller, open_round.number, open_round.committed))
-                elif not open_round.decided and controller not in open_round.votes:
+            for controller in () if open_round.decided else open_round.participants:
+                if controller not in open_round.votes:
                     effects.append(self._request(open_round, controller))
         return effects
+
+    def ordered(self, decided: Round) -> tuple[str, ...]:
+        """Who gets an order in a round that is decided, and has to acknowledge it; nobody before."""
+        if not decided.decided:
+            return ()
+        commits = () if decided.committed is None else self.participants[decided.committed]
+        return tuple(dict.fromkeys((*decided.participants, *commits)))
 
     def _hear(self, controller: str, readiness: Readiness) -> None:
         if readiness.sequence <= self.seen[controller]:
             return
         self.seen[controller] = readiness.sequence
-        new = readiness.transitions - self.ready[controller]
-        self.ready[controller] = readiness.transitions
+        transitions = readiness.transitions
+        if controller in self.lately:
+            self.lately[controller] = readiness.epoch == self.epoch
+            if not self.lately[controller]:
+                transitions -= self.of_free[controller]
+        new = transitions - self.ready[controller]
+        self.ready[controller] = transitions
         for name in sorted(new):
             self.waiting.setdefault(self.group_of[name])
 
@@ -204,13 +235,17 @@ class Coordinator:
         self.next_round += self.stride
         for controller in opened.participants:
             yield self._request(opened, controller)
+        if not opened.participants:
+            yield from self._decide(opened, self._choice(opened))
 
     def _round(self, number: int, group: int, names: tuple[str, ...]) -> Round:
         writes = reads = 0
         for name in names:
             compiled = self.player.transitions[name]
             writes, reads = writes | compiled.writes, reads | compiled.reads
-        participants = tuple(dict.fromkeys(c for name in names for c in self.participants[name]))
+        participants = tuple(
+            dict.fromkeys(c for name in names for c in self.participants[name] if c not in self.free[name])
+        )
         return Round(number, group, names, participants, writes, reads)
 
     def _restore(self, kept: Mapping[str, Stored]) -> None:
@@ -242,8 +277,14 @@ class Coordinator:
 
     def _choice(self, voted: Round) -> str | None:
         """The transition to commit: one of those with all votes yes, by the arbiter of the group."""
-        enabled = [t for t in voted.transitions if all(t in voted.votes[c] for c in self.participants[t])]
+        enabled = [t for t in voted.transitions if self._has_all_votes(voted, t)]
         return self.arbiter.choose(enabled) if enabled and self.permits != 0 else None
+
+    def _has_all_votes(self, voted: Round, t: str) -> bool:
+        free = self.free[t]
+        if free and any(other.committed == t for other in self.rounds.values()):
+            return False  # the votes may be from before that firing
+        return all(t in (self.ready[c] if c in free else voted.votes[c]) for c in self.participants[t])
 
     def _decide(self, decided: Round, committed: str | None) -> Iterator[Effect]:
         decided.decided, decided.committed = True, committed
@@ -255,14 +296,16 @@ class Coordinator:
                 self.kept_turns = self.arbiter.turns
                 yield Keep("turns", self.kept_turns)
             yield Firing(committed)
-        for controller in decided.participants:
+        for controller in self.ordered(decided):
             yield self._decision(controller, decided.number, committed)
+        if not self.ordered(decided):
+            del self.rounds[decided.number]
 
     def _acknowledged(self, message: Acknowledgement) -> Iterator[Effect]:
         acknowledged = self.rounds.get(message.round)
         if acknowledged is not None and acknowledged.decided:
             acknowledged.acknowledged.add(message.controller)
-            if len(acknowledged.acknowledged) == len(acknowledged.participants):
+            if acknowledged.acknowledged.issuperset(self.ordered(acknowledged)):
                 del self.rounds[message.round]
                 if acknowledged.committed is not None:
                     yield Keep(f"round/{message.round}", None)
@@ -271,7 +314,9 @@ class Coordinator:
         yield from self._open()
 
     def _request(self, asked: Round, controller: str) -> VoteRequest:
-        names = tuple(t for t in asked.transitions if controller in self.participants[t])
+        names = tuple(
+            t for t in asked.transitions if controller in self.participants[t] and controller not in self.free[t]
+        )
         seen = self.seen[controller]
         return VoteRequest(controller, asked.number, names, self.closed_below, seen, self.epoch, self.name)
 

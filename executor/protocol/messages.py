@@ -10,6 +10,10 @@ The protocol is the voting of the paper with the obligations of SEMANTICS, "Deco
 3. Of the transitions with all votes yes, the arbiter of the group chooses one (O2). The decision, commit or abort, goes
    to all who were asked, is applied once, and is repeated until acknowledged (O5). It releases the promises.
 
+Parts that are *free of promise* (`Decomposition.free`) are not asked: their readiness is a vote that stands until an
+order for them is applied, and no hint. So a transition of which all parts are free is decided at once. What makes such
+a vote count is said in `executor/protocol/coordinator.py`, and why it may, in docs/protocol-invariant.md.
+
 Rejected: promises given unasked, as soon as a part is enabled. Two parts of one controller in conflict could then
 hold each other's transitions up for ever, each promised where the other is needed.
 
@@ -44,10 +48,14 @@ Stored = bool | int | str | Sequence["Stored"] | Mapping[str, "Stored"]
 
 @dataclass(frozen=True, slots=True)
 class Readiness:
-    """The coordinated transitions whose parts are enabled in a controller now; a larger sequence number is newer."""
+    """The coordinated transitions whose parts are enabled in a controller now; a larger sequence number is newer.
+
+    `epoch` is that of the coordinator, as the controller knew it.
+    """
 
     sequence: int
     transitions: frozenset[str]
+    epoch: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,13 +45,13 @@ _CONTROLLER: Final = frozenset(
     {
         *("name", "subnet", "player", "parts", "transitions", "enabled", "rows", "local_mask", "arbiter", "kept_turns"),
         *("word", "kept_word", "promises", "closed", "coordinators", "above", "latched", "commands", "timers"),
-        *("unsent", "untold", "held", "forgone", "index_of", "epoch"),
+        *("unsent", "untold", "held", "forgone", "index_of", "epoch", "free", "free_mask", "lasting"),
     }
 )
 _COORDINATOR: Final = frozenset(
     {
         *("name", "first_round", "stride", "player", "participants", "arbiter", "kept_turns", "groups", "group_of"),
-        *("seen", "ready", "waiting", "rounds", "epoch", "next_round", "permits"),
+        *("seen", "ready", "waiting", "rounds", "epoch", "next_round", "permits", "free", "of_free", "lately"),
     }
 )
 _LOW: Final = (1 << EPOCH_BITS) - 1

@@ -141,20 +141,50 @@ def _steps(before: Structure, after: Structure, fired: Sequence[str], sensed: Se
         return sorted(after.relations[name] - before.relations[name], key=str)
 
     yield from (("forget", pair) for pair in sorted({(r, c) for r, _, c in _forgotten(before, after)}, key=str))
+    free = before.relations["free"]
     yield from (("fire", (name,)) for name in fired)
     yield from (("promise", key) for key in new("promised"))
+    used = set()
     for key in new("obeyed"):
         if key in _forgotten(before, after):
             continue
-        yield ("apply" if key[:2] in before.relations["committed"] else "release"), key
-    yield from (("sense", (name,)) for name in sensed)
+        if key[:2] not in before.relations["committed"]:
+            yield "release", key
+        elif key[1:] in free:
+            used.add(key[1:])
+            yield "apply-free", key
+        else:
+            yield "apply", key
+    for name in sensed:
+        late = _cleared_late(before, used, name)
+        yield ("sense-late", (*late, name)) if late else ("sense", (name,))
+    stood = before.relations["stands"] - used
+    yield from (("stand", key) for key in sorted(after.relations["stands"] - stood, key=str))
     yield from (("hear", key) for key in new("heard"))
-    for (r,) in new("decided"):
-        commits = [key for key in new("committed") if key[0] == r]
-        yield ("decide", commits[0]) if commits else ("give-up", (r,))
+    decided = new("decided")
+    opened = {r for r, _ in new("asked")}
+    yield from _decisions([r for (r,) in decided if r not in opened], new("committed"))
     yield from (("note", key) for key in new("noted"))
     yield from (("close", key) for key in new("closed"))
     yield from (("ask", key) for key in new("asked"))
+    # In which nobody has to promise.
+    yield from _decisions([r for (r,) in decided if r in opened], new("committed"))
+
+
+def _decisions(decided: Iterable[Thing], committed: Sequence[tuple[Thing, ...]]) -> Iterator[Instance]:
+    for r in decided:
+        commits = [key for key in committed if key[0] == r]
+        yield ("decide", commits[0]) if commits else ("give-up", (r,))
+
+
+def _cleared_late(before: Structure, used: set[tuple[Thing, ...]], name: str) -> tuple[Thing, ...]:
+    """The round and the transition, at a free part, that has cleared a signal whose owner has still to obey."""
+    owner = before.functions["owner"][name]
+    for r, t in sorted(before.relations["committed"], key=str):
+        under_way = (t, owner) in before.relations["free"] and (r, t, owner) not in before.relations["obeyed"]
+        if under_way and (t, owner) not in used and (t, name) in before.relations["clears"]:
+            return r, t
+    return ()
 
 
 def _forgotten(before: Structure, after: Structure) -> set[tuple[Thing, ...]]:

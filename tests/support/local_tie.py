@@ -30,6 +30,7 @@ from firable.executor.protocol.messages import (
     Message,
     Sending,
     ToController,
+    ToCoordinator,
     Vote,
     VoteRequest,
 )
@@ -48,6 +49,7 @@ class LocalTie:
         self.net = decomposition.net
         self.structure = net_structure(decomposition, (), signals=True)
         self.takes_part = self.structure.relations["takes-part"]
+        self.free = self.structure.relations["free"]
         self.coordinators = coordinators(decomposition)
         self.actions: Counter[str] = Counter()
         self.acts: set[object] = set()
@@ -122,7 +124,13 @@ class LocalTie:
         rounds |= set(asked_of)
         # Below what is closed, a promise that still stands is of a round that a restart of the coordinator gave up.
         given_up = {number for number in was.promises if number < now.above[self._whose(number)].closed_below}
-        asked_keys = [(r, t, name) for r, names in asked_of.items() for t in names]
+        asked_keys = [
+            (r, t, name)
+            for r, names in asked_of.items()
+            for t in names
+            if (t, name) not in self.free
+            or (isinstance(message, Decision) and (r, t) == (message.round, message.committed))
+        ]
         commit = [
             k for k in asked_keys if isinstance(message, Decision) and k[:2] == (message.round, message.committed)
         ]
@@ -130,7 +138,26 @@ class LocalTie:
         abort += [key for key in asked_keys if key[0] in given_up]
         request = [k for k in asked_keys if isinstance(message, VoteRequest) and k[0] == message.round]
 
+        # The vote stands that an order finds, and whatever is told now.
+        reports = [] if step.kind.endswith("crash") else [e for e in step.effects if isinstance(e, ToCoordinator)]
+        newest = {
+            each: max(r.readiness.sequence for r in reports if r.coordinator == each)
+            for each in {report.coordinator for report in reports}
+        }
+        voted = {
+            (t, name)
+            for report in reports
+            if report.readiness.sequence == newest[report.coordinator]
+            for t in report.readiness.transitions
+        } & self.free
+        earlier = {(t, name) for report in reports for t in report.readiness.transitions} & self.free - voted
+        assert earlier <= {key[1:] for key in commit}, f"a vote that does not stand: {step}"
+
         def told(machine: LocalController, kept: Closed) -> Structure:
+            found = {
+                key[1:] for key in commit if key[1:] in self.free and not _is_over(key[0], kept[self._whose(key[0])])
+            }
+            stands = found if machine is was else found | voted
             marked = [*machine.subnet.names(machine.marking)]
             marked += [s.name for s in machine.subnet.signals if machine.word & machine.player.signal_bit(s.name)]
             promised = [(r, t, name) for r, promise in machine.promises.items() for t in promise.promised]
@@ -146,6 +173,7 @@ class LocalTie:
                 closed=[(r,) for r in rounds if r < below[self._whose(r)] and r not in given_up],
                 committed=[key[:2] for key in commit],
                 promised=promised,
+                stands=stands,
                 obeyed=obeyed,
                 request=request,
                 commit_order=commit,
@@ -183,15 +211,16 @@ class LocalTie:
         known = {**now.rounds, **was.rounds}
         rounds = set(known)
         is_crash = step.kind.endswith("crash")
-        participants = {r: opened.participants for r, opened in known.items()}
-        keys = [(r, t, c) for r, o in known.items() for t in o.transitions for c in participants[r]]
-        asked_keys = [key for key in keys if key[1:] in self.takes_part]
+        asked_keys = [(r, t, c) for r, o in known.items() for t in o.transitions for c in now.participants[t]]
+        commits = {r: opened.committed for r, opened in known.items()}
+        stands = self._standing(was, now, message, is_crash=is_crash)
         votes: list[tuple[int, str, str]] = []
         if isinstance(message, Vote) and message.round in rounds:
             votes = [(message.round, t, message.controller) for t in message.promised]
         notes: list[tuple[int, str, str]] = []
         if isinstance(message, Acknowledgement):
             notes = [key for key in asked_keys if (key[0], key[2]) == (message.round, message.controller)]
+            notes = [key for key in notes if key[1:] not in self.free or commits[key[0]] == key[1]]
 
         def told(machine: Coordinator) -> Structure:
             begun = {r for r in rounds if r in was.rounds or r in machine.rounds}
@@ -210,14 +239,21 @@ class LocalTie:
             noted = {
                 key
                 for key in asked_keys
-                if key[0] in decided and (key[0] in over - lost or key[2] in of[key[0]].acknowledged)
+                if (key[1:] not in self.free or committed.get(key[0]) == key[1])
+                and key[0] in decided
+                and (key[0] in over - lost or key[2] in of[key[0]].acknowledged)
             }
             if machine is now and is_crash:
                 noted |= {
-                    key for key in asked_keys if key[0] in was.rounds and key[2] in was.rounds[key[0]].acknowledged
+                    key
+                    for key in asked_keys
+                    if (key[1:] not in self.free or committed.get(key[0]) == key[1])
+                    and key[0] in was.rounds
+                    and key[2] in was.rounds[key[0]].acknowledged
                 }
                 noted |= {key for key in notes if was.rounds[key[0]].decided}
             mine = [key for key in asked_keys if key[0] in begun]
+            promising = [key for key in mine if key[1:] not in self.free]
             return self._told(
                 rounds,
                 begun=[(r,) for r in begun],
@@ -227,10 +263,11 @@ class LocalTie:
                 committed=list(committed.items()),
                 noted=noted,
                 closed=[(r,) for r in over - lost],
-                request=mine,
+                request=promising,
+                stands=stands,
                 vote=[*heard, *votes],
                 commit_order=[k for k in mine if k[0] in decided and committed.get(k[0]) == k[1]],
-                abort_order=[k for k in mine if k[0] in decided and committed.get(k[0]) != k[1]],
+                abort_order=[k for k in promising if k[0] in decided and committed.get(k[0]) != k[1]],
                 acknowledgement=[*noted, *notes],
             )
 
@@ -260,6 +297,8 @@ class LocalTie:
                 case Decision() if effect.round in rounds:
                     orders = last.relations["commit-order"] | last.relations["abort-order"]
                     sent = {k for k in asked_keys if (k[0], k[2]) == (effect.round, effect.controller)}
+                    sent = {k for k in sent if k[1:] not in self.free or k[1] == effect.committed}
+                    assert sent, f"an order to nobody: {step}"
                     assert sent <= orders, step
                     assert (effect.round, effect.committed) in last.relations["committed"] or not effect.committed
                 case Decision():
@@ -267,6 +306,22 @@ class LocalTie:
                     self.actions["(an old round is said to be over)"] += 1
             if isinstance(effect, VoteRequest | Decision | Hello):
                 assert all(r >= effect.closed_below for r in now.rounds), f"{effect} while an older round is open"
+
+    def _standing(self, was: Coordinator, now: Coordinator, message: Message | None, *, is_crash: bool) -> set[Key]:
+        """The votes of free parts that count here: such as counted before, and of a report of this epoch."""
+
+        def counted(machine: Coordinator) -> set[Key]:
+            return {(t, c) for c, names in machine.ready.items() for t in names if (t, c) in self.free}
+
+        told = message if isinstance(message, ToCoordinator) else None
+        if is_crash:  # what it has counted it has forgotten, and may have decided on before
+            heard = told.readiness.transitions if told is not None and told.readiness.epoch == was.epoch else ()
+            return counted(was) | {(t, told.controller) for t in heard if told is not None} & self.free
+        if fresh := counted(now) - counted(was):
+            assert told is not None, f"nobody has told of {fresh}"
+            assert told.readiness.epoch == now.epoch, f"a vote of another epoch counts: {told}"
+            assert fresh <= {(t, told.controller) for t in told.readiness.transitions}, told
+        return counted(now)
 
     def _keep(self, first: Structure, last: Structure, known: object) -> None:
         lost = first.relations["committed"] - last.relations["committed"]
@@ -287,6 +342,11 @@ class LocalTie:
         except AssertionError as failed:
             raise AssertionError(f"{step.kind} at {step.machine} of {step.about}: {failed}") from failed
         self.actions.update(name for name, _ in steps)
+
+
+def _is_over(number: Thing, kept: tuple[int, frozenset[int]]) -> bool:
+    """Whether a round is decided, as far as a controller has kept."""
+    return isinstance(number, int) and (number < kept[0] or number in kept[1])
 
 
 def _obeyed(kept: object) -> tuple[int, frozenset[int]]:

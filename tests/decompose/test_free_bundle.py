@@ -1,0 +1,163 @@
+"""A bundle says which parts are free of promise; who says so of another part, or without showing it, is refused."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+from support.reference import load_net
+
+from firable.analysis.check import check
+from firable.decompose.bundling import make_bundle
+from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.persistence import persistence
+from firable.decompose.verification.checked import Examination
+from firable.decompose.verification.documents import check_verdicts_on_the_net
+from firable.decompose.verification.free_parts import check_free_parts
+from firable.decompose.verification.recut import check_cut
+from firable.decompose.verification.refusal import NotShownError
+from firable.decompose.verification.solvers import SOLVERS
+from firable.nets.bundle import Bundle, read_bundle, write_bundle
+from firable.nets.catalogue import catalogue_net
+from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.right_to_run import unproved
+from firable.nets.verdict import Status, Verdict
+
+Free = tuple[tuple[str, str], ...]
+
+
+@cache
+def cell() -> Bundle:
+    return make_bundle(check(catalogue_net("one_robot")))
+
+
+def saying(free: Free) -> Bundle:
+    return replace(cell(), decomposition=replace(cell().decomposition, free=free))
+
+
+def judged(bundle: Bundle) -> None:
+    """What `firable verify` does of free parts, without the obligations on the split; raises `NotShownError`."""
+    examination = Examination(bundle)
+    examination.used |= {file for file in bundle.evidence if file.endswith(".smt2")}
+    check_verdicts_on_the_net(examination, SOLVERS["z3"], 10_000)
+    check_free_parts(examination, check_cut(bundle.decomposition))
+
+
+def test_bundle_says_which_parts_are_free_and_shows_it(tmp_path: Path) -> None:
+    found = persistence(split(catalogue_net("one_robot")))
+    names = {(vote.transition, vote.controller): vote.part for vote in found.votes}
+    assert tuple(names[pair] for pair in cell().decomposition.free) == found.free_of_promise
+    assert len(cell().decomposition.free) == 15
+    write_bundle(tmp_path / "cell.bundle", cell())
+    assert read_bundle(tmp_path / "cell.bundle").decomposition == cell().decomposition
+    judged(cell())
+
+
+def test_bundle_with_verdicts_on_the_protocol_of_its_net_has_no_free_parts() -> None:
+    bundle = make_bundle(check(load_net("no_trouble")), protocol=True)
+    assert bundle.decomposition.free == ()
+    every = tuple((row.name, part.controller) for row in bundle.decomposition.coordinated for part in row.parts)
+    freed = replace(bundle, decomposition=replace(bundle.decomposition, free=every))
+    assert unproved(freed) == ()
+    with pytest.raises(NotShownError, match="every part promises"):
+        check_free_parts(Examination(freed), check_cut(freed.decomposition))
+
+
+def others() -> list[tuple[str, str]]:
+    """The parts that are not free."""
+    rows = cell().decomposition.coordinated
+    every = [(row.name, part.controller) for row in rows for part in row.parts]
+    return [pair for pair in every if pair not in cell().decomposition.free]
+
+
+@pytest.mark.parametrize("which", range(9))
+def test_each_part_that_may_not_be_free_is_refused_as_free(which: int) -> None:
+    rows = cell().decomposition.coordinated
+    every = [(row.name, part.controller) for row in rows for part in row.parts]
+    bundle = saying(tuple(pair for pair in every if pair in {*cell().decomposition.free, others()[which]}))
+    assert len(unproved(bundle)) == 1
+    with pytest.raises(NotShownError, match="not free of promise"):
+        judged(bundle)
+
+
+def test_there_are_nine_parts_that_may_not_be_free() -> None:
+    assert len(others()) == 9
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda free: (*free, free[0]),
+        lambda free: free[::-1],
+        lambda free: (*free, ("G1", "nobody")),
+        lambda free: (("nothing", "robot"), *free),
+    ],
+    ids=["twice", "another order", "nobody", "nothing"],
+)
+def test_free_parts_that_are_no_parts_in_the_order_of_the_table_are_refused(change: Callable[[Free], Free]) -> None:
+    bundle = saying(change(cell().decomposition.free))
+    assert unproved(bundle)
+    with pytest.raises(NotShownError, match="in its order"):
+        judged(bundle)
+
+
+@pytest.mark.parametrize("which", range(15))
+def test_a_free_part_that_was_taken_out_is_missed(which: int) -> None:
+    free = cell().decomposition.free
+    with pytest.raises(NotShownError, match="the table does not say so"):
+        judged(saying(free[:which] + free[which + 1 :]))
+
+
+def changed(name: str, change: Callable[[Verdict], list[Verdict]]) -> Bundle:
+    return replace(
+        cell(), verdicts=tuple(new for v in cell().verdicts for new in (change(v) if v.name == name else [v]))
+    )
+
+
+@pytest.mark.parametrize("part", ["t0-1", "t2-22", "t3-23"])
+def test_free_part_needs_a_verdict_that_its_vote_is_persistent(part: str) -> None:
+    name = f"persistent.{part}"
+    assert unproved(cell()) == ()
+    assert unproved(changed(name, lambda _: []))
+    assert unproved(changed(name, lambda v: [replace(v, status=Status.UNKNOWN)]))
+    assert unproved(changed(name, lambda v: [v, replace(v, status=Status.VIOLATED)]))
+
+
+def by_an_invariant() -> Net:
+    """`l` takes the gate of `G` when the token is on `a.x`, and then it is not on `a.i`, as `G` needs it."""
+    names = {
+        "a.i": True,
+        "a.j": False,
+        "a.x": False,
+        "a.w": False,
+        "a.g": True,
+        "a.h": False,
+        "b.p": True,
+        "b.q": False,
+    }
+    return Net(
+        "by_an_invariant",
+        tuple(Place(name, name[0], marked) for name, marked in names.items()),
+        (
+            Transition("G", ("a.i", "b.p"), ("a.j", "b.q"), ("a.g",)),
+            Transition("m", ("a.j",), ("a.x",)),
+            Transition("l", ("a.x", "a.g"), ("a.w", "a.h")),
+            Transition("k", ("a.w",), ("a.i",)),
+            Transition("n", ("a.h",), ("a.g",)),
+            Transition("back", ("b.q",), ("b.p",)),
+        ),
+        controllers=(Controller("a"), Controller("b")),
+    )
+
+
+def test_vote_that_the_arcs_do_not_show_needs_evidence() -> None:
+    bundle = make_bundle(check(by_an_invariant()))
+    assert bundle.decomposition.free == (("G", "a"), ("G", "b"))
+    verdict = next(v for v in bundle.verdicts if v.name == "persistent.t1-11")
+    assert verdict.evidence == ("persistence.evidence.json",)
+    judged(bundle)
+    bare = tuple(replace(v, evidence=()) if v is verdict else v for v in bundle.verdicts)
+    assert [problem.message for problem in unproved(replace(bundle, verdicts=bare))] == [
+        "the vote on 't1-11' is said to be persistent without evidence"
+    ]

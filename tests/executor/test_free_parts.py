@@ -1,0 +1,160 @@
+"""Parts free of promise in the machines: their acts are actions of the proof, and what they rest on is needed."""
+
+from collections import Counter
+from functools import cache
+
+import pytest
+from support import free_parts as planted
+from support.examples import seeds
+from support.free_parts import GATE_CLOSED, GATE_PROMISED, OUTPUT_READ, freed, parts_of
+from support.gated_nets import GATE_READ_AGAIN
+from support.local_tie import LocalTie
+from support.reference import load_net
+
+from firable.decompose.splitting.cut import split
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.coordinator import Coordinator
+from firable.executor.protocol.messages import (
+    Decision,
+    Firing,
+    Message,
+    ProtocolError,
+    Report,
+    ToCoordinator,
+    VoteRequest,
+)
+from firable.executor.simulation.exploring import Budget, Explorer, NotATraceError, explore
+from firable.executor.simulation.network import Network, Simulation
+from firable.nets.catalogue import catalogue_net
+from firable.nets.decomposition import Decomposition
+from firable.nets.net import Net
+from firable.semantics.replaying import replay
+from firable.semantics.trace import Fired
+
+LOSS, COPY, CRASH = Budget(losses=1), Budget(copies=1), Budget(crashes=1)
+SMALL = ["local_gate", "local_conflict", "read_before_order", "ring", "gate_read_again", "no_trouble"]
+
+
+@cache
+def free_in(name: str) -> Decomposition:
+    return freed(split(GATE_READ_AGAIN if name == "gate_read_again" else load_net(name)))
+
+
+@pytest.mark.parametrize("budget", [Budget(), LOSS, COPY, CRASH], ids=["no fault", "loss", "copy", "crash"])
+@pytest.mark.parametrize("name", SMALL)
+def test_every_act_with_free_parts_is_some_actions_of_the_proof(name: str, budget: Budget) -> None:
+    tie = LocalTie(free_in(name))
+    space = explore(Explorer(free_in(name)), budget, max_configurations=1500, watch=tie)
+    assert tie.actions["stand"] > 0
+    assert tie.actions["apply-free"] > 0
+    assert space.complete or budget != Budget()
+
+
+FAULTS: list[tuple[type, str, Budget]] = [
+    (planted.CountsEarlierEpochs, "no_trouble", CRASH),
+    (planted.CountsUsedVotes, "ring", Budget()),
+    (planted.CountsOlderReports, "no_trouble", COPY),
+    (planted.VotesOnWhatIsNotKept, "local_gate", CRASH),
+    (planted.AppliesFreePartsTwice, "ring", COPY),
+    (planted.AcknowledgesBeforeItObeys, "ring", Budget()),
+]
+
+
+@pytest.mark.parametrize(("fault", "name", "budget"), FAULTS, ids=[fault.__name__ for fault, _, _ in FAULTS])
+def test_planted_fault_in_what_standing_votes_rest_on_is_found(fault: type, name: str, budget: Budget) -> None:
+    decomposition = free_in(name)
+    is_controller = issubclass(fault, LocalController)
+    explorer = (
+        Explorer(decomposition, controller=fault) if is_controller else Explorer(decomposition, coordinator=fault)
+    )
+    with pytest.raises((AssertionError, NotATraceError, ProtocolError)):
+        explore(explorer, budget, max_configurations=6000, watch=LocalTie(decomposition))
+
+
+@pytest.mark.parametrize("net", [GATE_CLOSED, OUTPUT_READ], ids=["closed", "read"])
+def test_part_that_is_free_and_may_not_be_goes_wrong(net: Net) -> None:
+    with pytest.raises(NotATraceError):
+        explore(Explorer(parts_of(split(net), "t1-11")))
+    assert explore(Explorer(freed(split(net)))).complete
+
+
+def test_vote_in_spite_of_a_promise_is_found() -> None:
+    decomposition = parts_of(split(GATE_PROMISED), "t1-11")
+    explorer = Explorer(decomposition, controller=planted.VotesInSpiteOfPromises)
+    with pytest.raises((AssertionError, NotATraceError)):
+        explore(explorer, watch=LocalTie(decomposition))
+
+
+# --- What is left out
+
+
+def between(decomposition: Decomposition, transition: str) -> list[Message]:
+    """Let everything happen that happens without faults until a transition fires; the messages that were sent."""
+    coordinator = Coordinator(decomposition)
+    controllers = {s.name: LocalController(decomposition, s.name) for s in decomposition.subnets}
+    waiting: list[Message] = []
+    sent: list[Message] = []
+    for controller in controllers.values():
+        waiting += [e for e in controller.report() if isinstance(e, Message)]
+    while waiting:
+        message = waiting.pop(0)
+        sent.append(message)
+        if isinstance(message, ToCoordinator):
+            effects = coordinator.receive(message)
+        else:
+            effects = controllers[message.controller].receive(message)
+        waiting += [e for e in effects if isinstance(e, Message)]
+        if Firing(transition) in effects:
+            return sent
+    raise AssertionError(f"'{transition}' does not fire")
+
+
+def test_transition_of_free_parts_fires_without_being_asked_for() -> None:
+    with_promises = split(load_net("no_trouble"))
+    assert Counter(type(m).__name__ for m in between(with_promises, "G")) == {"Report": 2, "VoteRequest": 2, "Vote": 2}
+    assert Counter(type(m).__name__ for m in between(freed(with_promises), "G")) == {"Report": 2}
+
+
+def test_only_who_has_to_promise_is_asked_and_told_of_an_abort() -> None:
+    decomposition = free_in("local_gate")
+    assert decomposition.free == (("G", "c2"),)
+    coordinator = Coordinator(decomposition)
+    reports = [e for name in ("c1", "c2") for e in LocalController(decomposition, name).report()]
+    asked = [e for r in reports if isinstance(r, Report) for e in coordinator.receive(r)]
+    assert [e.controller for e in asked if isinstance(e, VoteRequest)] == ["c1"]
+    aborted = [e for e in coordinator.permit(0) if isinstance(e, Decision)]
+    assert [(e.controller, e.committed) for e in aborted] == [("c1", None)]
+
+
+def test_completion_that_a_free_part_awaits_falls_by_its_command_alone() -> None:
+    decomposition = freed(split(catalogue_net("two_robots_shared")))
+    awaited = {
+        (part.controller, gate.signal)
+        for row in decomposition.coordinated
+        for part in row.parts
+        for gate in decomposition.subnet(part.controller).transition(part.name).external
+        if (row.name, part.controller) in decomposition.free
+    }
+    assert awaited
+    for name, signal in awaited:
+        controller = LocalController(decomposition, name)
+        bit = controller.player.signal_bit(signal)
+        controller.read(signal, value=True)
+        assert controller.word & bit
+        assert controller.read(signal, value=False) == []
+        assert controller.word & bit
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("cell", ["one_robot", "two_robots_shared"])
+def test_cells_with_free_parts_do_what_the_net_does_with_fewer_messages(cell: str) -> None:
+    promising = split(catalogue_net(cell))
+    for seed in seeds(2):
+        sent = []
+        for decomposition in (promising, freed(promising)):
+            simulation = Simulation(decomposition, seed, Network(loss=0.1, duplication=0.1))
+            trace = simulation.run(600)
+            assert replay(decomposition.net, trace).complete
+            fired = sum(1 for event in trace.events if isinstance(event, Fired))
+            sent.append(simulation.messages / max(fired, 1))
+        assert sent[1] < sent[0]
