@@ -116,8 +116,8 @@ class Acts:
         """Whether anything is said to other hosts for the first time."""
         self.halted = False
         """Whether nothing may fire here by itself, nor be promised to the coordinators of other hosts."""
-        self.withheld: dict[tuple[str, int], VoteRequest] = {}
-        """What those have asked for meanwhile."""
+        self.withheld: dict[tuple[str, int], VoteRequest | Decision] = {}
+        """What those have asked for meanwhile, and what they have decided on votes that stood before the halt."""
         self.clock: RunClock | None = None
         self.ticks: dict[str, asyncio.TimerHandle] = {}
         """For each controller with a time that runs, when it is told the time next."""
@@ -171,8 +171,8 @@ class Acts:
         """End a halt: what was withheld is answered, and everybody has a turn."""
         self.halted = False
         self.permit(None)
-        for request in self.withheld.values():
-            self.post(request.controller, request)
+        for message in self.withheld.values():
+            self.post(message.controller, message)
         self.withheld.clear()
         for machine in self.controllers:
             self.post(machine, None)
@@ -213,6 +213,11 @@ class Acts:
         match item:
             case VoteRequest() if self.halted and item.coordinator not in self.coordinators:
                 self.withheld[machine, item.round] = item
+                return
+            case Decision() if (
+                self.halted and item.coordinator not in self.coordinators and item.committed in controller.free
+            ):
+                self.withheld[machine, item.round] = item  # as if it were still on its way
                 return
             case VoteRequest() | Decision() | Hello():
                 self._receive(machine, controller, item)
