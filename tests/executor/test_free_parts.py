@@ -5,7 +5,6 @@ from functools import cache
 
 import pytest
 from support import free_parts as planted
-from support.examples import seeds
 from support.free_parts import GATE_CLOSED, GATE_PROMISED, OUTPUT_READ, freed, parts_of
 from support.gated_nets import GATE_READ_AGAIN
 from support.local_tie import LocalTie
@@ -24,12 +23,9 @@ from firable.executor.protocol.messages import (
     VoteRequest,
 )
 from firable.executor.simulation.exploring import Budget, Explorer, NotATraceError, explore
-from firable.executor.simulation.network import Network, Simulation
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Net
-from firable.semantics.replaying import replay
-from firable.semantics.trace import Fired
 
 LOSS, COPY, CRASH = Budget(losses=1), Budget(copies=1), Budget(crashes=1)
 SMALL = ["local_gate", "local_conflict", "read_before_order", "ring", "gate_read_again", "no_trouble"]
@@ -143,18 +139,3 @@ def test_completion_that_a_free_part_awaits_falls_by_its_command_alone() -> None
         assert controller.word & bit
         assert controller.read(signal, value=False) == []
         assert controller.word & bit
-
-
-@pytest.mark.seeds
-@pytest.mark.parametrize("cell", ["one_robot", "two_robots_shared"])
-def test_cells_with_free_parts_do_what_the_net_does_with_fewer_messages(cell: str) -> None:
-    promising = split(catalogue_net(cell))
-    for seed in seeds(2):
-        sent = []
-        for decomposition in (promising, freed(promising)):
-            simulation = Simulation(decomposition, seed, Network(loss=0.1, duplication=0.1))
-            trace = simulation.run(600)
-            assert replay(decomposition.net, trace).complete
-            fired = sum(1 for event in trace.events if isinstance(event, Fired))
-            sent.append(simulation.messages / max(fired, 1))
-        assert sent[1] < sent[0]
