@@ -20,6 +20,7 @@ from measuring import Table, timed
 
 from firable.decompose.splitting.cut import split
 from firable.executor.operating.running import RunReport, execute
+from firable.executor.operating.situation import State
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.machines.plant_file import parse_plant
 
@@ -47,6 +48,8 @@ def lasted(workpieces: int) -> Lasted:
         journal = Path(folder) / "journal"
         work = partial(execute, split(net), plant, workpieces=workpieces, journal_path=journal, digest=NAME)
         report, seconds = timed(work)
+        if report.state is not State.DONE:
+            raise RuntimeError(f"the run has not come to its end: {report.situation.message}")
         return Lasted(
             report, seconds, journal.stat().st_size / 1024, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         )
