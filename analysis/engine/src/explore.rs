@@ -310,13 +310,14 @@ mod tests {
 
     #[test]
     fn each_budget_stops_with_its_reason() {
-        let run = |limits| Space::explore(machines(16, 0), limits, &mut |_| Err(Stop::Cancelled)).expect("begins");
+        let run = |limits| Space::explore(machines(16, 0), limits, &mut unwatched).expect("begins");
         let all = Limits { step: false, markings: 1 << 20, memory_bytes: 1 << 28, time: None };
         assert_eq!(run(Limits { markings: 100, ..all }).stop, Some(Stop::Markings));
         assert_eq!(run(Limits { markings: 100, ..all }).len(), 100);
         assert_eq!(run(Limits { memory_bytes: 100_000, ..all }).stop, Some(Stop::Memory));
         assert_eq!(run(Limits { time: Some(Duration::ZERO), ..all }).stop, Some(Stop::Time));
-        assert_eq!(run(all).stop, Some(Stop::Cancelled));
+        let cancelled = Space::explore(machines(16, 0), all, &mut |_| Err(Stop::Cancelled)).expect("begins");
+        assert_eq!(cancelled.stop, Some(Stop::Cancelled));
     }
 
     #[test]
