@@ -69,7 +69,8 @@ def main() -> None:
     if options.repeat < 1:
         parser.error("--repeat must be at least 1")
     head = machine()
-    build_examples()
+    if not options.only or "explicit" in options.only:
+        build_examples()
     about = (
         f"# Results\n\nWritten by `make bench`; do not edit. {head}.\n\n"
         "Each figure is a ratio to something measured in the same run, from the smallest of "
