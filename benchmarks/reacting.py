@@ -42,6 +42,7 @@ from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.device import Point, Value
 from firable.executor.drivers.driver import Answer, Clock, Driver, Listener, Reading
 from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
+from firable.executor.drivers.keeping import ended
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.nets.net import Place
@@ -298,8 +299,7 @@ async def at_server(client: Callable[[int], Awaitable[None]], count: int) -> lis
     async with plant("modbus", str(count)) as lines:
         running = asyncio.ensure_future(client(int(await lines.readline())))
         times: list[float] = json.loads(await lines.readline())
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
+        await ended([running])
     return times
 
 
