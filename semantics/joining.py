@@ -3,7 +3,9 @@
 Each host writes what its own machines do, in their order, by its own clock. What is between hosts, the rounds tell:
 
 - a controller that votes yes for a transition has done before all that its trace shows before (`voted`);
-- the coordinator fires it when it has the votes (a firing with its `round`);
+- one whose part is free of promise has done so before its yes that stands, and that is of no round (`stands`);
+- the coordinator fires it when it has the votes (a firing with its `round`); a yes that stands counts once, and the
+  next one of that controller is from after it has applied the firing;
 - a controller applies it, and sends its commands, when it has heard of that (`applied`).
 
 These and the order in each file are what happened before what (Lamport 1978). Any order of all lines that keeps them is
@@ -17,7 +19,7 @@ Rejected: joining by the clocks alone. Two hosts agree to a millisecond at best,
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError, Span
@@ -29,11 +31,15 @@ VOTED: Final = "voted"
 """The note of a vote: `controller`, `round`, and in `promised` the transitions with a yes."""
 COORDINATOR: Final = ""
 """The name of the coordinator among the machines of a host."""
+STANDS: Final = "stands"
+"""The note of votes on parts free of promise: `controller`, and in `transitions` those with a yes from now on."""
 APPLIED: Final = "applied"
 """The note of a controller that takes its part of a committed transition: `controller`, `round`."""
 
 Vote = tuple[int, str, str]
 """A yes: the round, the transition, the controller."""
+Standing = tuple[str, str]
+"""A yes that stands: the transition, the controller."""
 
 
 @dataclass(slots=True)
@@ -73,7 +79,27 @@ class _Joined:
 
     net: Net
     parts: list[_Part]
-    fired: set[int]
+    stands_somewhere: frozenset[Standing]
+    fired: dict[int, str] = field(default_factory=dict)
+    """The rounds that are decided, and for what."""
+    stands: set[Standing] = field(default_factory=set)
+    """The votes that stand and that no firing has used."""
+    unapplied: set[Standing] = field(default_factory=set)
+    """Where a firing has used one, and is not applied."""
+
+    def tell(self, event: Event | None) -> None:
+        """Note what an event means for those that come after it."""
+        match event:
+            case Fired(_, (transition,), int(number)):
+                self.fired[number] = transition
+                used = {each for each in self.stands if each[0] == transition}
+                self.stands -= used
+                self.unapplied |= used
+            case Noted(_, note, {"controller": str(controller), "round": int(number)}) if note == APPLIED:
+                self.unapplied.discard((self.fired[number], controller))
+            case Noted(_, note, {"controller": str(controller), "transitions": list(names)}) if note == STANDS:
+                # One that is told again before the order is applied is the yes that was used.
+                self.stands |= {(str(name), controller) for name in names} - self.unapplied
 
     def missing(self, event: Event | None) -> str:
         """What has to be told before this event; nothing where it may come now."""
@@ -81,7 +107,8 @@ class _Joined:
             case Fired(_, (transition,), int(number)):
                 for controller in _participants(self.net, transition):
                     vote = (number, transition, controller)
-                    if not any(part.has_told(vote) for part in self.parts):
+                    stands = (transition, controller) in self.stands
+                    if not stands and not any(part.has_told(vote) for part in self.parts):
                         return f"the yes of '{controller}' for '{transition}' in round {number}"
             case Noted(_, note, {"round": int(number)}) if note == APPLIED and number not in self.fired:
                 return f"the decision of round {number}"
@@ -92,11 +119,14 @@ class _Joined:
         match event:
             case Fired(_, (transition,), int(number)):
                 votes = [(number, transition, controller) for controller in _participants(self.net, transition)]
-                return all(any(vote in part.yes for part in self.parts) for vote in votes)
+                return all(vote[1:] in self.stands_somewhere or self._is_voted(vote) for vote in votes)
             case Noted(_, _, {"round": int(number)}):
                 events = (event for part in self.parts for event in part.trace.events)
                 return any(isinstance(event, Fired) and event.round == number for event in events)
         return True
+
+    def _is_voted(self, vote: Vote) -> bool:
+        return any(vote in part.yes for part in self.parts)
 
 
 def join(net: Net, traces: Sequence[Trace]) -> Trace:
@@ -107,7 +137,7 @@ def join(net: Net, traces: Sequence[Trace]) -> Trace:
     what they make is a trace of the net, `firable.semantics.replaying` says.
     """
     _refuse_other_hosts(net, traces)
-    joined = _Joined(net, [_Part(trace, _yes(trace)) for trace in traces], set())
+    joined = _Joined(net, [_Part(trace, _yes(trace)) for trace in traces], _standing(traces))
     began = min(trace.header.began for trace in traces)
     events: list[Event] = []
     now = 0.0
@@ -119,9 +149,8 @@ def join(net: Net, traces: Sequence[Trace]) -> Trace:
         now = max(now, part.next_seconds - began)
         event = part.next
         part.told += 1
-        if isinstance(event, Fired) and event.round is not None:
-            joined.fired.add(event.round)
-        if event is not None and not (isinstance(event, Noted) and event.note in (VOTED, APPLIED)):
+        joined.tell(event)
+        if event is not None and not (isinstance(event, Noted) and event.note in (VOTED, STANDS, APPLIED)):
             events.append(replace(event, at_seconds=now))
     stuck = [part for part in joined.parts if part.next is not None]
     whole = all(part.whole for part in joined.parts)
@@ -153,6 +182,17 @@ def _yes(trace: Trace) -> dict[Vote, int]:
                     for name in names:
                         found.setdefault((number, name, controller), i)
     return found
+
+
+def _standing(traces: Iterable[Trace]) -> frozenset[Standing]:
+    """The votes that stand at any time."""
+    notes = (event for trace in traces for event in trace.events if isinstance(event, Noted) and event.note == STANDS)
+    found: set[Standing] = set()
+    for note in notes:
+        match note.data:
+            case {"controller": str(controller), "transitions": list(names)}:
+                found |= {(str(name), controller) for name in names}
+    return frozenset(found)
 
 
 def _end(net: Net, traces: Iterable[Trace], now: float) -> End:

@@ -118,6 +118,8 @@ class Acts:
         """Whether nothing may fire here by itself, nor be promised to the coordinators of other hosts."""
         self.withheld: dict[tuple[str, int], VoteRequest | Decision] = {}
         """What those have asked for meanwhile, and what they have decided on votes that stood before the halt."""
+        self.standing: dict[str, set[str]] = {name: set() for name, one in self.controllers.items() if one.free}
+        """For each controller with parts free of promise, what the trace tells as standing votes."""
         self.clock: RunClock | None = None
         self.ticks: dict[str, asyncio.TimerHandle] = {}
         """For each controller with a time that runs, when it is told the time next."""
@@ -239,10 +241,13 @@ class Acts:
 
     def _receive(self, machine: str, controller: LocalController, item: ToController) -> None:
         known = frozenset(controller.promises)
+        applied = str(item.committed) if isinstance(item, Decision) and controller.applies(item) else None
         effects = controller.receive(item)
-        if isinstance(item, Decision) and item.committed in controller.parts and item.round in known:
-            self.recorder.applied(self.now_seconds(), machine, item.round, str(item.committed))
-            self.left(machine, str(item.committed))
+        if isinstance(item, Decision) and applied is not None:
+            self.recorder.applied(self.now_seconds(), machine, item.round, applied)
+            self.left(machine, applied)
+            if applied in controller.free:
+                self.standing[machine].discard(applied)
         self.act(machine, effects, known)
 
     def _tick(self, machine: str) -> None:
@@ -292,8 +297,10 @@ class Acts:
                     is_new = not again and number not in known
                     if is_new:
                         self.recorder.voted(now, controller, number, promised)
+                    self._stands(now, effect)
                     self._say(effect.coordinator, effect, again=not is_new)
                 case Report() | Acknowledgement():
+                    self._stands(now, effect)
                     self._say(effect.coordinator, effect, again=again)
                 case _:
                     assert_never(effect)
@@ -311,6 +318,15 @@ class Acts:
         self.heard, self.fired_seconds = False, now
         self.firings_at_once += 1
         self.fired_at_once.append(transition)
+
+    def _stands(self, now: float, told: Report | Vote | Acknowledgement) -> None:
+        """Have the trace of one host among others tell of votes that stand from now on, before anybody counts them."""
+        if (known := self.standing.get(told.controller)) is None or not self.recorder.machines:
+            return
+        if new := (told.readiness.transitions & self.controllers[told.controller].free) - known:
+            known |= new
+            self.recorder.stands(now, told.controller, new)
+            self.unsynced = True
 
     def _say(self, receiver: str, message: Message, *, again: bool) -> None:
         self.messages += 1

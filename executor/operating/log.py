@@ -20,7 +20,7 @@ from types import MappingProxyType
 from typing import Final
 
 from firable.executor.operating.situation import Situation, State
-from firable.semantics.joining import APPLIED, VOTED
+from firable.semantics.joining import APPLIED, STANDS, VOTED
 from firable.semantics.trace import Event, Noted
 
 LEVELS: Final[Mapping[str, int]] = MappingProxyType(
@@ -63,7 +63,7 @@ class Log:
 
     def seen(self, event: Event) -> None:
         """An event of the trace; votes and applications stand there alone."""
-        if isinstance(event, Noted) and event.note not in (VOTED, APPLIED):
+        if isinstance(event, Noted) and event.note not in (VOTED, STANDS, APPLIED):
             self._tell(LEVELS.get(event.note, logging.INFO), event.note, {"at": event.at_seconds, **event.data})
 
     def ended(self, situation: Situation) -> None:

@@ -29,7 +29,7 @@ from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
 from firable.nets.source import printable
-from firable.semantics.joining import APPLIED, VOTED
+from firable.semantics.joining import APPLIED, STANDS, VOTED
 from firable.semantics.trace import CommandSent, End, Event, Fired, Header, Noted, SignalChanged
 
 
@@ -167,6 +167,10 @@ class Recorder:
         """A controller has voted in a round: yes for these transitions."""
         data = {"controller": controller, "round": number, "promised": sorted(promised)}
         self._write(Noted(at_seconds, VOTED, data))
+
+    def stands(self, at_seconds: float, controller: str, transitions: frozenset[str]) -> None:
+        """A controller has said yes for parts that are free of promise: of one host among others, that is told."""
+        self._write(Noted(at_seconds, STANDS, {"controller": controller, "transitions": sorted(transitions)}))
 
     def applied(self, at_seconds: float, controller: str, number: int, transition: str) -> None:
         """A controller has applied its part of what a round committed: of one host among others, that is told."""

@@ -222,6 +222,10 @@ class LocalController:
             case Hello():
                 return effects
 
+    def applies(self, decision: Decision) -> bool:
+        """Whether this order would fire a part here: it commits one, and has not been obeyed."""
+        return decision.committed in self.parts and not self._is_closed(decision.round)
+
     def read(self, signal: str, value: bool, entry: int | None = None) -> list[Effect]:
         """Take a new value of a signal.
 

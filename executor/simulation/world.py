@@ -360,7 +360,7 @@ class World:
         self.note("arrives", message)
         self.counts["arrived"] += 1
         match message:
-            case Decision(committed=str(name)) if message.round in receiver.machine.promises:
+            case Decision(committed=str(name)) if receiver.machine.applies(message):
                 self._left(receiver, name)
         self.act(receiver, receiver.machine.receive(message))
         if to_controller and not self._is_slow():

@@ -1,32 +1,43 @@
 """Traces of several hosts, joined by their rounds, are a trace of the central net."""
 
 import io
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from support.examples import seeds
+from support.free_parts import freed
 from support.host_traces import Hosts
 
 from firable.decompose import split
 from firable.nets.catalogue import catalogue_net
+from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
-from firable.semantics.joining import APPLIED, VOTED, join
+from firable.semantics.joining import APPLIED, STANDS, VOTED, join
 from firable.semantics.replaying import replay
 from firable.semantics.trace import CommandSent, Event, Fired, Noted, Trace, parse_trace
 
 NETS = ["one_robot", "two_robots_shared", "one_robot_mc_late"]
 
 
-def of_hosts(name: str, seed: int, steps: int = 600) -> list[Trace]:
-    return Hosts(split(catalogue_net(name)), seed).run(steps)
+@cache
+def decomposition_of(name: str, *, free: bool) -> Decomposition:
+    decomposition = split(catalogue_net(name))
+    return freed(decomposition) if free else decomposition
+
+
+def of_hosts(name: str, seed: int, steps: int = 600, *, free: bool = False) -> list[Trace]:
+    return Hosts(decomposition_of(name, free=free), seed).run(steps)
 
 
 @pytest.mark.seeds
+@pytest.mark.parametrize("free", [False, True], ids=["promises", "free"])
 @pytest.mark.parametrize("name", NETS)
-def test_the_traces_of_hosts_join_to_a_trace_of_the_net_whatever_their_clocks_say(name: str) -> None:
+def test_the_traces_of_hosts_join_to_a_trace_of_the_net_whatever_their_clocks_say(name: str, *, free: bool) -> None:
     fired = 0
     for seed in seeds(20):
-        traces = of_hosts(name, seed)
+        traces = of_hosts(name, seed, free=free)
         joined = join(catalogue_net(name), traces)
         done = replay(catalogue_net(name), joined)
         assert done.complete, seed
@@ -95,6 +106,24 @@ def test_a_firing_without_a_vote_and_a_part_without_a_decision_are_refused() -> 
     assert f"for '{fired.transitions[0]}' in round {fired.round}" in refused(unvoted)
     undecided = tuple(e for e in traces[0].events if e != fired)
     assert f"the decision of round {fired.round}" in refused([replace(traces[0], events=undecided), *traces[1:]])
+
+
+def test_a_firing_without_a_vote_that_stands_and_one_on_a_vote_that_was_used_are_refused() -> None:
+    traces = of_hosts("one_robot", 1, free=True)
+
+    def with_notes(note: str, keep: Callable[[int], bool]) -> list[Trace]:
+        """The traces with some of these notes alone, by their numbers in each trace."""
+        found = []
+        for trace in traces:
+            places = [i for i, event in enumerate(trace.events) if isinstance(event, Noted) and event.note == note]
+            dropped = {place for number, place in enumerate(places) if not keep(number)}
+            found.append(replace(trace, events=tuple(e for i, e in enumerate(trace.events) if i not in dropped)))
+        return found
+
+    assert replay(catalogue_net("one_robot"), join(catalogue_net("one_robot"), with_notes(STANDS, lambda _: True)))
+    assert "nowhere before stands the yes of" in refused(with_notes(STANDS, lambda _: False))
+    assert "nowhere before stands the yes of" in refused(with_notes(STANDS, lambda number: number == 0))
+    assert "nowhere before stands the yes of" in refused(with_notes(APPLIED, lambda _: False))
 
 
 def test_commands_that_are_told_before_their_decision_are_noticed() -> None:

@@ -5,11 +5,22 @@ from dataclasses import replace
 
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
-from firable.executor.protocol.messages import Decision, Effect, Firing, Message, Sending, Taken, ToController, Vote
+from firable.executor.protocol.messages import (
+    Acknowledgement,
+    Decision,
+    Effect,
+    Firing,
+    Message,
+    Report,
+    Sending,
+    Taken,
+    ToController,
+    Vote,
+)
 from firable.nets.decomposition import Decomposition
 from firable.nets.interchange import net_digest
 from firable.nets.net import SignalKind
-from firable.semantics.joining import APPLIED, COORDINATOR, VOTED
+from firable.semantics.joining import APPLIED, COORDINATOR, STANDS, VOTED
 from firable.semantics.trace import CommandSent, End, Event, Fired, Header, Noted, SignalChanged, Trace
 
 
@@ -28,6 +39,7 @@ class Hosts:
         self.under_way: list[Message] = []
         self.completing: list[tuple[str, int]] = []
         self.steps = 0
+        self.standing: dict[str, set[str]] = {name: set() for name in self.controllers}
         for name, controller in self.controllers.items():
             self._perform(name, controller.report())
 
@@ -81,9 +93,10 @@ class Hosts:
             self._perform(COORDINATOR, self.coordinator.receive(message))
             return
         controller = self.controllers[message.controller]
-        held = isinstance(message, Decision) and message.round in controller.promises
+        applied = str(message.committed) if isinstance(message, Decision) and controller.applies(message) else None
         effects = controller.receive(message)
-        if isinstance(message, Decision) and held and message.committed in controller.parts:
+        if isinstance(message, Decision) and applied is not None:
+            self.standing[message.controller].discard(applied)
             self._write(message.controller, Noted(0, APPLIED, {"controller": controller.name, "round": message.round}))
         self._perform(message.controller, effects)
 
@@ -100,12 +113,21 @@ class Hosts:
                     if completion := self.net.place(place).completion:
                         self.completing.append((completion, entry))
                     self.controllers[name].sent(place, entry)
+                case Report() | Acknowledgement():
+                    self._tell_standing(name, effect)
+                    self.under_way.append(effect)
                 case Vote():
                     data = {"controller": name, "round": effect.round, "promised": sorted(effect.promised)}
                     self._write(name, Noted(0, VOTED, data))
+                    self._tell_standing(name, effect)
                     self.under_way.append(effect)
                 case _ if isinstance(effect, Message):
                     self.under_way.append(effect)
+
+    def _tell_standing(self, name: str, told: Report | Vote | Acknowledgement) -> None:
+        if new := (told.readiness.transitions & self.controllers[name].free) - self.standing[name]:
+            self.standing[name] |= new
+            self._write(name, Noted(0, STANDS, {"controller": name, "transitions": sorted(new)}))
 
     def _write(self, name: str, event: Event) -> None:
         self.lines[name].append(replace(event, at_seconds=float(self.steps)))

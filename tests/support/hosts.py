@@ -1,10 +1,12 @@
-"""The hosts of a cell in one process, over the in-process link, in virtual time."""
+"""The hosts of a cell in one process, over the in-process link, in virtual time; with parts free of promise, or not."""
 
 import asyncio
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+
+from support.free_parts import freed
 
 from firable.decompose import split
 from firable.executor.drivers.dry_run import DryRunDriver
@@ -34,10 +36,12 @@ class Cell:
         name: str = "one_robot",
         link: Callable[[Greeting], Link] | None = None,
         seconds: float = 1.0,
+        *,
+        free: bool = False,
     ) -> None:
         self.make_link = link
         self.seconds = seconds
-        self.decomposition = split(catalogue_net(name))
+        self.decomposition = freed(split(catalogue_net(name))) if free else split(catalogue_net(name))
         self.net = self.decomposition.net
         self.folder = folder
         self.exchange = Exchange()

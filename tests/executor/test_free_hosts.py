@@ -1,0 +1,177 @@
+"""Hosts of a cell of which parts are free of promise: traces join, and who is halted obeys no order on votes."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from support.free_parts import freed
+from support.hosts import ALL_IN_ONE, ONE_EACH, TOGETHER, Cell
+
+from firable.decompose.splitting.cut import split
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.journal.journal import MemoryJournal
+from firable.executor.operating.acts import Acts, CommandTaken
+from firable.executor.operating.recorder import Recorder
+from firable.executor.protocol.messages import Acknowledgement, Decision, Report, Sending
+from firable.nets.decomposition import Decomposition
+from firable.nets.net import Command, Controller, Net, Place, Transition
+from firable.semantics.joining import APPLIED
+from firable.semantics.trace import CommandSent, Noted, read_trace
+
+CONVEYOR = ("conveyor",)
+
+
+@pytest.mark.parametrize("of", [ONE_EACH, TOGETHER, ALL_IN_ONE], ids=["one each", "together", "all in one"])
+def test_hosts_with_free_parts_run_a_cell_and_their_traces_join_to_one_of_the_net(
+    of: tuple[tuple[str, ...], ...], tmp_path: Path
+) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path, of, free=True)
+        await asyncio.sleep(60)
+        await cell.stop()
+        assert cell.replayed().firings == cell.firings() > 50
+
+    run_in_virtual_time(main())
+
+
+@pytest.mark.parametrize("after", [3.0, 5.1, 6.0])
+@pytest.mark.parametrize("dies", ONE_EACH, ids=lambda machines: machines[0] or "coordinator")
+def test_a_host_with_free_parts_that_is_killed_and_started_anew_loses_and_doubles_nothing(
+    dies: tuple[str, ...], after: float, tmp_path: Path
+) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path, free=True)
+        await asyncio.sleep(after)
+        await cell.kill(dies)
+        await asyncio.sleep(5)
+        cell.start(dies)
+        await asyncio.sleep(5)
+        stood = cell.firings()
+        assert cell.hosts[dies].resume()
+        await asyncio.sleep(60)
+        await cell.stop()
+        assert cell.replayed().firings > stood + 30
+
+    run_in_virtual_time(main())
+
+
+# --- One host with the controller `b`, and a coordinator elsewhere
+
+
+def _net() -> Net:
+    """`G` takes a token of `a` and one of `b`, and commands a machine of `b`, whose end nobody awaits."""
+    machine = Command("M", "GO")
+    places = (
+        Place("a.p", "a", marked=True),
+        Place("a.q", "a"),
+        Place("b.p", "b", marked=True),
+        Place("b.q", "b", command=machine),
+    )
+    return Net(
+        "n",
+        places,
+        (Transition("G", ("a.p", "b.p"), ("a.q", "b.q")), Transition("H", ("a.q", "b.q"), ("a.p", "b.p"))),
+        controllers=(Controller("a"), Controller("b")),
+    )
+
+
+class OneHost:
+    """The acts of the host of `b`, and what they told; every part is free of promise."""
+
+    def __init__(self) -> None:
+        self.decomposition: Decomposition = freed(split(_net()))
+        assert set(self.decomposition.free) == {(t, c) for t in "GH" for c in "ab"}
+        recorder = Recorder(_net(), "", None, machines=("b",))
+        self.left: list[tuple[str, str]] = []
+        self.acts = Acts(
+            self.decomposition,
+            ("b",),
+            MemoryJournal(),
+            recorder,
+            None,
+            lambda: None,
+            lambda controller, transition: self.left.append((controller, transition)),
+        )
+        self.acts.start()
+
+    def leaving(self) -> list[object]:
+        self.acts.group()
+        return list(self.acts.commit())
+
+    def order(self, number: int, transition: str) -> None:
+        self.acts.hear("b", Decision("b", number, transition, 0, -1))
+
+    @property
+    def marking(self) -> tuple[str, ...]:
+        controller = self.acts.controllers["b"]
+        return controller.subnet.names(controller.marking)
+
+
+def test_a_halted_host_obeys_no_order_on_votes_that_stand_until_it_goes_on() -> None:
+    host = OneHost()
+    assert any(isinstance(each, Report) and each.readiness.transitions == {"G"} for each in host.leaving())
+    host.acts.halted = True
+    host.order(0, "G")
+    host.order(0, "G")  # it is repeated, as nobody acknowledges it
+    assert host.leaving() == []
+    assert host.marking == ("b.p",)
+    host.acts.go_on()
+    left = host.leaving()
+    assert [each.place for each in left if isinstance(each, Sending)] == ["b.q"]
+    assert any(isinstance(each, Acknowledgement) for each in left)
+    assert host.marking == ("b.q",)
+
+
+def test_the_firing_of_a_free_part_gives_up_what_its_tokens_leave_behind() -> None:
+    host = OneHost()
+    host.leaving()
+    host.order(0, "G")
+    (sending,) = (each for each in host.leaving() if isinstance(each, Sending))
+    assert host.left == [("b", "G")]
+    host.acts.hear("b", CommandTaken(sending.place, sending.entry))
+    host.leaving()
+    host.order(1, "H")
+    host.order(1, "H")  # a copy fires nothing, and leaves nothing behind
+    host.leaving()
+    assert host.left == [("b", "G"), ("b", "H")]
+
+
+@pytest.mark.parametrize("after", [2.1, 8.1, 12.1])
+@pytest.mark.parametrize("how", ["paused", "emergency stop"])
+def test_nothing_is_applied_or_commanded_at_a_halted_host_of_a_cell(how: str, after: float, tmp_path: Path) -> None:
+    """The others decide on what the conveyor has said before; what it is told of that waits."""
+
+    async def main() -> None:
+        cell = Cell(tmp_path, free=True)
+        await asyncio.sleep(after)
+        host = cell.hosts[CONVEYOR]
+        if how == "paused":
+            host.pause()
+        else:
+            host.emergency_stop("a person in the cell")
+        await asyncio.sleep(1.9)
+        assert any(isinstance(message, Decision) for message in host.acts.withheld.values())
+        await cell.stop()
+
+    run_in_virtual_time(main())
+    events = read_trace(tmp_path / "conveyor.trace").events
+    notes = [event.note if isinstance(event, Noted) else "" for event in events]
+    since = notes.index(how)
+    assert APPLIED in notes[:since]
+    assert APPLIED not in notes[since:]
+    assert not [event for event in events[since:] if isinstance(event, CommandSent)]
+
+
+def test_what_a_halted_host_was_told_is_applied_when_it_goes_on(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path, free=True)
+        await asyncio.sleep(5.1)
+        cell.hosts[CONVEYOR].pause()
+        await asyncio.sleep(10)
+        stood = cell.firings()
+        cell.hosts[CONVEYOR].resume()
+        await asyncio.sleep(30)
+        await cell.stop()
+        assert cell.replayed().firings > stood + 10
+
+    run_in_virtual_time(main())
