@@ -8,6 +8,10 @@ so. A second Ctrl-C says that somebody does not want to wait so long: `HURRY_SEC
 which take milliseconds where anybody answers. Rejected: to end at that very instant, as tools that hold no machine do;
 a key that bounces would leave the machines on.
 
+A terminal that is closed and an ssh connection that is lost ask to terminate too (SIGHUP), and so does SIGQUIT: nobody
+looks at the machines any more, and left to itself the signal would end the process with the machines on. Who begins a
+run with `nohup` has said that it outlives the terminal, and is believed.
+
 A program that blocks the event loop itself obeys none of this. So a thread beside it, begun with the first request,
 ends the process when it is still there after all that time; what the journal holds, a restart takes up.
 """
@@ -31,6 +35,10 @@ HURRY_SECONDS: Final = 1.0
 GIVEN_UP: Final = 1
 """The exit code of a process that was given up."""
 
+_ASKING: Final = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)
+)
+"""The signals that ask a run to end, of those that the platform has."""
 _POLL_SECONDS: Final = 0.1
 _AFTER_SECONDS: Final = 5.0
 """What comes after the driver has ended takes no longer."""
@@ -92,7 +100,8 @@ def ended_by_signals(patience: Patience | None = None) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():  # no other is reached by signals
         yield
         return
-    earlier = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    heard = [number for number in _ASKING if signal.getsignal(number) is not signal.SIG_IGN]
+    earlier = {number: signal.signal(number, end) for number in heard}
     try:
         yield
     finally:

@@ -210,7 +210,10 @@ def test_whoever_cancels_again_does_not_cut_off_the_safe_outputs() -> None:
     run_in_virtual_time(main())
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+ASKING = [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT]
+
+
+@pytest.mark.parametrize("number", ASKING)
 def test_a_second_signal_does_not_cut_off_the_safe_outputs(number: signal.Signals) -> None:
     run, machine = slow()
 
@@ -221,6 +224,25 @@ def test_a_second_signal_does_not_cut_off_the_safe_outputs(number: signal.Signal
         return (await terminable(run)).state
 
     assert run_in_virtual_time(ended()) is State.STOPPED
+    assert machine.is_off
+
+
+def test_a_terminal_that_is_closed_does_not_end_a_run_that_was_begun_to_outlive_it() -> None:
+    run, machine = slow()
+    earlier = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as `nohup` leaves it
+
+    async def ended() -> float:
+        loop = asyncio.get_running_loop()
+        loop.call_later(1, signal.raise_signal, signal.SIGHUP)
+        loop.call_later(5, signal.raise_signal, signal.SIGTERM)
+        await terminable(run)
+        return loop.time()
+
+    try:
+        assert run_in_virtual_time(ended()) >= 5
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, earlier)
     assert machine.is_off
 
 
