@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -216,6 +216,22 @@ def write_folder(folder: str, files: Mapping[str, str | bytes]) -> tuple[str, ..
     return tuple(paths)
 
 
+def _listed(values: Iterable[object]) -> Iterator[str]:
+    """The texts among the values of a command's parameters: files, among others."""
+    for value in values:
+        if isinstance(value, str):
+            yield value
+        elif isinstance(value, tuple):
+            yield from _listed(value)
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    try:
+        return one.exists() and other.exists() and one.samefile(other)
+    except (OSError, ValueError):
+        return False
+
+
 def answer(
     command: str,
     format_: str,
@@ -237,9 +253,12 @@ def answer_all(
     from firable.nets.diagnostics import InputError
 
     written: Sequence[tuple[str, str]] = click.get_current_context().meta.get(_WRITTEN, ())
+    given = [Path(file) for file in map(str, _listed(click.get_current_context().params.values())) if file]
     for _, file in written:
         if file == "-":
             raise click.UsageError("--write is for files: what goes to standard output is named by --format")
+        if any(_is_same(Path(file), path) for path in given):
+            raise click.UsageError(f"--write {file} would overwrite what the command reads: name another file")
     reports: list[Report] = []
     errors: list[Diagnostic] = []
     as_text = format_ in {"text", "github"}

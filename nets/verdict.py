@@ -144,7 +144,8 @@ def held_to(expected: Iterable[Expectation], verdicts: Iterable[Verdict]) -> tup
     """
     from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
 
-    known = {verdict.name: verdict for verdict in verdicts}
+    given = tuple(verdicts)
+    known = {verdict.name for verdict in given}
     by_name = {one.verdict: one.status for one in expected}
     with_machines = any(map(_of_machines, known))
     unknown = [name for name in by_name if name not in known and _of_machines(name) is with_machines]
@@ -153,12 +154,12 @@ def held_to(expected: Iterable[Expectation], verdicts: Iterable[Verdict]) -> tup
             Diagnostic(
                 "F2030",
                 f"`expect` names the verdict '{name}', which is none of this net",
-                did_you_mean(name, list(known)) + "write the name as `firable check` prints it",
+                did_you_mean(name, sorted(known)) + "write the name as `firable check` prints it",
                 ("expect", name),
             )
             for name in unknown
         )
-    return tuple(replace(verdict, expected=by_name.get(name)) for name, verdict in known.items())
+    return tuple(replace(verdict, expected=by_name.get(verdict.name)) for verdict in given)
 
 
 def _of_machines(name: str) -> bool:

@@ -236,6 +236,8 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[tuple[str, ...], str, 
     yield from station(("departures", "station"), model.departures.station)
     for name, machine in model.machines.items():
         path = ("machines", name)
+        if name == "safe":
+            yield path, "'safe' is the verdict on accidents, and no name for a machine", "rename the machine"
         if machine.hand is not None and machine.hand not in machine.positions:
             yield (*path, "hand"), f"there is no position '{machine.hand}'", "see `positions` of the machine"
         for position, at in machine.positions.items():

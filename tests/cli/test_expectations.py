@@ -13,7 +13,7 @@ from firable.nets.catalogue import catalogue_path
 from firable.nets.interchange import net_digest, net_from_json, net_to_json
 from firable.nets.printing import format_net
 from firable.nets.text import parse_net
-from firable.nets.verdict import Expectation, Status
+from firable.nets.verdict import Expectation, Status, Verdict, Weight, held_to, overall
 
 LATE = catalogue_path("one_robot_mc_late").read_text("utf-8")
 KNOWN = ("deadlock-free", "property.no_deadlock", "property.restart")
@@ -118,3 +118,10 @@ def test_no_bundle_is_made_of_what_is_known_to_be_violated(tmp_path: Path, capsy
     assert main(["bundle", path, "-o", str(tmp_path / "cell.bundle")]) == 1
     assert not (tmp_path / "cell.bundle").exists()
     capsys.readouterr()
+
+
+def test_no_verdict_is_lost_where_two_have_one_name() -> None:
+    one = Verdict("fault.safe", Status.VIOLATED, "no accident", "by hand")
+    other = Verdict("fault.safe", Status.VIOLATED, "it goes on", "by hand", Weight.INFORMATION)
+    assert held_to((), (one, other)) == (one, other)
+    assert overall(held_to((), (one, other))) is Status.VIOLATED

@@ -201,6 +201,13 @@ def test_reports_are_written_to_files_beside_what_is_printed(here: Path, capsys:
     assert json.loads((here / "out.json").read_text("utf-8"))["exit_code"] == 1
 
 
+def test_no_report_is_written_over_what_is_read(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for file in ("safe.firable.yaml", str(here / "nets/../safe.firable.yaml")):
+        assert main(["check", "safe.firable.yaml", "--write", "json", file]) == 2
+        assert "would overwrite what the command reads" in capsys.readouterr().err
+    assert (here / "safe.firable.yaml").read_text("utf-8") == SAFE
+
+
 def test_a_report_cannot_be_written_beside_the_printed_one_on_standard_output(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

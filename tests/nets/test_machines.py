@@ -156,6 +156,12 @@ def test_a_plant_that_does_not_fit_the_net_is_refused() -> None:
     assert {problem.code for problem in refusal.value.diagnostics} == {"F5003"}
 
 
+def test_no_machine_has_the_name_of_the_verdict_on_accidents() -> None:
+    text = catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
+    with pytest.raises(InputError, match=r"F5003.*'safe' is the verdict on accidents"):
+        parse_plant(text.replace("\n  MC:\n", "\n  safe:\n"), "cell.plant.yaml")
+
+
 def test_a_firing_with_more_outcomes_than_the_loop_can_tell_apart_is_refused() -> None:
     machines = "".join(
         f"  M{i}:\n    commands:\n      GO: {{does: clamp, station: table, takes_s: 1}}\n" for i in range(13)
