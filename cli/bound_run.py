@@ -99,13 +99,14 @@ def _verdict(report: RunReport, bind: str) -> Verdict:
     from firable.nets.verdict import Status, Verdict
 
     went_wrong = report.state not in {State.STOPPED, State.HELD}
-    held = report.state is State.HELD
+    # An emergency stop is no failure of the cell, and nothing that a service manager may take for an end in order.
+    unsettled = report.state is State.HELD or report.situation.is_emergency
     return Verdict(
         "ran-until-stopped",
-        Status.VIOLATED if went_wrong else Status.UNKNOWN if held else Status.PROVED,
+        Status.VIOLATED if went_wrong else Status.UNKNOWN if unsettled else Status.PROVED,
         "the cell runs until it is stopped",
         f"run on the machines of {bind}",
-        bound=report.situation.message if held else "",
+        bound=report.situation.message if unsettled else "",
         hint=f"{report.state}: {report.situation.message}" if went_wrong else "",
         subjects=tuple(map(str, report.situation.blocked)) if went_wrong else (),
     )

@@ -35,7 +35,7 @@ def situation(run: Host) -> Situation:
     if run.fault:
         return Situation(State.FAULT, run.marking, waiting, run.fault)
     if run.stopping:
-        return Situation(State.STOPPED, run.marking, waiting, run.ended_by or others)
+        return Situation(State.STOPPED, run.marking, waiting, run.ended_by or others, run.is_emergency)
     if run.taking_up is not None:
         held = restart.told(run, run.taking_up)
         return Situation(State.HELD, run.marking, (), "; ".join(filter(None, (held, others))))

@@ -133,6 +133,8 @@ class Host:
         """Whether a stop has waited long enough for what is open."""
         self.left_nothing_open = False
         self.ended_by = ""
+        self.is_emergency = False
+        """Whether there was an emergency stop."""
         self.fault = ""
         self.patience = patience or Patience()
         self.turn = 0
@@ -249,7 +251,7 @@ class Host:
     def emergency_stop(self, reason: str) -> None:
         """Drive the safe outputs at once, before anything is written or said; the run ends, and can be taken up."""
         self.make_safe()
-        self.ended_by = f"emergency stop: {reason}"
+        self.ended_by, self.is_emergency = f"emergency stop: {reason}", True
         self._end_soon("emergency stop", reason=reason)
 
     def commanded(self, command: str, by: str) -> None:

@@ -67,8 +67,8 @@ class Log:
             self._tell(LEVELS.get(event.note, logging.INFO), event.note, {"at": event.at_seconds, **event.data})
 
     def ended(self, situation: Situation) -> None:
-        """The host has ended; where that is no stop, what waited for what stands there."""
-        wrong = situation.state not in (State.DONE, State.STOPPED)
+        """The host has ended; where nobody wanted that, what waited for what stands there."""
+        wrong = situation.is_emergency or situation.state not in (State.DONE, State.STOPPED)
         data = {"state": situation.state.value, "message": situation.message, "marking": list(situation.marking)}
         blocked = {"blocked": list(map(str, situation.blocked))} if wrong else {}
         self._tell(logging.ERROR if wrong else logging.INFO, "ended", {**data, **blocked})

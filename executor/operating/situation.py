@@ -67,6 +67,8 @@ class Situation:
     marking: tuple[str, ...]
     blocked: tuple[Blocked, ...] = ()
     message: str = ""
+    is_emergency: bool = False
+    """Whether it is an emergency stop that has ended the run, and no stop that somebody wanted to come."""
 
     def __str__(self) -> str:
         lines = [f"{self.state}: {self.message}" if self.message else str(self.state)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import signal
 import subprocess
@@ -120,7 +121,8 @@ def test_open_contact_stops_the_machines_of_its_controller_and_the_run_stays_sto
 ) -> None:
     bind, trace, journal = tmp_path / "cell.bind.yaml", tmp_path / "trace", tmp_path / "journal"
     bind.write_text(BINDING.format(port=lamp.end.port))
-    mine = [bundle, "--bind", str(bind), "--journal", str(journal)]
+    log = tmp_path / "log"
+    mine = [bundle, "--bind", str(bind), "--journal", str(journal), "--log", str(log)]
     at = f"tcp/127.0.0.1:{free_port()}"
     if coordinator != "in the same process":
         mine += ["--controller", "a", "--join", at]
@@ -139,16 +141,20 @@ def test_open_contact_stops_the_machines_of_its_controller_and_the_run_stays_sto
         until(lambda: len(lamp.machine.outputs) == 2, "the safe outputs")
         lamp.show("button", value=True)
         said, _ = processes[0].communicate(timeout=60)
-        assert processes[0].returncode in {0, 3}, said
+        assert processes[0].returncode == 3, said
         assert "emergency stop: plc: 'button' is open" in said
         assert (lamp.machine.outputs, len(lamp.machine.orders)) == ([False, False], 1)
         notes = [event for event in read_trace(trace).events if isinstance(event, Noted)]
         assert [note.data["reason"] for note in notes if note.note == "emergency stop"] == ["plc: 'button' is open"]
+        told = [json.loads(line) for line in log.read_text().splitlines()]
+        levels = {line["event"]: line["level"] for line in told}
+        assert (levels["emergency stop"], levels["ended"]) == ("error", "error")
         # Started again with the button pressed it ends at once, whatever the operator says.
         lamp.show("button", value=False)
         again = started(*mine, "--resume")
         processes.append(again)
         said, _ = again.communicate(timeout=60)
+        assert again.returncode == 3, said
         assert "emergency stop: plc: 'button' is open" in said
         assert len(lamp.machine.orders) == 1
     finally:
