@@ -51,7 +51,8 @@ def rehearse(
     """Run the controllers and the coordinator of NET many times, through faults that a seed draws.
 
     The machines of the protocol are those that run the cell; network, disks, clocks, machines and operator are
-    simulated. Messages are lost and overtaken, processes killed and restarted, writes lost, machines late. Each run
+    simulated. Parts that a bundle of NET would run free of promise are free here, too; of a bundle, as it says.
+    Messages are lost and overtaken, processes killed and restarted, writes lost, machines late. Each run
     must be a trace of NET with every command sent once, and must go on when everything is mended in the end. A run
     that fails is made shorter and printed as the command that brings it back.
 
@@ -116,17 +117,18 @@ def _report(argument: str, runs: Sequence[Run], jobs: int, is_text: bool) -> Rep
 
 @cache
 def _subjects(argument: str) -> Callable[[int], Subject]:
-    """What a seed is tried on: the net of the argument, or one that is drawn."""
+    """What a seed is tried on: the net of the argument as its bundle would run, or one that is drawn."""
     from firable.decompose.splitting.cut import split
+    from firable.decompose.splitting.persistence import freed
     from firable.executor.simulation.drawn import DRAWN
     from firable.executor.simulation.judge import Subject
 
     if argument in DRAWN:
-        drawn = cache(lambda number: Subject(split(DRAWN[argument](number))))
+        drawn = cache(lambda number: Subject(freed(split(DRAWN[argument](number)))))
         return lambda seed: drawn(seed // _SEEDS_PER_NET)
     loaded = load_net(argument)
     with loaded.placing():
-        subject = Subject(split(loaded.net))
+        subject = Subject(loaded.decomposition or freed(split(loaded.net)))
     return lambda _: subject
 
 

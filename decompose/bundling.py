@@ -11,7 +11,7 @@ on all of it goes along, so that the bundle can be checked again without anythin
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -25,7 +25,7 @@ from firable.decompose.protocol.outages import sealed_outages
 from firable.decompose.protocol.shown import proved_without_exploring
 from firable.decompose.refinement.sealing import Origin, sealed
 from firable.decompose.splitting.cut import split
-from firable.decompose.splitting.persistence import Persistence, persistence
+from firable.decompose.splitting.persistence import persistence
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.machines.plant_file import parse_plant
@@ -77,7 +77,7 @@ def make_bundle(
     found = persistence(decomposition, report.space)
     voted, shown = found.with_evidence()
     if not protocol and not faults:
-        decomposition = replace(decomposition, free=_free(found, voted))
+        decomposition = replace(decomposition, free=found.free_as_shown(voted))
     document = evidence_of_report(report, (), _anew(limits, seconds))
     named = {record.name for record in document.records if not record.lacking}
     on_the_net = (replace(v, evidence=(*v.evidence, EVIDENCE)) if v.name in named else v for v in report.verdicts)
@@ -103,16 +103,6 @@ def _anew(limits: Limits | None, seconds: float | None) -> Limits:
     """So many seconds from now on, and the memory of these limits."""
     deadline = NEVER if seconds is None else Deadline.after(seconds)
     return Limits(deadline) if limits is None else replace(limits, deadline=deadline)
-
-
-def _free(found: Persistence, verdicts: Iterable[Verdict]) -> tuple[tuple[str, str], ...]:
-    """The parts that may leave out the promise, as far as the bundle shows it."""
-    may = set(found.free_of_promise)
-    return tuple(
-        (vote.transition, vote.controller)
-        for vote, verdict in zip(found.votes, verdicts, strict=True)
-        if vote.part in may and (verdict.evidence or not vote.accused)
-    )
 
 
 def _unbundled(problem: Diagnostic, lacking: Mapping[str, str]) -> Diagnostic:

@@ -16,6 +16,7 @@ from typing import Final
 from firable.nets import pnml, text
 from firable.nets.archive import SIGNATURE
 from firable.nets.bundle import read_bundle
+from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Net
 from firable.nets.text_positions import Positions
@@ -28,13 +29,15 @@ TEXT_SUFFIXES: Final = frozenset({".yaml", ".yml"})
 class Loaded:
     """A net, what of its file it does not carry (nothing, for a net file), and where its parts stand in the file.
 
-    `renamed` holds the names that the net has for identifiers of a PNML file that are no names here.
+    `renamed` holds the names that the net has for identifiers of a PNML file that are no names here; `decomposition` is
+    what a bundle says of it.
     """
 
     net: Net
     notes: tuple[Diagnostic, ...] = ()
     positions: Positions | None = None
     renamed: Mapping[str, str] = field(default_factory=dict)
+    decomposition: Decomposition | None = None
 
     @contextmanager
     def placing(self) -> Generator[None]:
@@ -54,7 +57,8 @@ def load(path: str | Path) -> Loaded:
     """
     head = _head(path)
     if head.startswith(SIGNATURE):
-        return Loaded(read_bundle(path).net)
+        bundle = read_bundle(path)
+        return Loaded(bundle.net, decomposition=bundle.decomposition)
     suffix = Path(path).suffix.lower()
     if suffix in PNML_SUFFIXES or (suffix not in TEXT_SUFFIXES and _looks_like_xml(head)):
         imported = pnml.read_pnml(path)

@@ -45,7 +45,7 @@ Rejected: the reference player over all markings, which is quick to write, has n
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Event
 from typing import Any, Final
@@ -119,6 +119,15 @@ class Persistence:
         may = set(undisturbing(self.decomposition))
         return tuple(part for part in persistent if part in may)
 
+    def free_as_shown(self, verdicts: Iterable[Verdict]) -> tuple[tuple[str, str], ...]:
+        """The parts that may leave out the promise as far as these verdicts, with their evidence, show it."""
+        may = set(self.free_of_promise)
+        return tuple(
+            (vote.transition, vote.controller)
+            for vote, verdict in zip(self.votes, verdicts, strict=True)
+            if vote.part in may and (verdict.evidence or not vote.accused)
+        )
+
     def evidence(self, limits: Limits | None = None) -> Document:
         """The document on every verdict that some marking could refute; the other ones need no more than the arcs.
 
@@ -167,6 +176,18 @@ def persistence(
     one.decide(open_)
     verdicts = tuple(one.found.get(vote.part) or _by_structure(vote) for vote in cast)
     return Persistence(decomposition, cast, verdicts, one.space, one.findings)
+
+
+def freed(decomposition: Decomposition) -> Decomposition:
+    """The decomposition as a bundle of its net would have it run: the parts free of promise of which that is shown.
+
+    >>> from firable.decompose.splitting.cut import split
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> len(freed(split(catalogue_net("one_robot"))).free)
+    15
+    """
+    found = persistence(decomposition)
+    return replace(decomposition, free=found.free_as_shown(found.with_evidence()[0]))
 
 
 def nonpersistent(decomposition: Decomposition) -> dict[str, list[str]]:

@@ -1,6 +1,7 @@
 """`firable rehearse`: what it says of runs that pass and of one that fails, and the mistakes of its users."""
 
 import json
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -8,8 +9,13 @@ import jsonschema
 import pytest
 
 import firable.executor.simulation.campaign
+from firable.analysis.check import check
 from firable.cli.main import main
+from firable.cli.rehearse import _subjects
+from firable.decompose.bundling import make_bundle
 from firable.executor.simulation.world import Machines
+from firable.nets.bundle import write_bundle
+from firable.nets.catalogue import catalogue_net
 from firable.nets.net import Net, Place, Transition
 from firable.nets.pnml_writer import write_pnml
 
@@ -57,6 +63,18 @@ def test_a_run_that_fails_is_shown_with_its_last_steps_and_the_command_that_brin
     out = told(capsys)
     assert "the last steps:" in out
     assert command in out
+
+
+def test_what_is_rehearsed_is_what_a_bundle_of_the_net_runs(tmp_path: Path) -> None:
+    net = catalogue_net("one_robot")
+    made = make_bundle(check(net))
+    assert made.decomposition.free
+    write_bundle(tmp_path / "cell.bundle", made)
+    assert _subjects("catalogue:one_robot")(0).decomposition == made.decomposition
+    promising = replace(made, decomposition=replace(made.decomposition, free=()))
+    write_bundle(tmp_path / "promising.bundle", promising)
+    for name, bundle in (("cell", made), ("promising", promising)):
+        assert _subjects(str(tmp_path / f"{name}.bundle"))(0).decomposition == bundle.decomposition
 
 
 def test_a_kind_of_fault_that_there_is_not_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,6 +11,7 @@ from support.planted_times import PLANTED_TIMES, PROVOKED_TIMES
 from support.timed_nets import TWO_TIMES
 
 from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.persistence import freed
 from firable.executor.simulation.campaign import Campaign, Failed, Passed, Run, campaign, rehearse, shrunk
 from firable.executor.simulation.clock import Clock
 from firable.executor.simulation.drawn import DRAWN
@@ -68,6 +69,33 @@ def test_runs_of_drawn_nets_through_faults_are_traces_of_them_and_go_on() -> Non
 @pytest.mark.seeds
 def test_runs_of_drawn_nets_in_layers_through_faults_are_traces_of_them_and_go_on() -> None:
     done = campaign(lambda seed: drawn(seed // 10, "drawn-layered"), map(Run, seeds(200)))
+    assert not done.failed, shown(done)
+
+
+@cache
+def free_in(name: str) -> Subject:
+    """A cell with the parts free of promise that are so in its bundle."""
+    return Subject(freed(split(catalogue_net(name))))
+
+
+@cache
+def drawn_free(number: int, family: str) -> Subject:
+    return Subject(freed(split(DRAWN[family](number))))
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("name", ["one_robot", "two_robots_shared", "one_robot_timed"])
+def test_runs_of_a_cell_with_free_parts_are_traces_of_it_and_go_on(name: str) -> None:
+    done = campaign(lambda _: free_in(name), map(Run, seeds(60)))
+    assert free_in(name).decomposition.free
+    assert not done.failed, shown(done)
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("family", DRAWN)
+def test_runs_of_drawn_nets_with_free_parts_are_traces_of_them_and_go_on(family: str) -> None:
+    done = campaign(lambda seed: drawn_free(seed // 10, family), map(Run, seeds(120)))
+    assert any(drawn_free(number, family).decomposition.free for number in range(12))
     assert not done.failed, shown(done)
 
 
