@@ -5,6 +5,7 @@ from functools import cache
 
 import pytest
 from support import free_parts as planted
+from support.examples import FIRST_SEED
 from support.free_parts import GATE_CLOSED, GATE_PROMISED, OUTPUT_READ, freed, parts_of
 from support.gated_nets import GATE_READ_AGAIN
 from support.local_tie import LocalTie
@@ -22,7 +23,8 @@ from firable.executor.protocol.messages import (
     ToCoordinator,
     VoteRequest,
 )
-from firable.executor.simulation.exploring import Budget, Explorer, NotATraceError, explore
+from firable.executor.simulation.drawn import DRAWN
+from firable.executor.simulation.exploring import Budget, Explorer, NotATraceError, explore, wander
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Net
@@ -44,6 +46,23 @@ def test_every_act_with_free_parts_is_some_actions_of_the_proof(name: str, budge
     assert tie.actions["stand"] > 0
     assert tie.actions["apply-free"] > 0
     assert space.complete or budget != Budget()
+
+
+def larger() -> dict[str, Decomposition]:
+    cells = {name: freed(split(catalogue_net(name))) for name in ("one_robot", "two_robots_shared", "one_robot_timed")}
+    drawn = {f"{family}-{seed}": freed(split(DRAWN[family](seed))) for family in DRAWN for seed in range(2)}
+    return {**cells, **drawn}
+
+
+@pytest.mark.seeds
+def test_on_ways_through_larger_nets_with_free_parts_every_act_is_some_actions_of_the_proof() -> None:
+    met: Counter[str] = Counter()
+    for name, decomposition in larger().items():
+        tie = LocalTie(decomposition)
+        wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 70, tie)
+        assert tie.actions["stand"] > 0 or not decomposition.free, name
+        met += tie.actions
+    assert met["apply-free"] > 0
 
 
 FAULTS: list[tuple[type, str, Budget]] = [

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from functools import cache
 
 import pytest
+from support import free_parts
 from support.examples import seeds
 from support.gated_nets import GATE_MOVED_BY_A_LOCAL, GATE_READ_AGAIN
 from support.planted import PLANTED, PROVOKED_BY, DecidesEarly, IgnoresPause, KeepsNoPromise
@@ -20,6 +21,7 @@ from firable.executor.simulation.judge import Subject
 from firable.executor.simulation.recovery import recover
 from firable.executor.simulation.world import Machines, World
 from firable.nets.catalogue import catalogue_net
+from firable.nets.net import Net
 from firable.semantics.replaying import replay
 
 CELLS = ["one_robot", "one_robot_mc_late", "two_robots_separate", "two_robots_shared"]
@@ -97,6 +99,34 @@ def test_runs_of_drawn_nets_with_free_parts_are_traces_of_them_and_go_on(family:
     done = campaign(lambda seed: drawn_free(seed // 10, family), map(Run, seeds(120)))
     assert any(drawn_free(number, family).decomposition.free for number in range(12))
     assert not done.failed, shown(done)
+
+
+FREE_FAULTS: list[tuple[Machines, tuple[str, ...]]] = [
+    (Machines(coordinator=free_parts.CountsEarlierEpochs), ("crash", "delay", "duplication", "slow")),
+    (Machines(coordinator=free_parts.CountsUsedVotes), ()),
+    (Machines(coordinator=free_parts.CountsOlderReports), ("duplication", "reordering", "delay")),
+    (Machines(controller=free_parts.VotesOnWhatIsNotKept), ("crash",)),
+    (Machines(controller=free_parts.AppliesFreePartsTwice), ("duplication",)),
+    (Machines(controller=free_parts.AcknowledgesBeforeItObeys), ()),
+]
+
+
+@pytest.mark.parametrize(("machines", "kinds"), FREE_FAULTS, ids=[str(i) for i in range(len(FREE_FAULTS))])
+def test_planted_fault_of_free_parts_is_found(machines: Machines, kinds: tuple[str, ...]) -> None:
+    subjects = (Subject(freed(split(free_parts.SLOWLY_BACK))), free_in("two_robots_shared"))
+    for seed in range(FOUND_WITHIN):
+        if isinstance(rehearse(subjects[seed % 2], Run(seed, kinds), machines), Failed):
+            return
+    pytest.fail("not found")
+
+
+@pytest.mark.parametrize("net", [free_parts.CLOSED_AGAIN, free_parts.OUTPUT_READ], ids=["closed", "read"])
+def test_part_that_is_free_and_may_not_be_is_found(net: Net) -> None:
+    subject = Subject(free_parts.parts_of(split(net), "t1-11"))
+    found = (rehearse(subject, Run(seed)) for seed in range(FOUND_WITHIN))
+    assert any(isinstance(each, Failed) for each in found)
+    rightly = Subject(freed(split(net)))
+    assert not any(isinstance(rehearse(rightly, Run(seed)), Failed) for seed in range(30))
 
 
 @pytest.mark.seeds

@@ -10,7 +10,7 @@ from firable.executor.protocol.controller import Above, LocalController
 from firable.executor.protocol.coordinator import Coordinator, Round
 from firable.executor.protocol.messages import Acknowledgement, Decision, Effect, Readiness
 from firable.nets.decomposition import Decomposition
-from firable.nets.net import Controller, Net, Place, Transition
+from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 
 
 def _net(marked: str, *transitions: Transition) -> Net:
@@ -29,6 +29,30 @@ GATE_PROMISED = _net(
     Transition("H", ("a.g", "b.s"), ("b.t",)),
 )
 """The yes of `t1-11` is not persistent: `H` takes what it reads, and is promised before it fires."""
+
+
+_SLOW = _net(
+    "a.p b.p",
+    Transition("G", ("a.p", "b.p"), ("a.q", "b.q")),
+    Transition("la", ("a.q",), ("a.p",)),
+    Transition("lb", ("b.q",), ("b.p",)),
+)
+SLOWLY_BACK = replace(
+    _SLOW,
+    signals=(Signal("a.s", "a"),),
+    transitions=tuple(
+        replace(t, external=(ExternalGate("a.s", wanted=True),)) if t.name == "la" else t for t in _SLOW.transitions
+    ),
+)
+"""Both votes on `G` stand; `a` waits for a sensor before it votes again, and a vote of before comes late."""
+CLOSED_AGAIN = _net(
+    "a.g b.p",
+    Transition("G", ("b.p",), ("b.q",), ("a.g",)),
+    Transition("l", ("a.g",), ("a.h",)),
+    Transition("l-back", ("a.h",), ("a.g",)),
+    Transition("b-back", ("b.q",), ("b.p",)),
+)
+"""The yes of `t1-11` is not persistent: `l` closes the gate that it reads, again and again."""
 
 
 def parts_of(decomposition: Decomposition, *names: str) -> Decomposition:
