@@ -88,8 +88,10 @@ class BoundDriver:
             for task in done:
                 task.result()
         finally:
-            self.stop()
-            await uninterrupted(self._stopped(tasks))
+            try:
+                self.stop()
+            finally:  # whatever became of the notes
+                await uninterrupted(self._stopped(tasks))
 
     async def _stopped(self, tasks: Sequence[asyncio.Task[None]]) -> None:
         """Wait until each device is safe or has had its time, and tell of those that are not."""
@@ -154,8 +156,11 @@ class BoundDriver:
         """Drive the safe outputs of every device that can be reached; the others have their watchdogs."""
         if not self.is_stopped:
             self.is_stopped = True
+            left = [device for device in self.devices.values() if device.is_out_of_reach]
             for device in self.devices.values():
-                device.stop()
+                device.kept.stop()
+            for device in left:  # only now: who is told may fail, or take its time
+                device.note("not connected: the stop is left to its watchdog until it is reached again")
 
     def emergency_stop(self, reason: str) -> None:
         """Drive the safe outputs now, and only then tell of it."""
@@ -249,11 +254,10 @@ class _Device:
         self.forced.append(((point, value),))
         self.kept.awake.set()
 
-    def stop(self) -> None:
-        """Drive the safe outputs, and say so where that cannot be."""
-        if not self.kept.is_connected and (self.document.safe or self.document.heartbeat is not None):
-            self.note("not connected: the stop is left to its watchdog until it is reached again")
-        self.kept.stop()
+    @property
+    def is_out_of_reach(self) -> bool:
+        """Whether a stop cannot be written to it now, though it has something that stops it."""
+        return not self.kept.is_connected and bool(self.document.safe or self.document.heartbeat is not None)
 
     @property
     def is_writing(self) -> bool:

@@ -92,6 +92,16 @@ def with_hanging(ended: Situation, hanging: Collection[str]) -> Situation:
     return replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, message))))
 
 
+def with_failed(ended: Situation, driver: asyncio.Task[None]) -> Situation:
+    """The end of a run whose driver failed when it was to stop the machines: a fault, whatever it was before."""
+    if not driver.done() or driver.cancelled() or (error := driver.exception()) is None:
+        return ended
+    message = (
+        f"the driver failed at the end, {type(error).__name__}: {error}: look at the machines, they may not be safe"
+    )
+    return replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, message))))
+
+
 def is_home(run: Host) -> bool:
     """Whether the machines here are as at the beginning, and nothing is awaited, timed or promised.
 

@@ -170,7 +170,7 @@ class Host:
             ended = await self._outcome(self.outcome)
         finally:
             hanging = await ending.close(self, tasks)
-        ended = ending.with_hanging(ended, hanging)
+        ended = ending.with_failed(ending.with_hanging(ended, hanging), tasks[0])
         if self.left_nothing_open:
             self.recorder.end(self.now_seconds(), self.marking, ended.state.value)
         else:
@@ -379,8 +379,7 @@ class Host:
             self.fault = message
             self.make_safe()
             self._end_soon("fault", message=message)
-            if self.tell is not None:
-                self.tell("fault", message)
+            self._tell("fault", message)
 
     def make_safe(self) -> None:
         """Stop the driver: what it is handed from now on it drops, so nothing is, and no command counts as sent."""
@@ -427,5 +426,12 @@ class Host:
     def told(self, kind: str, sentence: str) -> None:
         """Have the trace tell something, and whoever follows the run."""
         self.note(kind, message=sentence)
+        self._tell(kind, sentence)
+
+    def _tell(self, kind: str, sentence: str) -> None:
+        """Tell who follows the run; one that cannot be told (a terminal that is gone) stops no stop on its way."""
         if self.tell is not None:
-            self.tell(kind, sentence)
+            try:
+                self.tell(kind, sentence)
+            except Exception as error:
+                self.note("untold", message=f"{type(error).__name__}: {error}", what=kind)

@@ -280,6 +280,60 @@ def test_a_driver_that_hangs_is_given_up_and_the_run_says_so() -> None:
     assert seconds == pytest.approx(1 + STOP_SECONDS, abs=0.2)
 
 
+class Failing(Machine):
+    """A machine whose driver fails on its way out."""
+
+    async def run(self, clock: Clock, listener: Listener) -> None:
+        try:
+            await super().run(clock, listener)
+        finally:
+            raise RuntimeError("a bug")
+
+
+def test_a_driver_that_fails_when_it_is_to_stop_the_machines_makes_the_end_a_fault() -> None:
+    async def main() -> None:
+        run, machine = run_of(MemoryJournal())
+        run.driver = failing = Failing([split(run.net).subnet("robot")], 1.0)
+        failing.sent = machine.sent
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(1)
+        run.stop()
+        ended = await ending
+        assert ended.state is State.FAULT
+        assert "the driver failed at the end, RuntimeError: a bug: look at the machines" in ended.message
+
+    run_in_virtual_time(main())
+
+
+@pytest.mark.parametrize(
+    ("act", "state"),
+    [
+        (lambda run: run.driver_note("R", "lost"), State.STOPPED),
+        (lambda run: run.driver_fault("R", "failed"), State.FAULT),
+    ],
+    ids=["note", "fault"],
+)
+def test_a_terminal_that_is_gone_ends_nothing_and_the_trace_tells_of_it(
+    act: Callable[[Host], object], state: State
+) -> None:
+    def gone(_kind: str, _sentence: str) -> None:
+        raise BrokenPipeError(32, "Broken pipe")
+
+    async def main() -> None:
+        run, machine = run_of(MemoryJournal())
+        run.tell = gone
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(1)
+        act(run)
+        run.stop()
+        assert (await ending).state is state
+        assert machine.is_stopped
+        assert isinstance(trace := run.recorder.stream, io.StringIO)
+        assert '"untold"' in trace.getvalue()
+
+    run_in_virtual_time(main())
+
+
 def test_a_second_ctrl_c_leaves_a_driver_that_hangs_no_more_than_a_moment() -> None:
     async def ended() -> tuple[State, float]:
         loop = asyncio.get_running_loop()

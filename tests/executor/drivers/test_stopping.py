@@ -46,3 +46,51 @@ def test_safe_outputs_are_driven_and_nothing_after_them(when: str, monkeypatch: 
 
     asyncio.run(main())
     assert written == ["output"]
+
+
+TWO = """{firable_bind: 1, cell: c, devices: {D: {driver: theirs, memory: gone, timeout_s: 0.1, retry_s: 0.02,
+safe: {output: false}}, E: {driver: theirs, memory: there, timeout_s: 0.5, safe: {output: false}}}}"""
+
+
+class Deaf(Heard):
+    """A listener that cannot be told anything from some time on: its terminal is gone."""
+
+    is_gone = False
+
+    def driver_note(self, machine: str, message: str) -> None:
+        if self.is_gone:
+            raise BrokenPipeError(32, "Broken pipe")
+        super().driver_note(machine, message)
+
+
+@pytest.mark.parametrize("who", ["operator", "cancelled"])
+def test_a_note_that_nobody_can_be_told_keeps_no_device_from_its_safe_outputs(
+    who: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP)
+    monkeypatch.setattr(kinds, "entry_points", lambda **_: [entry])
+    written: list[str] = []
+
+    async def main() -> None:
+        gone, there, heard = MemoryEnd("gone"), MemoryEnd("there"), Deaf()
+        await gone.start(lambda _, __: None)
+        await there.start(lambda point, _: written.append(point))
+        driver = BoundDriver(parse_binding(TWO), (), frozenset())
+        task = asyncio.create_task(driver.run(heard, heard))
+        for device in driver.devices.values():
+            await asyncio.wait_for(device.is_ready.wait(), 5)
+        await asyncio.sleep(0.02)
+        await gone.cut()
+        await asyncio.sleep(0.05)
+        written.clear()
+        heard.is_gone = True
+        if who == "operator":
+            with pytest.raises(BrokenPipeError):
+                driver.stop()
+        task.cancel()
+        await asyncio.wait((task,), timeout=5)
+        assert driver.devices["E"].kept.is_safe
+        assert isinstance(task.exception(), BrokenPipeError)
+
+    asyncio.run(main())
+    assert written == ["output"]
