@@ -34,6 +34,8 @@ from firable.executor.operating.situation import Situation
 from firable.nets.diagnostics import Diagnostic, InputError
 
 METRICS_CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
+SHUTDOWN_SECONDS: Final = 1.0
+"""So long what is being answered may take once the run is over; then the process ends, whatever a client does."""
 
 
 class Operated(Protocol):
@@ -101,7 +103,7 @@ async def serving(run: Operated, endpoint: Endpoint, figures: Callable[[], bytes
 
     Raises `InputError` F5061 where the address cannot be had.
     """
-    runner = web.AppRunner(application(run, endpoint, figures), access_log=None)
+    runner = web.AppRunner(application(run, endpoint, figures), access_log=None, shutdown_timeout=SHUTDOWN_SECONDS)
     await runner.setup()
     try:
         site = web.TCPSite(runner, endpoint.host, endpoint.port, ssl_context=endpoint.tls)

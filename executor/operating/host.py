@@ -265,8 +265,8 @@ class Host:
             self.dispatch.watch(place)
 
     async def quiet(self) -> None:
-        """Wait until nothing is posted."""
-        if not self.is_quiet and self.outcome is not None and not self.outcome.done():
+        """Wait until nothing is posted, or the run is over."""
+        if not self.is_quiet and self.outcome is not None and not self.is_over:
             waiter = asyncio.get_running_loop().create_future()
             self.quiet_waiters.append(waiter)
             await waiter
@@ -303,13 +303,13 @@ class Host:
     # Groups
 
     def _wake(self) -> None:
-        if not self.working and self.outcome is not None and not self.outcome.done():
+        if not self.working and self.outcome is not None and not self.is_over:
             self.working = True
             asyncio.get_running_loop().call_soon(self._work)
 
     def _work_now(self) -> None:
         """Do a group at once, unless one is about to be done."""
-        if not self.working and self.outcome is not None and not self.outcome.done():
+        if not self.working and self.outcome is not None and not self.is_over:
             self.working = True
             self._work()
 
@@ -341,10 +341,7 @@ class Host:
 
     def _settle(self) -> None:
         """At quiescence, wake who waits for it, and end the run if nothing will happen."""
-        for waiter in self.quiet_waiters:
-            if not waiter.done():
-                waiter.set_result(None)
-        self.quiet_waiters.clear()
+        self._release()
         if self.ends_at_home and not self.stopping and not self.paused and ending.is_home(self):
             self.ended_by = ending.AT_THE_END if self.is_whole else ""
             self._end_soon(ending.AT_THE_END)
@@ -357,6 +354,18 @@ class Host:
             self.acts.commit()
             self.left_nothing_open = self.acts.is_settled  # what comes while the link is closed is not heard
             self.outcome.set_result(ended)
+
+    def _release(self) -> None:
+        """Wake who waits for quiescence."""
+        for waiter in self.quiet_waiters:
+            if not waiter.done():
+                waiter.set_result(None)
+        self.quiet_waiters.clear()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it is known how the run has ended, if by an error."""
+        return self.outcome is not None and self.outcome.done()
 
     @property
     def is_quiet(self) -> bool:
@@ -416,6 +425,7 @@ class Host:
             self.outcome.set_exception(error)
             if self.log is not None:
                 self.log.broke(error)
+        self._release()  # no group will ever end for them
 
     def note(self, note: str, **data: str) -> None:
         """Have the trace tell something, durably."""

@@ -57,6 +57,8 @@ async def take_up(run: Host, found: TakingUp) -> None:
             if answer is Answer.UNKNOWN:
                 run.told("held", f"nobody knows what became of the command of '{place}': look, and --say it")
     await run.quiet()
+    if run.is_over:  # by an error: nothing is resumed any more
+        return
     found.is_final = True
     if not found.resume or run.paused or not run.resume():  # paused: as it is after a stop or a fault, too
         for name, controller in run.controllers.items():

@@ -25,7 +25,7 @@ async def step(run: Host) -> str | None:
     before = dict(run.recorder.firings)
     names = [*run.coordinators, *run.controllers]
     for name in names[run.turn :] + names[: run.turn]:
-        if not run.paused or run.stopping:
+        if not run.paused or run.stopping or run.is_over:
             return None
         if name in run.controllers:
             run.acts.fire(name)
@@ -44,7 +44,7 @@ async def _commit_one(run: Host, name: str) -> None:
     run.acts.act(name, coordinator.permit(1))
     await run.quiet()
     end = loop.time() + VOTES_SECONDS
-    while any(not one.decided for one in coordinator.rounds.values()) and loop.time() < end:
+    while any(not one.decided for one in coordinator.rounds.values()) and loop.time() < end and not run.is_over:
         await asyncio.sleep(0.01)  # votes of other hosts are on their way
     if run.paused:
         run.acts.act(name, coordinator.permit(0))

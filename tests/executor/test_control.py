@@ -7,6 +7,7 @@ import datetime
 import re
 import ssl
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -218,6 +219,25 @@ def test_files_that_are_no_certificate_are_one_clear_error(tmp_path: Path) -> No
     with pytest.raises(InputError) as caught:
         tls_context(str(broken), str(broken), None)
     assert caught.value.diagnostics[0].code == "F5062"
+
+
+def test_an_answer_that_takes_for_ever_does_not_keep_the_process_when_the_run_is_over() -> None:
+    class Stepping(Told):
+        async def step(self) -> str | None:
+            self.log.append("step")
+            await asyncio.Event().wait()
+            return None
+
+    async def main() -> None:
+        run = Stepping()
+        async with serving(run, Endpoint("127.0.0.1", 0, TOKEN), bytes) as url, ClientSession() as session:
+            asked = asyncio.create_task(session.post(f"{url}/step", headers=BEARER).__aenter__())
+            while "step" not in run.log:
+                await asyncio.sleep(0.01)
+        with suppress(ClientError, asyncio.CancelledError):
+            await asked
+
+    asyncio.run(asyncio.wait_for(main(), 20))
 
 
 def test_when_the_run_is_over_nobody_answers() -> None:

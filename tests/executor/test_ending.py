@@ -120,6 +120,49 @@ def test_an_error_ends_the_run_and_stops_the_machines_even_where_its_caller_swal
     run_in_virtual_time(main())
 
 
+async def stepped(run: Host) -> str | None:
+    """As the endpoint of an operator does it."""
+    run.commanded("step", "token")
+    return await run.step()
+
+
+def test_a_disk_that_fails_during_a_step_ends_the_step_with_the_run_and_commands_nothing() -> None:
+    async def main() -> None:
+        journal = Filling()
+        run, machine = run_of(journal)
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(0.5)
+        run.pause()
+        await asyncio.sleep(0.5)
+        sent = list(machine.sent)
+        journal.is_full = True
+        fired = asyncio.create_task(stepped(run))
+        with pytest.raises(InputError, match="full"):
+            await asyncio.wait_for(ending, 5)
+        assert await asyncio.wait_for(fired, 1) is None
+        assert machine.sent == sent
+        assert not run.quiet_waiters
+
+    run_in_virtual_time(main())
+
+
+def test_a_disk_that_fails_while_a_run_is_taken_up_resumes_nothing() -> None:
+    journal = Filling()
+    journal.of = crashed().of
+    run, machine = run_of(journal, resume=True)
+
+    async def main() -> None:
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(0.5)
+        journal.is_full = True
+        with pytest.raises(InputError, match="full"):
+            await asyncio.wait_for(ending, 5)
+        assert run.taking_up is not None
+        assert machine.sent == []
+
+    run_in_virtual_time(main())
+
+
 def crashed() -> MemoryJournal:
     """The journal of a run that has crashed when its command was issued."""
     journal = MemoryJournal()
