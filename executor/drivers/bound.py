@@ -94,7 +94,7 @@ class BoundDriver:
                 await uninterrupted(self._stopped(tasks))
 
     async def _stopped(self, tasks: Sequence[asyncio.Task[None]]) -> None:
-        """Wait until each device is safe or has had its time, and tell of those that are not."""
+        """Wait until each device is safe or has had its time, and tell of those that are not; raises a mistake."""
         stopping = [asyncio.create_task(device.kept.stopped.wait()) for device in self.devices.values()]
         longest = max((device.document.timeout_s for device in self.devices.values()), default=0.0)
         if stopping:
@@ -103,6 +103,9 @@ class BoundDriver:
         for device in self.devices.values():
             if not device.kept.is_safe:
                 device.note("has not confirmed its safe outputs: they are left to its watchdog")
+        for device in self.devices.values():
+            if device.kept.error is not None:
+                raise device.kept.error
 
     def send(self, place: Place, entry: int) -> None:
         """Send the command of a place, or keep it until its device is connected."""
@@ -307,6 +310,13 @@ class _Device:
         if why != self.noted and not self.driver.is_stopped:
             self.noted = why
             self.note(f"not connected: {why}")
+
+    def broken(self, error: Exception) -> None:
+        """Its driver has made a mistake: all devices are stopped, and the run ends."""
+        try:
+            self._fault(f"its driver has failed, {type(error).__name__}: {error}")
+        finally:
+            self.driver.stop()
 
     def next_writes(self) -> Writes | None:
         """What is to be written now."""

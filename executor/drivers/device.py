@@ -16,7 +16,7 @@ import logging
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
@@ -25,6 +25,9 @@ Point = str
 
 Value = bool | int | float | str
 """What a point holds. A text that means a number or a truth value counts as that (`as_bit`, `as_number`)."""
+
+DIGITS_MAX: Final = 20
+"""A text of more digits is no number of a device: 64 bits have no more."""
 
 Writes = Sequence[tuple[Point, Value]]
 """Values for points; a device takes them in this order."""
@@ -128,13 +131,16 @@ def as_bit(value: Value) -> bool | None:
 def as_number(value: Value) -> int | None:
     """The whole number that a point shows, or None where it shows none.
 
-    >>> [as_number(value) for value in (7, "7", 7.0, True, "x", 7.5)]
-    [7, 7, 7, None, None, None]
+    A text of more digits than any counter has (`DIGITS_MAX`) shows none.
+
+    >>> [as_number(value) for value in (7, "7", 7.0, True, "x", 7.5, "7" * 5000)]
+    [7, 7, 7, None, None, None, None]
     """
     if isinstance(value, bool):
         return None
     if isinstance(value, str):
-        return int(value) if value.strip().isascii() and value.strip().isdigit() else None
+        digits = value.strip()
+        return int(digits) if len(digits) <= DIGITS_MAX and digits.isascii() and digits.isdigit() else None
     if isinstance(value, float):
         return int(value) if value.is_integer() else None
     return value

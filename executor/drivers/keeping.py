@@ -9,6 +9,10 @@ still to be sent.
 A stop breaks off what is being written, if it is not confirmed at once, and makes new connections until the device has
 confirmed the safe outputs, or has had its time.
 
+An error that is no failure of a link is a mistake, in a library or in what is served here. It ends the run, and this
+device is stopped as any other: over a new connection of which nothing is taken, since what it shows may be what nobody
+can deal with.
+
 While the cell runs, the safe outputs are not driven on a *later* connection. What the machines do while the line is
 down is for the device's own watchdog, which knows of it in time; a driver that is back after a second would stop a
 machine that did its work.
@@ -93,10 +97,39 @@ class Served(Protocol):
         """The device has confirmed that."""
         ...
 
+    def broken(self, error: Exception) -> None:
+        """Something is wrong that is no failure of a link: nothing is served any more, and the device is stopped."""
+        ...
+
     @property
     def is_writing(self) -> bool:
         """Whether something that is to be written has not been confirmed."""
         ...
+
+
+class Nobody:
+    """What a connection is for that is made for the safe outputs alone: for nothing else."""
+
+    is_writing = False
+
+    def read(self, batch: Sequence[tuple[Point, Value]]) -> None:
+        """Take nothing."""
+
+    def ready(self) -> None:
+        """Tell nobody."""
+
+    def lost(self, why: str) -> None:
+        """Tell nobody."""
+
+    def next_writes(self) -> Writes | None:
+        """Write nothing."""
+        return None
+
+    def written(self) -> None:
+        """Tell nobody."""
+
+    def broken(self, error: Exception) -> None:
+        """Tell nobody."""
 
 
 class Kept:
@@ -120,6 +153,8 @@ class Kept:
         self.is_safe = not self.safe
         """Whether the device has confirmed the safe outputs of the stop, where it has any."""
         self.stopping = False
+        self.error: Exception | None = None
+        """What ended the serving, and was no failure of a link."""
         self.writing: asyncio.Timeout | None = None
         """Around a command that is being written: a stop breaks it off."""
         self.stopped = asyncio.Event()
@@ -129,19 +164,44 @@ class Kept:
         self.alive_value: Value | None = None
 
     async def run(self) -> None:
-        """Keep the device connected; ends when it is stopped, and safe as far as it can be reached in time."""
+        """Keep the device connected; ends when it is stopped, and safe as far as it can be reached in time.
+
+        Only then it raises what was no failure of a link.
+        """
         try:
-            await self._keep()
+            try:
+                await self._keep()
+            except Exception as error:
+                self._break(error)
             with suppress(TimeoutError):
                 async with asyncio.timeout(2 * self.document.timeout_s):
                     while not self.is_safe:
                         try:
                             await self._connected()
                         except _FAILURES as error:
-                            self.served.lost(str(error) or "no answer in time")
+                            self._lost(error)
+                            await asyncio.sleep(self.document.retry_s)
+                        except Exception as error:
+                            self._break(error)
                             await asyncio.sleep(self.document.retry_s)
         finally:
             self.stopped.set()
+        if self.error is not None:
+            raise self.error
+
+    def _lost(self, error: Exception) -> None:
+        try:
+            self.served.lost(str(error) or "no answer in time")
+        except Exception as mistake:
+            self._break(mistake)
+
+    def _break(self, error: Exception) -> None:
+        """Serve nobody any more, and stop; who was served is told in a turn of its own: what fails there is no harm."""
+        self.stopping = True
+        if self.error is None:
+            self.error = error
+            served, self.served = self.served, Nobody()
+            asyncio.get_running_loop().call_soon(served.broken, error)
 
     async def _keep(self) -> None:
         pause_s = self.document.retry_s

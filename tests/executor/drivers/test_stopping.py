@@ -1,15 +1,17 @@
 """A stop reaches the machines: after a link that was lost, over a write in flight, and however often it is said."""
 
 import asyncio
+from collections.abc import Sequence
 from importlib.metadata import EntryPoint
 
 import pytest
-from support.third_party_driver import MemoryEnd
+from support.third_party_driver import MEMORIES, MemoryConnection, MemoryEnd
 
 from firable.executor.drivers import kinds
 from firable.executor.drivers.bench import Heard
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver
+from firable.executor.drivers.device import Point, Value, Writes
 
 BINDING = """{firable_bind: 1, cell: c, devices: {D: {driver: theirs, memory: stopping, timeout_s: 0.5, retry_s: 0.02,
 safe: {output: false}}}}"""
@@ -94,3 +96,72 @@ def test_a_note_that_nobody_can_be_told_keeps_no_device_from_its_safe_outputs(
 
     asyncio.run(main())
     assert written == ["output"]
+
+
+class Mistaken(MemoryConnection):
+    """A connection to the memory `gone` whose library has a mistake, which shows once."""
+
+    at = ""
+
+    async def read(self) -> Sequence[tuple[Point, Value]]:
+        shown = await super().read()
+        self.fails("read", self.end)
+        return shown
+
+    async def write(self, writes: Writes) -> None:
+        self.fails("write", self.end)
+        await super().write(writes)
+
+    async def close(self) -> None:
+        await super().close()
+        self.fails("close", self.end)
+
+    @classmethod
+    def fails(cls, at: str, end: MemoryEnd) -> None:
+        if cls.at == at and end is MEMORIES["gone"]:
+            cls.at = ""
+            raise AttributeError(f"no {at}")
+
+
+@pytest.mark.parametrize("at", ["read", "write", "close", "what is shown", "stopped"])
+def test_a_mistake_of_a_library_stops_its_device_as_any_other_and_is_a_fault(
+    at: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = EntryPoint("theirs", "support.third_party_driver:KIND", kinds.GROUP)
+    monkeypatch.setattr(kinds, "entry_points", lambda **_: [entry])
+    monkeypatch.setattr("support.third_party_driver.MemoryConnection", Mistaken)
+    monkeypatch.setattr(Mistaken, "at", "")
+    written: list[str] = []
+    heard = Heard()
+
+    async def main() -> None:
+        ends = [MemoryEnd("gone"), MemoryEnd("there")]
+        await ends[0].start(lambda point, _: written.append(f"D {point}"))
+        await ends[1].start(lambda point, _: written.append(f"E {point}"))
+        driver = BoundDriver(parse_binding(TWO.replace("0.1", "0.5")), (), frozenset())
+        task = asyncio.create_task(driver.run(heard, heard))
+        for device in driver.devices.values():
+            await asyncio.wait_for(device.is_ready.wait(), 5)
+        await asyncio.sleep(0.02)
+        written.clear()
+        if at == "what is shown":  # and shown again at each connection
+            monkeypatch.setattr(driver.devices["D"].image, "take", lambda *_: int("x"))
+        elif at == "stopped":
+            monkeypatch.setattr(Mistaken, "at", "write")
+            driver.stop()
+        else:
+            monkeypatch.setattr(Mistaken, "at", at)
+        if at == "close":
+            await ends[0].cut()
+            await ends[0].mend()
+        elif at == "write":
+            driver.devices["D"].force("start", value=True)
+        else:
+            ends[0].show("output", 1)
+        await asyncio.wait((task,), timeout=5)
+        assert isinstance(task.exception(), (AttributeError, ValueError))
+        assert all(device.kept.is_safe for device in driver.devices.values())
+
+    asyncio.run(main())
+    assert sorted(written) == ["D output", "E output"]
+    assert [fault.split(",")[0] for fault in heard.faults] == ["D: its driver has failed"] * (at != "stopped")
