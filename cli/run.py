@@ -129,15 +129,17 @@ def run(
         from firable.executor import run as run_bundle
 
         loaded = load(bundle, trust)
+        plant_file = None
+        if not options.is_one_of_several and (plant is not None or options.bind is None):
+            plant_file = _plant_file(loaded, plant)
+        secrets = (token_file, operators, *(serve_tls or ()), *(options.tls or ()))
+        read = [path for path in (bundle, options.bind, plant_file, *trust, *secrets) if path is not None]
+        _refuse_to_overwrite(trace, log, *read, *_files_beside(options.journal))
         service = served.service()
         if options.is_one_of_several:
-            if trace is not None:
-                _refuse_to_overwrite(trace, bundle, *filter(None, (options.bind, options.journal)))
             said = _said(loaded.net, say, options.journal)
             return run_host_of(bundle, loaded, options, trace, said, service, log_to(log))
         if options.bind is not None:
-            if trace is not None:
-                _refuse_to_overwrite(trace, bundle, options.bind, *_files_beside(options.journal))
             return run_bound_of(
                 bundle,
                 loaded,
@@ -147,15 +149,12 @@ def run(
                 options.journal,
                 _said(loaded.net, say, options.journal),
                 resume=options.resume,
-                plant=None if plant is None else read_plant(_plant_file(loaded, plant)),
+                plant=None if plant_file is None else read_plant(plant_file),
                 watch=Watch(watch),
                 service=service,
                 log=log_to(log),
             )
-        plant_file = _plant_file(loaded, plant)
-        model = read_plant(plant_file)
-        if trace is not None:
-            _refuse_to_overwrite(trace, bundle, plant_file, *_files_beside(options.journal))
+        model = read_plant(plant_file or _plant_file(loaded, plant))
         report = run_bundle(
             loaded,
             model,
@@ -184,7 +183,9 @@ def run(
 
 
 def _files_beside(journal: str | None) -> tuple[str, ...]:
-    return (journal, f"{journal}.cell", f"{journal}.generation") if journal else ()
+    """The files of a journal, those that SQLite makes beside it among them."""
+    beside = ("", ".cell", ".generation", "-wal", "-shm", "-journal")
+    return tuple(f"{journal}{suffix}" for suffix in beside) if journal else ()
 
 
 def _said(net: Net, say: tuple[str, ...], journal: str | None) -> dict[str, Answer]:
@@ -223,17 +224,23 @@ def _plant_file(bundle: Bundle, argument: str | None) -> Path:
     return catalogue_file(argument, "plant") if argument.startswith(CATALOGUE) else Path(argument)
 
 
-def _refuse_to_overwrite(trace: str, *inputs: Path | str) -> None:
-    """Refuse a trace on standard output, where the report goes, or in a file that the run reads; `InputError` F1017."""
+def _refuse_to_overwrite(trace: str | None, log: str | None, *inputs: Path | str) -> None:
+    """Refuse a trace on standard output, where the report goes, and a trace or log in a file that the run reads, or in
+    one file both; `InputError` F1017.
+    """
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable
 
     if trace == "-":
         message = "-: the trace cannot go to standard output, where the report goes"
         raise InputError([Diagnostic("F1017", message, "name a file; one that is called so is ./-")])
-    if any(_is_same(Path(trace), Path(path)) for path in inputs):
-        message = f"{printable(trace)}: the trace would overwrite what the run reads"
-        raise InputError([Diagnostic("F1017", message, "name another file for the trace")])
+    for what, written in (("trace", trace), ("log", None if log == "-" else log)):
+        if written is not None and any(_is_same(Path(written), Path(path)) for path in inputs):
+            message = f"{printable(written)}: the {what} would overwrite what the run reads"
+            raise InputError([Diagnostic("F1017", message, f"name another file for the {what}")])
+    if trace is not None and log is not None and _is_same(Path(trace), Path(log)):
+        message = f"{printable(log)}: trace and log would be one file, which nobody could read"
+        raise InputError([Diagnostic("F1017", message, "name another file for the log")])
 
 
 def _is_same(one: Path, other: Path) -> bool:

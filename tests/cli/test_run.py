@@ -158,16 +158,17 @@ def test_steps_end_where_the_cell_waits_for_ever(bundle: str, tmp_path: Path) ->
     assert "G1 waits for conveyor.part_at_entry" in done.stdout
 
 
-def test_a_trace_never_overwrites_what_the_run_reads(
+def test_neither_trace_nor_log_overwrites_what_the_run_reads(
     bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     plant, link = tmp_path / "cell.plant.yaml", tmp_path / "link"
     plant.write_bytes(PLANT.read_bytes())
     link.hardlink_to(bundle)
     before = Path(bundle).read_bytes()
-    for trace in (bundle, str(link), str(plant)):
-        assert main(["run", bundle, "--plant", str(plant), "--workpieces", "1", "--trace", trace]) == 2
-        assert "error[F1017]" in capsys.readouterr().err
+    for option in ("--trace", "--log"):
+        for written in (bundle, str(link), str(plant)):
+            assert main(["run", bundle, "--plant", str(plant), "--workpieces", "1", option, written]) == 2
+            assert "error[F1017]" in capsys.readouterr().err
     assert (Path(bundle).read_bytes(), plant.read_bytes()) == (before, PLANT.read_bytes())
 
 
@@ -228,13 +229,17 @@ def test_a_run_that_was_killed_goes_on_by_the_operators_key(bundle: str, tmp_pat
     assert {"restarted", "taken up"} <= set(notes_of(tmp_path / "trace"))
 
 
-def test_a_trace_in_the_file_of_the_journal_is_refused(
+def test_a_trace_or_a_log_in_a_file_of_the_journal_is_refused(
     bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     journal = str(tmp_path / "cell.journal")
-    for trace in (journal, f"{journal}.cell"):
-        assert main(["run", bundle, "--journal", journal, "--trace", trace]) == 2
-        assert "the trace would overwrite what the run reads" in capsys.readouterr().err
+    for what in ("trace", "log"):
+        for suffix in ("", ".cell", ".generation", "-wal", "-shm", "-journal"):
+            assert main(["run", bundle, "--journal", journal, f"--{what}", f"{journal}{suffix}"]) == 2
+            assert f"the {what} would overwrite what the run reads" in capsys.readouterr().err
+    both = str(tmp_path / "both")
+    assert main(["run", bundle, "--trace", both, "--log", both]) == 2
+    assert "trace and log would be one file" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
