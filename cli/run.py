@@ -168,6 +168,7 @@ def run(
             watch=Watch(watch),
             service=service,
             log=log_to(log),
+            tell=_told,
             operator=stepping(_SPEEDS[speed], to_stderr=format_ == "json") if step else None,
         )
         return Report(
@@ -180,6 +181,14 @@ def run(
         )
 
     return answer("run", format_, make, _show)
+
+
+def _told(kind: str, sentence: str) -> None:
+    """What the report does not tell: a word of the operator that was of no use."""
+    from firable.executor.operating.restart import UNASKED
+
+    if kind == UNASKED:
+        click.echo(f"  {sentence}", err=True)
 
 
 def _files_beside(journal: str | None) -> tuple[str, ...]:
@@ -201,9 +210,8 @@ def _said(net: Net, say: tuple[str, ...], journal: str | None) -> dict[str, Answ
         place, _, word = option.partition("=")
         commanding = [p.name for p in net.places if p.command is not None]
         if place not in commanding:
-            raise click.UsageError(
-                f"--say {option}: no place '{place}' sends a command; {did_you_mean(place, commanding)}"
-            )
+            near = did_you_mean(place, commanding).rstrip()
+            raise click.UsageError(f"--say {option}: no place '{place}' sends a command{near and f'; {near}'}")
         if word not in words:
             raise click.UsageError(f"--say {option}: say {', '.join(words)}")
         said[place] = words[word]

@@ -117,10 +117,12 @@ class Host:
         self.owner_of = {
             signal.name: name for name in self.controllers for signal in decomposition.subnet(name).signals
         }
+        self.said = said or {}
+        """What the operator has said beforehand of commands, by place."""
         self.taking_up: restart.TakingUp | None = None
         """What a restart has found out, as long as the controllers are held."""
         if any(controller.held for controller in self.controllers.values()):
-            self.taking_up = restart.TakingUp(said or {}, resume=resume)
+            self.taking_up = restart.TakingUp(resume=resume)
         self.was_done = self.journal.kept(TRACE).get(_END) == State.DONE.value
         self.paused = False
         self.stopping = False
@@ -167,6 +169,8 @@ class Host:
             self.log.began(self.net.name, [*self.coordinators, *self.controllers])
         try:
             self.acts.start()
+            if self.taking_up is None:
+                restart.tell_unasked(self, ())
             ended = await self._outcome(self.outcome)
         finally:
             hanging = await ending.close(self, tasks)

@@ -26,7 +26,9 @@ from firable.semantics.trace import Event, Noted
 LEVELS: Final[Mapping[str, int]] = MappingProxyType(
     {
         **dict.fromkeys(("fault", "divergence", "emergency stop"), logging.ERROR),
-        **dict.fromkeys(("lost", "refused", "never-met", "dropped", "held", "withdrawn", "untold"), logging.WARNING),
+        **dict.fromkeys(
+            ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold"), logging.WARNING
+        ),
     }
 )
 """The level of each kind of note; of all others it is `info`."""

@@ -10,7 +10,7 @@ What a person says counts only where the driver does not know: machines are beli
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
@@ -19,6 +19,9 @@ from firable.executor.protocol.commands import Answer
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
+
+UNASKED: Final = "unasked"
+"""The kind of note of what was said of a command that nobody asked after."""
 
 _TELLS: Final = {
     Answer.DONE: "is done",
@@ -30,9 +33,8 @@ _TELLS: Final = {
 
 @dataclass
 class TakingUp:
-    """What the operator has said beforehand, and what the drivers have answered."""
+    """Whether the operator has resumed it beforehand, and what the drivers have answered."""
 
-    said: Mapping[str, Answer]
     resume: bool
     """Whether to resume as soon as nothing is uncertain, unless the run is paused by then."""
     answers: dict[str, Answer] = field(default_factory=dict)
@@ -50,12 +52,13 @@ async def take_up(run: Host, found: TakingUp) -> None:
         for place, entry in controller.commands.questions:
             answer = Answer((await run.driver.ask(run.net.place(place), entry)).value)
             if answer is Answer.UNKNOWN:
-                answer = found.said.get(place, answer)
+                answer = run.said.get(place, answer)
             found.answers[place] = answer
             run.note("asked after", place=place, answer=answer.value)
             run.answer(name, place, entry, answer)
             if answer is Answer.UNKNOWN:
                 run.told("held", f"nobody knows what became of the command of '{place}': look, and --say it")
+    tell_unasked(run, found.answers)
     await run.quiet()
     if run.is_over:  # by an error: nothing is resumed any more
         return
@@ -65,6 +68,13 @@ async def take_up(run: Host, found: TakingUp) -> None:
             if controller.held:
                 run.told("held", f"{called(name)} is held after a restart, until it is resumed")
     run.moved()
+
+
+def tell_unasked(run: Host, asked: Collection[str]) -> None:
+    """Tell of what was said of commands that nobody asked after: whoever said it believes that it counts."""
+    for place in run.said:
+        if place not in asked:
+            run.told(UNASKED, f"nobody asked after {place}: what is said of it changes nothing")
 
 
 def release(run: Host) -> None:

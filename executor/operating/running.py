@@ -20,7 +20,7 @@ from firable.executor.cell.plant import Disturbance, Plant
 from firable.executor.drivers.binding import Binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.simulated import SimulatedDriver
-from firable.executor.operating.host import Host
+from firable.executor.operating.host import Host, Told
 from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.recorder import LineStream
@@ -126,6 +126,7 @@ def run(
     watch: Watch = Watch.TELL,
     service: Service | None = None,
     log: Log | None = None,
+    tell: Told | None = None,
 ) -> RunReport:
     """Run a bundle on the simulated cell of a plant until `workpieces` workpieces have gone through.
 
@@ -134,7 +135,7 @@ def run(
     accounted for; `said` gives the operator's word on those that no machine can tell of, by place.
 
     The machines are held against their plant file as the run goes (`watch`). With a `service` an operator may act from
-    elsewhere, in real time. A `log` is told what the trace notes.
+    elsewhere, in real time. A `log` is told what the trace notes, `tell` what an operator has to know.
 
     `speed` None is virtual time, 1.0 real time, 10.0 ten times as fast. A command that is not completed within
     `overdue_seconds` (of the cell's time) is a fault. Raises `InputError` F5002 where the bundle is not proved, F5003
@@ -160,6 +161,7 @@ def run(
         watch=watch,
         service=service,
         log=log,
+        tell=tell,
     )
 
 
@@ -181,6 +183,7 @@ def execute(
     watch: Watch = Watch.TELL,
     service: Service | None = None,
     log: Log | None = None,
+    tell: Told | None = None,
 ) -> RunReport:
     """Run a decomposition, proved or not, on the simulated cell of a plant; parameters as for `run`.
 
@@ -208,6 +211,7 @@ def execute(
             stop_at_divergence=watch is Watch.STOP,
             figures=figures,
             log=log,
+            tell=tell,
         )
         situation = run_to_the_end(host, service, figures, virtual=speed is None)
     delivered = tuple(workpiece.id for workpiece in cell.delivered)

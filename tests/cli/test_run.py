@@ -248,6 +248,7 @@ def test_a_trace_or_a_log_in_a_file_of_the_journal_is_refused(
     [
         (("--say", "mc.fix=done"), "name its --journal"),
         (("--say", "mc.fi=done", "--journal", "j"), "did you mean 'mc.fix'?"),
+        (("--say", "x=done", "--journal", "j"), "no place 'x' sends a command\n"),
         (("--say", "mc.fix=perhaps", "--journal", "j"), "say done, working, not-received"),
     ],
 )
@@ -256,6 +257,19 @@ def test_a_word_on_no_command_is_refused(
 ) -> None:
     assert main(["run", bundle, *options]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_a_word_on_a_command_that_nobody_asks_after_is_told(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = tmp_path / "trace"
+    options = ("--workpieces", "1", "--journal", str(tmp_path / "journal"), "--trace", str(trace))
+    assert main(["run", bundle, *options, "--say", "mc.fix=done"]) == 0
+    assert "nobody asked after mc.fix" in capsys.readouterr().err
+    assert "unasked" in notes_of(trace)
+    assert main(["replay", str(trace), "--net", bundle]) == 0
+    assert main(["run", bundle, *options, "--say", "mc.fix=done"]) == 0, "taken up"
+    assert "nobody asked after mc.fix" in capsys.readouterr().err
 
 
 def test_a_run_that_is_done_is_known_as_done_when_it_is_started_again(
