@@ -60,3 +60,13 @@ def test_every_make_target_that_is_named_exists() -> None:
     for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"):
         named = set(re.findall(r"(?:^|`)make ([a-z-]+)", (ROOT / name).read_text(encoding="utf-8"), re.MULTILINE))
         assert named <= targets, f"{name}: {named - targets}"
+
+
+@pytest.mark.parametrize(
+    "page", ["README.md", "ARCHITECTURE.md", *(f"docs/{p.name}" for p in sorted(ROOT.glob("docs/*.md")))]
+)
+def test_no_blank_line_cuts_a_table(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    outside = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    heads = re.findall(r"(?:\A|\n\n)\|[^\n]*\n([^\n]*)", outside)
+    assert all(re.fullmatch(r"[|:\- ]+", below) for below in heads)
