@@ -4,7 +4,7 @@
     GET  /metrics                    its figures, for Prometheus
     POST /pause  /resume  /step      let nothing fire; let fire; fire one transition
     POST /stop                       stop every machine where it is, and end the run
-    POST /stop-at-end                let no new work in, and end when the cell is empty
+    POST /stop-at-end                let no new work in, and end when the cell, or what of it is here, is empty
     POST /emergency-stop             drive the safe outputs at once
 
 *Who may* is asked of every request, reading ones too: a bearer token, compared in constant time, or, where a client

@@ -32,10 +32,14 @@ def situation(run: Host) -> Situation:
         waiting = tuple(blocked(run.recorder.player, run.recorder.word, run.dispatch.untaken))
     else:
         waiting = tuple(one for each in run.controllers.values() for one in blocked_parts(each, run.dispatch.untaken))
+    barred = beginnings(run.net) if run.ends_at_home else ()
+    waiting = tuple(replace(one, is_barred=one.transition in barred) for one in waiting)
     if run.fault:
         return Situation(State.FAULT, run.marking, waiting, run.fault)
     if run.stopping:
         return Situation(State.STOPPED, run.marking, waiting, run.ended_by or others, run.is_emergency)
+    if run.ends_at_home and not run.is_whole:
+        others = "; ".join(filter(None, (alone(run), others)))
     if run.taking_up is not None:
         held = restart.told(run, run.taking_up)
         return Situation(State.HELD, run.marking, (), "; ".join(filter(None, (held, others))))
@@ -110,6 +114,12 @@ def is_home(run: Host) -> bool:
     at_home = all(each.marking == each.subnet.initial_marking for each in run.controllers.values())
     awaits = run.dispatch.timers or run.dispatch.untaken or run.acts.ticks
     return at_home and not awaits and run.acts.is_settled
+
+
+def alone(run: Host) -> str:
+    """What a host among others waits for at the end of the cycle: what is elsewhere in the cell it does not see."""
+    names = " and ".join(run.controllers) or "nobody"
+    return f"{names} alone {'are' if len(run.controllers) > 1 else 'is'} waited for; the cell may not be empty"
 
 
 def beginnings(net: Net) -> tuple[str, ...]:

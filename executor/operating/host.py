@@ -348,7 +348,7 @@ class Host:
         self._release()
         if self.ends_at_home and not self.stopping and not self.paused and ending.is_home(self):
             self.ended_by = ending.AT_THE_END if self.is_whole else ""
-            self._end_soon(ending.AT_THE_END)
+            self._end_soon(ending.AT_THE_END, **({} if self.is_whole else {"message": ending.alone(self)}))
             return
         ended = ending.ended(self)
         if ended is not None and self.outcome is not None:

@@ -48,8 +48,12 @@ class Blocked:
     """Places whose command no machine is known to have, and which has no completion to wait for."""
     decided_by: str | None = None
     """The coordinator of a transition of which only a part is seen."""
+    is_barred: bool = False
+    """Whether the operator, who ends the cycle, lets it fire no more."""
 
     def __str__(self) -> str:
+        if self.is_barred:
+            return f"{self.transition} is barred by the operator: no new work comes in"
         reasons = [f"a token on {place}" for place in self.empty]
         reasons += [f"{place} to become empty" for place in self.full]
         reasons += [f"{signal}" if wanted else f"not {signal}" for signal, wanted in self.gates]

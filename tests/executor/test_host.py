@@ -387,9 +387,11 @@ def test_a_cell_whose_driver_cannot_keep_work_out_ends_its_cycle_with_the_machin
         await asyncio.sleep(33)
         assert host.recorder.marking != decomposition.net.initial_marking
         host.stop(at_end_of_cycle=True)
+        assert not host.situation().message, "of a whole cell the end of the cycle is that it is empty"
         begun = host.recorder.firings["G1"]
         ended = await asyncio.wait_for(ending, 100)
         assert (ended.state, ended.message) == (State.STOPPED, "stopped at the end of the cycle")
+        assert [str(one) for one in ended.blocked] == ["G1 is barred by the operator: no new work comes in"]
         assert host.recorder.marking == decomposition.net.initial_marking
         assert host.recorder.firings["G1"] == begun == host.recorder.firings["G9"]  # what was begun was ended
         return host
@@ -403,12 +405,16 @@ def test_a_host_that_ends_its_cycle_takes_no_new_work_and_ends_alone(tmp_path: P
         await asyncio.sleep(33)
         host = cell.hosts[("conveyor",)]
         host.stop(at_end_of_cycle=True)
+        alone = "conveyor alone is waited for; the cell may not be empty"
+        assert alone in host.situation().message
         situation = await asyncio.wait_for(cell.tasks[("conveyor",)], 100)
         assert situation.state is State.STOPPED
         controller = host.controllers["conveyor"]
         assert controller.marking == controller.subnet.initial_marking
         await cell.stop()
         cell.replayed()
+        notes = [event for event in read_trace(cell.path(("conveyor",))).events if isinstance(event, Noted)]
+        assert [note.data for note in notes if note.note == "stopped at the end of the cycle"] == [{"message": alone}]
 
     run_in_virtual_time(main())
 
