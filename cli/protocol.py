@@ -145,7 +145,7 @@ def show(answered: Answered) -> None:
     if answered.outages:
         from firable.decompose.protocol.outages import outage_text
 
-        click.echo(f"\n{click.style('what stands still while somebody is dead', bold=True)}")
+        click.echo(f"\n{click.style('what may stand still while somebody is dead', bold=True)}")
         for line in outage_text(answered.outages).splitlines():
             click.echo(f"  {line}")
     if answered.refutations:

@@ -1,4 +1,4 @@
-"""What the page says of the protocol: what stands still while somebody is dead, and what the cell lives on.
+"""What the page says of the protocol: what may stand still while somebody is dead, and what the cell lives on.
 
 The protocols that are known to be wrong are refuted on the cell, and a refutation is no counterexample of the cell: the
 protocol that runs is another. So they have a section of their own, in the words of the terminal. A wrong protocol that
@@ -37,11 +37,21 @@ def while_dead(report: Report) -> Markup | None:
         told = (outage.at_once, outage.at_last, outage.goes_on, outage.still, outage.running)
         rows.append((who, *(names(some) if some else "–" for some in told)))
     lead = (
-        "Who is dead never restarts. The others do nothing wrong, but some transitions wait for the dead: at once, or "
-        "at last, when they have finished what was begun. A machine stands still that gets no command any more."
+        "Who is dead never restarts. The others do nothing wrong, but some transitions stand still at once, and others "
+        "may, for ever, by what the crash has left open. What goes on does so whenever the crash was. A machine may "
+        "stand that may get no command any more."
     )
-    heads = ("dead", "stands still at once", "stands still at last", "goes on", "machines still", "machines running")
-    return together(tag("p", lead, cls="lead"), table(heads, rows, caption="What stands still while somebody is dead"))
+    heads = (
+        "dead",
+        "stands still at once",
+        "may stand still",
+        "goes on",
+        "machines that may stand",
+        "machines running",
+    )
+    return together(
+        tag("p", lead, cls="lead"), table(heads, rows, caption="What may stand still while somebody is dead")
+    )
 
 
 def lives_on(report: Report) -> Markup | None:

@@ -353,7 +353,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section("assumptions", "Assumptions", _assumptions),
     Section("machines", "With its machines", _loop),
     Section("counterexamples", "Counterexamples", _counterexamples),
-    Section("dead", "What stands still while somebody is dead", while_dead),
+    Section("dead", "What may stand still while somebody is dead", while_dead),
     Section("lives-on", "What this cell lives on", lives_on),
     Section("verdicts", "Verdicts", _others),
     Section("course", "How it was found", _course),

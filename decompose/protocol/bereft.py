@@ -4,24 +4,29 @@ What the others can still do after a crash is a question about the protocol, who
 with forty markings. But of all configurations that carry one central marking some are the worst, and what they still
 fire is seen in the central net:
 
-- *A controller is dead.* The worst is where each group with a transition in which it takes part was asked for that, and
-  given up: the round waits for the acknowledgement of the dead for ever, and nothing of the group is decided any more.
-  Whatever else anybody has promised is released or applied, since its coordinator lives.
+- *A controller is dead.* A round that asks for a transition in which it takes part stays open for ever: undecided, as
+  its vote does not come, and then the promises of the others stand; or without its acknowledgement. The coordinator
+  opens no round that disturbs an open one, nor one that disturbs a group that waits for that, and so on; whoever has
+  promised fires nothing that disturbs the promise, and reads no signal anew that it reads or clears. Such a round may
+  be opened after the crash, too, on reports from before. So whatever it would keep back is held up throughout.
 - *A coordinator is dead.* It decides nothing any more, and what it was promised stays promised: of the parts that are
-  firable where it died, as many as do not disturb each other. What would disturb one of them fires no more (O1).
+  firable where it died, as many as do not disturb each other. What would disturb one of them fires no more (O1), nor
+  what shares a signal with it.
 
-Everything else can be brought to rest by steps that fire nothing, and is then fired as if nobody were dead. So the net
-here is the central one, the life of who dies, and the promises that a dead coordinator leaves:
+Everything else can be brought to rest, and is then fired as if nobody were dead. So the net here is the central one,
+the life of who dies, and the promises that a dead coordinator leaves:
 
     not-begun ─begins──▶ alive ─dies──▶ dying ─is-dead──▶ dead        what the dead hold up fires while they are alive,
     not-begun ─dies-at-once──▶ dead, early                            the rest then, and when they are dead
     hold/t/c: while dying, c has promised its part of t
 
-Each question is a property of this net (`outages`), with evidence as any property. That what is found here is what the
-protocol does is argued in docs/protocol.md, and tests hold it to an exploration of the protocol's net.
+Each question is a property of this net (`outages`), with evidence as any property. That what goes on here goes on in
+the protocol is argued in docs/protocol.md, and tests hold it to an exploration of the protocol's net, in which rounds
+may be given up, and to the machines that run.
 
-Rejected: to explore the protocol's net with somebody dead in it, which took the line of two cells a minute, and left no
-evidence but diagrams of it.
+Rejected: to count on it that a round with a dead controller is given up. The coordinator that runs has no clock, and
+decides when everybody has voted. Rejected, too: to explore the protocol's net with somebody dead in it, which took the
+line of two cells a minute, and left no evidence but diagrams of it.
 """
 
 from __future__ import annotations
@@ -53,14 +58,79 @@ class Bereft:
 
     @cached_property
     def held_up(self) -> frozenset[str]:
-        """The transitions that fire no more when the dead are dead, in the worst case."""
+        """The transitions of which nothing is claimed when the dead are dead: in the worst case they fire no more.
+
+        Cost: each pair of coordinated transitions is compared once.
+        """
         parts = self.parts
         if not self.who:
             return frozenset(t for t in parts.coordinated if parts.decider(t) == self.coordinator)
         waiting = {t for t, its in parts.coordinated.items() if any(part.controller == self.who for part in its)}
-        groups = (group for group in parts.groups if not waiting.isdisjoint(group))
-        own = (part.whole for part in parts.local if part.controller == self.who)
-        return frozenset((*(t for group in groups for t in group), *own))
+        asked = [group for group in parts.groups if not waiting.isdisjoint(group)]
+        found = {t for group in asked for t in group}
+        locked = (
+            part.whole
+            for part in parts.local
+            if part.controller == self.who or any(self._shared(part.whole, t) for t in found)
+        )
+        own = tuple(locked)
+        rest, new = [group for group in parts.groups if group not in asked], found
+        while new:  # whoever waits for those keeps its place before others
+            behind = [group for group in rest if any(self._shared(t, u) for t in group for u in new)]
+            rest = [group for group in rest if group not in behind]
+            new = {t for group in behind for t in group}
+            found = found | new
+        return frozenset((*found, *own))
+
+    def _shared(self, t: str, u: str) -> bool:
+        """Whether one disturbs the other, or both have to do with a signal."""
+        (writes, reads), (others_writes, others_reads) = self._reach[t], self._reach[u]
+        return not (writes.isdisjoint(others_reads) and reads.isdisjoint(others_writes))
+
+    @cached_property
+    def _reach(self) -> dict[str, tuple[frozenset[str], frozenset[str]]]:
+        """Of each transition what it changes, and what it depends on.
+
+        Signals count as changed even where they are read: one that a standing promise reads is not read anew. They are
+        told from places by a bar; were a place named so, more would be held up.
+        """
+        found = {}
+        for t in self.parts.transitions:
+            writes = {*t.inputs, *t.outputs, *self._signals(t)}
+            found[t.name] = frozenset(writes), frozenset((*writes, *t.permissive, *t.inhibitive))
+        return found
+
+    def _signals(self, t: Transition) -> Iterator[str]:
+        yield from (f"|{gate.signal}" for gate in t.external)
+        for place in t.outputs:
+            yield from (f"|{signal}" for signal in self.parts.net.place(place).cleared)
+
+    def _in_the_way(self, part: Part) -> tuple[Part, ...]:
+        """The parts whose promise keeps this one from being promised or fired, or its signals from being read."""
+        mine = self._signals_of[part]
+        if not mine:
+            return self.parts.excluding(part)
+        of_place = set(self.parts.excluding(part))
+        group = self.parts.group_of.get(part.whole)
+        return tuple(
+            other
+            for t, its in self.parts.coordinated.items()
+            for other in its
+            if other in of_place
+            or (
+                other.controller == part.controller
+                and (group is None or self.parts.group_of[t] != group)
+                and not mine.isdisjoint(self._signals_of[other])
+            )
+        )
+
+    @cached_property
+    def _signals_of(self) -> dict[Part, frozenset[str]]:
+        subnets = {subnet.name: subnet for subnet in self.parts.decomposition.subnets}
+        return {
+            part: frozenset(self._signals(subnets[part.controller].transition(part.name)))
+            for part in (*self.parts.local, *(part for its in self.parts.coordinated.values() for part in its))
+        }
 
     @cached_property
     def at_once(self) -> frozenset[str]:
@@ -78,7 +148,7 @@ class Bereft:
         """The parts of which a promise may be left by a dead coordinator, and keeps somebody from firing."""
         if self.who:
             return ()
-        disturbed = {other for part in self._going for other in self.parts.excluding(part)}
+        disturbed = {other for part in self._going for other in self._in_the_way(part)}
         its = (part for t, some in self.parts.coordinated.items() if t in self.held_up for part in some)
         return tuple(part for part in its if part in disturbed)
 
@@ -112,7 +182,7 @@ class Bereft:
     def _central(self, held: Mapping[Part, str]) -> Iterator[Transition]:
         disturbed: dict[str, list[str]] = {}
         for part in self._going if held else ():
-            disturbed.setdefault(part.whole, []).extend(held[o] for o in self.parts.excluding(part) if o in held)
+            disturbed.setdefault(part.whole, []).extend(held[o] for o in self._in_the_way(part) if o in held)
         for t in self.parts.transitions:
             alive, away = ((ALIVE,), ()) if t.name in self.held_up else ((), (NOT_BEGUN, DYING))
             empty = (*t.inhibitive, *away, *disturbed.get(t.name, ()))

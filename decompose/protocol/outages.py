@@ -1,4 +1,4 @@
-"""What a fault does to the cell: blocked safely or not, which machines stand still, what goes on, what resumes.
+"""What a fault does to the cell: blocked safely or not, which machines may stand still, what goes on, what resumes.
 
 Two explorations answer for all faults that pass: with messages lost and doubled and everybody crashing and restarting,
 again and again, the protocol stays safe (the sentences of refinement); and when faults have ceased, nothing is lost:
@@ -13,19 +13,20 @@ transition
 
 - stands still *at once*, if nothing fires it after the crash: it is local to who is dead, or nobody is left to decide
   it;
-- stands still *at last*, if from some configuration after the crash it never fires again, though from the central
-  marking that this one carries the central net could: as soon as it waits for something that nobody does any more. It
-  may still finish what was begun, such as a firing that was decided before the crash;
-- *goes on*, if it can fire again from each of them from where the central net could.
+- *goes on*, if it can fire again from every configuration after the crash from where the central net could, when what
+  is under way is over: whenever the crash was, and whatever was open then, or is opened later;
+- *may stand still*, if that is not shown: where the crash leaves promises that nobody takes back, or a round that keeps
+  others from being opened, it may never fire again. Another crash may leave none, and then it goes on all the same; and
+  it may still finish what was begun, such as a firing that was decided before.
 
-The same is asked of the transitions that send commands to a machine, taken together, which is not the division of each:
-a machine that is switched on once and then used stands still if its use does, though nothing keeps back the switching
-on. It stands still if from some configuration none of them ever fires again, though the central net could fire one.
+Only what goes on is claimed, and what is over at once. The same is asked of the transitions that send commands to a
+machine, taken together, which is not the division of each: a machine that is switched on once and then used may stand
+still if its use does, though nothing keeps back the switching on.
 
-All of it is asked of the central net without what the dead hold up (`bereft`), of whose markings a table or a diagram
-is made. What is looked at first is M0. Whoever crashes may do so before anything has fired, and whatever can fire at
-all can fire from there; so what does not fire then is kept back. Only of the others is it asked from wherever somebody
-may die. Each answer is a property of that net, which a document of evidence shows (`Inquest.document`).
+All of it is asked of the central net without what the dead may hold up (`bereft`), of whose markings a table or a
+diagram is made. What is looked at first is M0. Whoever crashes may do so before anything has fired, and whatever can
+fire at all can fire from there; so what does not fire then is kept back. Only of the others is it asked from wherever
+somebody may die. Each answer is a property of that net, which a document of evidence shows (`Inquest.document`).
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ from firable.nets.net import Net, Property, TemporalProperty
 from firable.nets.verdict import Status, Verdict, Weight
 
 WHILE_FAULTS: Final = "while messages are lost and doubled, and controllers and coordinators crash and restart"
-METHOD: Final = "the central net, without what the dead hold up"
+METHOD: Final = "the central net, without what the dead may hold up"
 EVIDENCE_SECONDS: Final = 60.0
 RESUMES: Final = "when faults have ceased, whatever the central net may fire next, the protocol can fire next"
 
@@ -68,8 +69,8 @@ class Outage:
 
     A coordinator bears the name of a controller too, which does not die with it. `at_once`, `at_last` and `goes_on`
     divide the transitions of the central net that can fire at all, `still` and `running` the machines that these send
-    commands. What goes on is what is not kept back: it may have fired for the
-    last time for other reasons. `bound` says why this is not known, where it is not.
+    commands. Those `at_last`, and the machines `still`, may stand still. What goes on is what is not kept back: it may
+    have fired for the last time for other reasons. `bound` says why this is not known, where it is not.
     """
 
     who: str
@@ -106,7 +107,7 @@ def fault_verdicts(found: Exploration) -> tuple[Verdict, ...]:
 
 
 def outages(decomposition: Decomposition, limits: Callable[[], Limits] = Limits) -> Iterator[Outage]:
-    """What stands still and what goes on while each controller is dead, and while each coordinator is.
+    """What may stand still and what goes on while each controller is dead, and while each coordinator is.
 
     The limits are made anew for each.
     """
@@ -228,17 +229,17 @@ def commanding(net: Net, firing: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
 
 def outage_verdict(outage: Outage) -> Verdict:
-    """As a verdict, for information: what stands still are its subjects."""
+    """As a verdict, for information: what may stand still are its subjects, first what does so at once."""
     at_once, still, running = (", ".join(some) or "none" for some in (outage.at_once, outage.still, outage.running))
     coordinator = outage.coordinator.removeprefix("the ").replace(" ", ".", 1)
     return Verdict(
         f"faults.dead.{outage.who}" if outage.who else f"faults.dead-{coordinator}",
         Status.UNKNOWN if outage.bound else Status.PROVED,
-        f"while {outage.name} is dead, these transitions stand still, at once or at last, where the central net could "
-        "fire them again, and no others",
+        f"while {outage.name} is dead, these transitions may stand still for ever, and every other that can fire goes "
+        "on, whenever the crash was: where the central net could fire it again when what is under way is over, it can",
         METHOD,
         Weight.INFORMATION,
-        hint="" if outage.bound else f"at once: {at_once}; machines: {still} stand still, {running} go on",
+        hint="" if outage.bound else f"at once: {at_once}; machines: {still} may stand still, {running} go on",
         bound=outage.bound,
         subjects=(*outage.at_once, *outage.at_last),
     )
@@ -249,11 +250,11 @@ def outage_text(found: Sequence[Outage]) -> str:
 
     >>> print(outage_text([Outage("robot", ("move",), ("load",), ("mill",), ("arm",), ("mill",))]), end="")
     robot dead
-      stands still at once   move
-      stands still at last   load
-      goes on                mill
-      machines still         arm
-      machines running       mill
+      stands still at once     move
+      may stand still          load
+      goes on                  mill
+      machines that may stand  arm
+      machines running         mill
     """
     lines = []
     for outage in found:
@@ -263,10 +264,10 @@ def outage_text(found: Sequence[Outage]) -> str:
             continue
         rows = (
             ("stands still at once", outage.at_once),
-            ("stands still at last", outage.at_last),
+            ("may stand still", outage.at_last),
             ("goes on", outage.goes_on),
-            ("machines still", outage.still),
+            ("machines that may stand", outage.still),
             ("machines running", outage.running),
         )
-        lines += [f"  {title:<22} {', '.join(names) or '-'}" for title, names in rows]
+        lines += [f"  {title:<24} {', '.join(names) or '-'}" for title, names in rows]
     return "".join(f"{line}\n" for line in lines)

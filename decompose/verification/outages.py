@@ -1,14 +1,14 @@
 """The verdicts on who is dead: the net that they leave is made anew, and a document must show each answer of it.
 
-The second text of `firable.decompose.protocol.bereft` and of the division in `outages`: which transitions the dead hold
-up, which promises a dead coordinator leaves, what is asked, and what the answers come to. The answers are those of the
-document of each verdict, which says what it shows as any does; which questions there are follows from them, one after
-the other, and no other may be there. Whoever is dead has a verdict, where the bundle speaks of faults at all.
+The second text of `firable.decompose.protocol.bereft` and of the division in `outages`: which transitions the dead may
+hold up, which promises a dead coordinator leaves, what is asked, and what the answers come to. The answers are those of
+the document of each verdict, which says what it shows as any does; which questions there are follows from them, one
+after the other, and no other may be there. Whoever is dead has a verdict, where the bundle speaks of faults at all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -26,8 +26,8 @@ from firable.nets.temporal import Logic, parse_temporal
 from firable.nets.verdict import Status, Verdict, Weight
 
 PREFIX: Final = "faults.dead"
-TITLE: Final = "while somebody is dead, what is said to stand still does, and the rest goes on"
-METHOD: Final = "the central net, without what the dead hold up"
+TITLE: Final = "while somebody is dead, what is said to go on does, whatever the crash has left"
+METHOD: Final = "the central net, without what the dead may hold up"
 
 _NOT_BEGUN: Final = "life/not-begun"
 _ALIVE: Final = "life/alive"
@@ -37,8 +37,8 @@ _EARLY: Final = "life/dead-at-once"
 
 _RUNS: Final = "runs played by the reference player"
 _SAYS: Final = (
-    "while {} is dead, these transitions stand still, at once or at last, where the central net could fire them again, "
-    "and no others"
+    "while {} is dead, these transitions may stand still for ever, and every other that can fire goes on, whenever the "
+    "crash was: where the central net could fire it again when what is under way is over, it can"
 )
 
 
@@ -104,7 +104,7 @@ class _Asking:
         return self.answers[name]
 
     def divided(self) -> tuple[tuple[str, ...], str]:
-        """The transitions that stand still, those at once first, and what is told of machines."""
+        """The transitions that may stand still, those at once first, and what is told of machines."""
         wake = self.wake
         fires = [t.name for t in wake.voting.transitions if self.is_so(_fires(t.name))]
         free = [t for t in fires if t not in wake.held_up and not self.is_so(_kept_from_start(t))]
@@ -119,7 +119,7 @@ class _Asking:
         at_once = [t for t in fires if wake.is_at_once(t)]
         at_last = [t for t in fires if t not in going and t not in at_once]
         at_once_told, still_told, running_told = (", ".join(some) or "none" for some in (at_once, still, running))
-        hint = f"at once: {at_once_told}; machines: {still_told} stand still, {running_told} go on"
+        hint = f"at once: {at_once_told}; machines: {still_told} may stand still, {running_told} go on"
         return (*at_once, *at_last), hint
 
 
@@ -163,17 +163,48 @@ class Wake:
 
     @cached_property
     def held_up(self) -> set[str]:
-        """What fires no more in the worst case."""
+        """What fires no more in the worst case: for a controller, whatever is behind a round of it, or may be."""
         voting = self.voting
         if not self.controller:
             return {t for t in voting.parts if voting.cut.decided_at[t] == self.coordinator}
         waited_for = {part.whole for part in voting.all_parts if part.controller == self.controller}
         together = {t for group in voting.groups if waited_for & set(group) for t in group}
-        return together | {part.whole for part in voting.local if part.controller == self.controller}
+        footprints = {t.name: self._footprint(t) for t in voting.transitions}
+
+        def near(t: str, some: set[str]) -> bool:
+            moved, looked_at = footprints[t]
+            return any(moved & footprints[u][1] or looked_at & footprints[u][0] for u in some)
+
+        alone = {p.whole for p in voting.local if p.controller == self.controller or near(p.whole, together)}
+        stopped = set(together)
+        while behind := {u for t in voting.parts if t not in stopped and near(t, stopped) for u in voting.group_of[t]}:
+            stopped |= behind
+        return stopped | alone
+
+    def _footprint(self, t: Transition) -> tuple[set[tuple[str, str]], set[tuple[str, str]]]:
+        """What a transition may change, and what it may see; a signal under a promise stays as it is, so both."""
+        both = {("place", p) for p in (*t.inputs, *t.outputs)} | {("signal", s) for s in self._signals(t)}
+        return both, both | {("place", p) for p in (*t.permissive, *t.inhibitive)}
+
+    def _signals(self, t: Transition) -> set[str]:
+        """The signals that its gates read, and those that a token clears where it puts one."""
+        entered = map(self.voting.cut.net.place, t.outputs)
+        return {gate.signal for gate in t.external} | {signal for place in entered for signal in place.cleared}
+
+    def _promises_near(self, part: Part) -> set[str]:
+        """The promises that keep a part from being promised or fired, or hold a signal of it still."""
+        mine, its = self._signals(part.own), self.voting.group_of.get(part.whole, ())
+        found = set(self.voting.others(part))
+        for other in self.voting.all_parts if mine else ():
+            if other.controller == part.controller and other.whole not in its and mine & self._signals(other.own):
+                found.add(other.at("promised"))
+        return found
 
     def is_at_once(self, t: str) -> bool:
         """Whether only the dead could fire it."""
-        return t in self.held_up and (not self.controller or t not in self.voting.parts)
+        if not self.controller:
+            return t in self.held_up
+        return any(part.whole == t and part.controller == self.controller for part in self.voting.local)
 
     def sending(self, among: list[str]) -> dict[str, list[str]]:
         """For each machine, the transitions of these that send it a command."""
@@ -191,14 +222,17 @@ class Wake:
         if self.controller:
             return {}
         going = (part for part in (*self.voting.local, *self.voting.all_parts) if part.whole not in self.held_up)
-        in_the_way = {promise for part in going for promise in self.voting.others(part)}
+        in_the_way = {promise for part in going for promise in self._promises_near(part)}
         its = (part for part in self.voting.all_parts if part.whole in self.held_up)
         return {f"held/{part.whole}/{part.controller}": part for part in its if part.at("promised") in in_the_way}
 
     def left_by(self, part: Part) -> set[str]:
-        """The promises of these that keep a part from being promised, or from firing."""
-        its = {promise: place for place, other in self.promises.items() if (promise := other.at("promised"))}
-        return {its[promise] for promise in self.voting.others(part) if promise in its}
+        """The promises of these that keep a part from firing."""
+        return self._places_of(self._promises_near(part))
+
+    def _places_of(self, promises: Iterable[str]) -> set[str]:
+        its = {other.at("promised"): place for place, other in self.promises.items()}
+        return {its[promise] for promise in promises if promise in its}
 
     @cached_property
     def net(self) -> Net:
@@ -217,7 +251,7 @@ class Wake:
         for place, part in sorted(self.promises.items()):
             own = part.own
             full = {_DYING, *own.inputs, *own.permissive}
-            empty = {*own.outputs, *own.inhibitive} | self.left_by(part)
+            empty = {*own.outputs, *own.inhibitive} | self._places_of(self.voting.others(part))
             yield Transition(
                 f"hold{place.removeprefix('held')}", (), (place,), tuple(sorted(full)), tuple(sorted(empty))
             )

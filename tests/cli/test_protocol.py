@@ -105,7 +105,7 @@ def test_faults_tell_what_stands_still(capsys: pytest.CaptureFixture[str], net: 
     assert main(["prove", net, "--faults"]) == 0
     told = capsys.readouterr().out
     assert "✓ proved    faults.resumes" in told
-    assert "  robot dead\n    stands still at once   fetch\n    stands still at last   hand_over, unload\n" in told
+    assert "  robot dead\n    stands still at once     fetch\n    may stand still          hand_over, unload\n" in told
 
 
 def test_wrong_protocols_are_told_by_their_events_and_fail_nothing(
@@ -162,7 +162,7 @@ def test_page_tells_what_stands_still(net: str, tmp_path: Path) -> None:
     page = page_of(net, tmp_path, "--faults")
     dead = section(page, "dead")
     assert '<tr><th scope="row"><b>robot</b></th><td data-of="stands still at once"><span class="code">fetch<' in dead
-    assert '<td data-of="stands still at last"><span class="code">hand_over, unload<' in dead
+    assert '<td data-of="may stand still"><span class="code">hand_over, unload<' in dead
     assert '<td data-of="goes on">–</td>' in dead
     assert "faults.dead." not in page, "told by the table, not once more among the verdicts"
 

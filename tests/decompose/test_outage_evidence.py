@@ -1,4 +1,7 @@
-"""What the dead keep back is what exploring the protocol finds; evidence shows it, and nothing else passes for it."""
+"""What the dead keep back is what exploring the protocol finds, and for controllers more, as a round may stay open.
+
+Evidence shows it, and nothing else passes for it.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -94,23 +97,35 @@ def refused(make: Callable[[], Bundle]) -> bool:
 # What is found is right
 
 
+def is_as_explored(net: Net) -> bool:
+    """Of coordinators the same is found; of controllers no more goes on, since rounds are given up where explored."""
+    found, explored = list(outages(split(net))), list(explored_outages(split(net)))
+    for one, other in zip(found, explored, strict=True):
+        if one != other and (
+            not one.who
+            or (one.who, one.at_once) != (other.who, other.at_once)
+            or not set(one.goes_on) <= set(other.goes_on)
+            or not set(one.running) <= set(other.running)
+        ):
+            return False
+    return True
+
+
 @pytest.mark.parametrize("seed", [1, 3, 5, 8])
 def test_what_the_dead_keep_back_is_what_exploring_the_protocol_finds_where_loops_are_read(seed: int) -> None:
-    decomposition = split(looping_net(seed))
-    assert list(outages(decomposition)) == list(explored_outages(decomposition))
+    assert is_as_explored(looping_net(seed))
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_what_the_dead_keep_back_is_what_exploring_the_protocol_finds(seed: int) -> None:
-    decomposition = split(owned_net(seed))
-    assert list(outages(decomposition)) == list(explored_outages(decomposition))
+    assert is_as_explored(owned_net(seed))
 
 
 def test_a_promise_that_nobody_takes_back_keeps_still_what_it_reads() -> None:
     dead = {outage.name: outage for outage in outages(split(gated()))}
     assert dead["the coordinator"].at_once == ("G", "H")
     assert dead["the coordinator"].at_last == ("turn", "back")
-    assert dead["b"].goes_on == ("turn", "back")
+    assert dead["b"].goes_on == ()  # `b` may have been asked for `G` too, and `a` have promised its part
 
 
 def test_without_the_promises_that_are_left_too_much_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -170,7 +185,7 @@ def more(bundle: Bundle, verdict: Verdict) -> Iterator[tuple[str, Callable[[], B
     changes = (
         ("one less stands still", replace(verdict, subjects=verdict.subjects[1:])),
         ("one more stands still", replace(verdict, subjects=(*verdict.subjects, "turn"))),
-        ("machines", replace(verdict, hint=verdict.hint.replace("stand still", "go on"))),
+        ("machines", replace(verdict, hint=verdict.hint.replace("may stand still", "go on"))),
         ("method", replace(verdict, method="by hand")),
         ("weight", replace(verdict, weight=Weight.WARNING)),
     )
@@ -184,7 +199,16 @@ def test_evidence_on_who_is_dead_that_is_missing_or_exchanged_is_refused() -> No
     bundle = bundled(gated)
     mutants = [(how, make) for how, make in evidence_mutants(bundle) if not how.startswith("another")]
     assert len(mutants) > 10
+    mutants = [(how, make) for how, make in mutants if not is_same(make, bundle)]
     assert [how for how, make in mutants if not refused(make)] == []
+
+
+def is_same(make: Callable[[], Bundle], bundle: Bundle) -> bool:
+    """Whether nothing is changed: two controllers that are dead may leave the same net, and the same document."""
+    try:
+        return make() == bundle
+    except ValueError:
+        return False
 
 
 def test_every_change_of_an_answer_is_refused() -> None:
