@@ -176,7 +176,10 @@ def spelled(count: int) -> str:
 
 
 def overall(verdicts: Iterable[Verdict]) -> Status:
-    """The outcome of all verdicts that matter together: unknown never passes, and a violation outweighs it."""
+    """The outcome of all verdicts that matter together: unknown never passes, and a violation outweighs it.
+
+    Expectations are taken into account: PROVED also says that what is violated is so as the net file expects.
+    """
     statuses = {verdict.outcome for verdict in verdicts if verdict.matters}
     if Status.VIOLATED in statuses:
         return Status.VIOLATED

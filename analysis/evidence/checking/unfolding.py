@@ -7,6 +7,21 @@ iff it can go round for ever without postponing any one until all the time. So t
 connected part of what is reached from M0, for every until, some firing does not postpone it. In a deadlock the
 marking is repeated.
 
+The parts of the formula are numbered, each after those that it is made of, and what is owed is a set of numbers:
+unfolded from the highest down, no part is unfolded twice, and a part that occurs often is one number. It is unfolded
+at a letter, the atoms that hold now and what fires, so a way to begin is what is owed next with what is postponed.
+
+Of the ways only the least are kept, of those that are begun as of those that are done: one goes where another one has
+no more to unfold, owes no more next and postpones no more. This loses no run that refutes. Where S' is within S, each
+way to unfold S has one of S' within it: unfold each part of S' as it was unfolded there (if in two ways, in either);
+what must hold now was asked for there as well. So whatever a way that goes would have become, the one that stays
+becomes something within it. Now let a run be followed from S0 through S1, S2, ... by any of the ways. By
+induction there are S'i within Si through which kept ways lead: one of S'i is within the way from Si, a kept one is
+within that, so S'i+1 is within Si+1. What is postponed on each step is within what was, so an until that was not
+postponed all the time is not now. And no run is made up: each way that is kept is one of all the ways. Without this
+the ways are as many as there are choices, exponentially many in nested operators; with it they may still be, so the
+deadline is looked at wherever one is begun.
+
 This is the one certificate that is decided again rather than looked through: ranks on these nodes would be as many
 numbers as there are nodes, and would be checked by going through just these nodes. What is certified is the set of
 markings; the tableau shares nothing with that of `firable.analysis.temporal` but the idea.
@@ -16,12 +31,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from enum import Enum, auto
 
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.evidence.checking.listed import Listed
+from firable.analysis.evidence.checking.listed import Column, Listed
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse, shown
-from firable.nets.formula import Constant, Formula, Not
+from firable.nets.formula import Constant, Formula
 from firable.nets.temporal import (
     Eventually,
     Fires,
@@ -34,103 +49,150 @@ from firable.nets.temporal import (
     TemporalOr,
     Until,
     WeakUntil,
-    all_of,
-    any_of,
     format_temporal,
 )
 from firable.nets.temporal_parts import has_events
+from firable.semantics.player import FiringSet
 from firable.semantics.trace import Discipline
 
-Owed = frozenset[Temporal]
+Numbers = frozenset[int]
+_NONE: Numbers = frozenset()
+
+
+class _Operator(Enum):
+    """The operators of positive form."""
+
+    AND = auto()
+    OR = auto()
+    NEXT = auto()
+    UNTIL = auto()
+    RELEASE = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class _Literal:
+    """An atom, or its negation."""
+
+    atom: Formula | Fires
+    wanted: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Joined:
+    """An operator over parts, which are numbers below its own."""
+
+    operator: _Operator
+    operands: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """One way to begin with what is owed: what holds now, what fires next or does not, what is owed then."""
+    """One way to begin with what is owed: what is still to be unfolded, what is owed next, the untils postponed."""
 
-    now: frozenset[Formula]
-    fires: frozenset[str]
-    spares: frozenset[str]
-    owed: Owed
-    postponed: Owed
+    rest: Numbers
+    owed: Numbers = _NONE
+    postponed: Numbers = _NONE
 
-
-def positive(formula: Temporal, *, negative: bool = False) -> Temporal:
-    """A formula of LTL, or its negation, in which negation stands before atoms alone, of X, U and R.
-
-    >>> from firable.nets.temporal import parse_temporal
-    >>> format_temporal(positive(parse_temporal("not (p U q)")))
-    'not p R not q'
-    """
-
-    def part(operand: Temporal) -> Temporal:
-        return positive(operand, negative=negative)
-
-    match formula:
-        case TemporalNot(operand):
-            return positive(operand, negative=not negative)
-        case TemporalAnd(operands) | TemporalOr(operands):
-            joined = all_of if isinstance(formula, TemporalAnd) is not negative else any_of
-            return joined(tuple(map(part, operands)))
-        case Next(operand):
-            return Next(part(operand))
-        case Eventually(operand):
-            return part(Until(Constant(value=True), operand))
-        case Globally(operand):
-            return part(Release(Constant(value=False), operand))
-        case Until(left, right):
-            return Release(part(left), part(right)) if negative else Until(part(left), part(right))
-        case Release(left, right):
-            return Until(part(left), part(right)) if negative else Release(part(left), part(right))
-        case WeakUntil(left, right):
-            return part(Release(right, any_of((left, right))))
-        case Fires():
-            return TemporalNot(formula) if negative else formula
-        case _ if isinstance(formula, Formula):
-            return Not(formula) if negative else formula
-    raise ValueError(f"'{format_temporal(formula)}' is no formula of LTL")
+    def within(self, other: _Way) -> bool:
+        """Whether it asks for no more than the other does."""
+        return self.rest <= other.rest and self.owed <= other.owed and self.postponed <= other.postponed
 
 
-@lru_cache(maxsize=4096)
-def _ways(owed: Owed) -> tuple[_Way, ...]:
-    """The ways to begin with what is owed."""
-    found: dict[_Way, None] = {}
-    none: frozenset[str] = frozenset()
-    todo: list[tuple[tuple[Temporal, ...], _Way]] = [
-        (tuple(owed), _Way(frozenset(), none, none, frozenset(), frozenset()))
-    ]
-    while todo:
-        rest, way = todo.pop()
-        if not rest:
-            found[way] = None
-            continue
-        one, rest = rest[0], rest[1:]
-        later = _Way(way.now, way.fires, way.spares, way.owed | {one}, way.postponed)
-        match one:
+class _Tableau:
+    """A formula of LTL in positive form, with negation before atoms alone, and how parts of it are unfolded."""
+
+    def __init__(self, formula: Temporal, deadline: Deadline, *, negative: bool) -> None:
+        self.deadline = deadline
+        self._numbers: dict[_Literal | _Joined, int] = {}
+        self.root = self._number(formula, negative=negative)
+        self.parts = tuple(self._numbers)
+        self._literals = frozenset(n for n, part in enumerate(self.parts) if isinstance(part, _Literal))
+        self._known: dict[tuple[Numbers, Numbers], tuple[_Way, ...]] = {}
+
+    def _number(self, formula: Temporal, *, negative: bool) -> int:
+        def part(operand: Temporal) -> int:
+            return self._number(operand, negative=negative)
+
+        def join(operator: _Operator, *operands: int) -> int:
+            return self._add(_Joined(operator, operands))
+
+        both, either = (_Operator.OR, _Operator.AND) if negative else (_Operator.AND, _Operator.OR)
+        until, release = _Operator.UNTIL, _Operator.RELEASE
+        if negative:
+            until, release = release, until
+        match formula:
+            case TemporalNot(operand):
+                return self._number(operand, negative=not negative)
             case TemporalAnd(operands):
-                todo.append(((*operands, *rest), way))
+                return join(both, *map(part, operands))
             case TemporalOr(operands):
-                todo += [((operand, *rest), way) for operand in operands]
+                return join(either, *map(part, operands))
             case Next(operand):
-                todo.append((rest, _Way(way.now, way.fires, way.spares, way.owed | {operand}, way.postponed)))
+                return join(_Operator.NEXT, part(operand))
+            case Eventually(operand):
+                return join(until, part(Constant(value=True)), part(operand))
+            case Globally(operand):
+                return join(release, part(Constant(value=False)), part(operand))
             case Until(left, right):
-                putting_off = _Way(later.now, later.fires, later.spares, later.owed, later.postponed | {one})
-                todo += [((right, *rest), way), ((left, *rest), putting_off)]
+                return join(until, part(left), part(right))
             case Release(left, right):
-                todo += [((left, right, *rest), way), ((right, *rest), later)]
-            case Fires(name):
-                todo.append((rest, _Way(way.now, way.fires | {name}, way.spares, way.owed, way.postponed)))
-            case TemporalNot(Fires(name)):
-                todo.append((rest, _Way(way.now, way.fires, way.spares | {name}, way.owed, way.postponed)))
-            case _ if isinstance(one, Formula):
-                todo.append((rest, _Way(way.now | {one}, way.fires, way.spares, way.owed, way.postponed)))
-            case _:
-                raise ValueError(f"'{format_temporal(one)}' is not in positive form")
-    return tuple(found)
+                return join(release, part(left), part(right))
+            case WeakUntil(left, right):
+                first, last = part(left), part(right)
+                return join(release, last, join(either, first, last))
+            case _ if isinstance(formula, Fires | Formula):
+                return self._add(_Literal(formula, not negative))
+        raise ValueError(f"'{format_temporal(formula)}' is no formula of LTL")
+
+    def _add(self, part: _Literal | _Joined) -> int:
+        return self._numbers.setdefault(part, len(self._numbers))
+
+    def ways(self, letter: Numbers, owed: Numbers) -> tuple[_Way, ...]:
+        """The least ways to begin with what is owed where just the literals of the letter hold."""
+        if (letter, owed) not in self._known:
+            self._known[letter, owed] = self._unfolded(letter, owed)
+        return self._known[letter, owed]
+
+    def _unfolded(self, letter: Numbers, owed: Numbers) -> tuple[_Way, ...]:
+        false = self._literals - letter
+        done: list[_Way] = []
+        # By the highest part still to be unfolded: a branch goes to a lower one, so what is taken out is all there is.
+        begun = {-1: done}
+        todo = [_Way(owed)]
+        while True:
+            for way in todo:
+                if self.deadline.over:
+                    raise TimeIsOverError
+                if way.rest.isdisjoint(false):
+                    settled = _Way(way.rest - letter, way.owed, way.postponed)
+                    beside = begun.setdefault(max(settled.rest, default=-1), [])
+                    if not any(other.within(settled) for other in (*done, *beside)):
+                        beside[:] = [other for other in beside if not settled.within(other)]
+                        beside.append(settled)
+            highest = max(begun)
+            if highest < 0:
+                return tuple(done)
+            todo = [branch for way in begun.pop(highest) for branch in self._branches(highest, way)]
+
+    def _branches(self, one: int, way: _Way) -> list[_Way]:
+        """A part unfolded; the branch that owes least comes first."""
+        rest, owed, postponed = way.rest - {one}, way.owed, way.postponed
+        match self.parts[one]:
+            case _Joined(_Operator.AND, operands):
+                return [_Way(rest.union(operands), owed, postponed)]
+            case _Joined(_Operator.OR, operands):
+                return [_Way(rest | {operand}, owed, postponed) for operand in operands]
+            case _Joined(_Operator.NEXT, (operand,)):
+                return [_Way(rest, owed | {operand}, postponed)]
+            case _Joined(_Operator.UNTIL, (left, right)):
+                return [_Way(rest | {right}, owed, postponed), _Way(rest | {left}, owed | {one}, postponed | {one})]
+            case _Joined(_Operator.RELEASE, (left, right)):
+                return [_Way(rest | {left, right}, owed, postponed), _Way(rest | {right}, owed | {one}, postponed)]
+        raise TypeError(f"{self.parts[one]} is no operator with its operands")
 
 
-Product = tuple[int, Owed]
-Edge = tuple[Product, Owed]
+Product = tuple[int, Numbers]
+Edge = tuple[Product, Numbers]
 """The node after, and the untils that are postponed."""
 
 
@@ -139,14 +201,17 @@ class Unfolding:
 
     def __init__(self, space: Listed, formula: Temporal, deadline: Deadline = NEVER) -> None:
         self.space, self.formula, self.deadline = space, formula, deadline
-        self.columns: dict[Formula, list[bool]] = {}
+        self.tableau = _Tableau(formula, deadline, negative=True)
         self.nodes = 0
+        self._columns: dict[Formula, Column] = {}
+        self._holding: dict[int, Numbers] = {}
+        self._firing: dict[FiringSet, Numbers] = {}
 
     def check(self) -> None:
         """Refuse where some run refutes the formula; raises `TimeIsOverError` at the deadline."""
         if has_events(self.formula) and self.space.discipline is Discipline.STEP:
             refuse("`fires` names one firing, and a step holds several")
-        start = (self.space.start, frozenset({positive(self.formula, negative=True)}))
+        start = (self.space.start, frozenset({self.tableau.root}))
         for part in self._parts(start):
             inside = set(part)
             edges = [postponed for node in part for after, postponed in self._edges(node) if after in inside]
@@ -155,23 +220,46 @@ class Unfolding:
                 refuse(f"a run that goes on from {here} does not satisfy ({format_temporal(self.formula)})")
 
     def _edges(self, node: Product) -> list[Edge]:
+        if self.deadline.over:
+            raise TimeIsOverError
         at, owed = node
-        names = self.space.net.transitions
-        row = [({names[t].name for t in fired}, after) for fired, after in self.space.edges[at]] or [(set(), at)]
         found = []
-        for way in _ways(owed):
-            if all(self._holds(one, at) for one in way.now):
-                found += [
-                    ((after, way.owed), way.postponed)
-                    for fired, after in row
-                    if way.fires <= fired and way.spares.isdisjoint(fired)
-                ]
+        for fired, after in self.space.edges[at] or [((), at)]:
+            letter = self._held(at) | self._fired(fired)
+            found += [((after, way.owed), way.postponed) for way in self.tableau.ways(letter, owed)]
         return found
 
-    def _holds(self, formula: Formula, at: int) -> bool:
-        if formula not in self.columns:
-            self.columns[formula] = self.space.where(formula)
-        return self.columns[formula][at]
+    def _held(self, at: int) -> Numbers:
+        """The literals over markings that hold in this one."""
+        if at not in self._holding:
+            self._holding[at] = frozenset(
+                number
+                for number, part in enumerate(self.tableau.parts)
+                if isinstance(part, _Literal)
+                and not isinstance(part.atom, Fires)
+                and self._column(part.atom)[at] is part.wanted
+            )
+        return self._holding[at]
+
+    def _fired(self, fired: FiringSet) -> Numbers:
+        """The literals over firings that hold where these fire."""
+        if fired not in self._firing:
+            names = {self.space.net.transitions[t].name for t in fired}
+            self._firing[fired] = frozenset(
+                number
+                for number, part in enumerate(self.tableau.parts)
+                if isinstance(part, _Literal)
+                and isinstance(part.atom, Fires)
+                and (part.atom.transition in names) is part.wanted
+            )
+        return self._firing[fired]
+
+    def _column(self, formula: Formula) -> Column:
+        if formula not in self._columns:
+            if self.deadline.over:
+                raise TimeIsOverError
+            self._columns[formula] = self.space.where(formula)
+        return self._columns[formula]
 
     def _parts(self, start: Product) -> Iterator[list[Product]]:
         """The strongly connected parts of what is reached (Tarjan 1972), without recursion."""
@@ -184,8 +272,6 @@ class Unfolding:
             for after, _ in edges:
                 if after not in number:
                     number[after] = low[after] = len(number)
-                    if len(number) % 1024 == 0 and self.deadline.over:
-                        raise TimeIsOverError
                     open_.append(after)
                     on_stack.add(after)
                     todo.append((after, iter(self._edges(after))))

@@ -1,0 +1,123 @@
+"""The tableau of the checker: it accepts just the runs that refute a formula, does no work twice, and ends in time."""
+
+import random
+from threading import Event
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support.examples import examples, seeds
+from support.temporal_formulas import ltl_formulas
+
+from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.evidence.certificate import Markings, Unfolded
+from firable.analysis.evidence.checking.checker import check_document, check_evidence
+from firable.analysis.evidence.checking.listed import Listed
+from firable.analysis.evidence.checking.obligations import Evidence
+from firable.analysis.evidence.checking.runs import Lasso
+from firable.analysis.evidence.checking.unfolding import Unfolding
+from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.document import Document, Record
+from firable.analysis.evidence.refusal import TimeIsOverError
+from firable.nets.diagnostics import InputError
+from firable.nets.net import Net, Place, Transition
+from firable.nets.temporal import Temporal, parse_temporal
+from firable.semantics.trace import Discipline
+
+NET = Net(
+    "letters",
+    (Place("p", marked=True), Place("q"), Place("r"), Place("s")),
+    (Transition("t", ("p",), ("q",)), Transition("u", ("q",), ("p",))),
+)
+NESTED = (
+    "not G (p R (q W r))",
+    "not G (p R (G (q W s) W r))",
+    "not G (p R (G ((p R r) W s) W r))",
+    "p W q W r W s W p W q W r W s W p W q W r W s W (X p) W (X q) W (X r) W (X s)",
+)
+CLAUSES = "not (" + " and ".join(f"({'X ' * i}p or {'X ' * i}q)" for i in range(1, 30)) + ")"
+"""Its negation can begin in 2^29 ways, of which none owes less than another."""
+
+
+class Run(Listed):
+    """One run as a set of markings, whatever the net would fire: a word of letters that the tableau reads."""
+
+    def __init__(self, run: Lasso) -> None:
+        self.net, self.discipline, self.markings, self.start = run.net, Discipline.INTERLEAVING, run.markings, 0
+        fired = [tuple(run.net.transition_index[name] for name in names) for names in run.fired]
+        self.edges = [[(names, after)] for names, after in zip(fired, [*range(1, len(fired)), run.loop], strict=True)]
+
+
+class Countdown(Event):
+    """A flag that is set after so many looks at it."""
+
+    def __init__(self, looks: int) -> None:
+        super().__init__()
+        self.looks = looks
+
+    def is_set(self) -> bool:
+        self.looks -= 1
+        return self.looks < 0
+
+
+def lasso(letters: list[tuple[int, str]], loop: int) -> Lasso:
+    markings, fired = zip(*letters, strict=True)
+    return Lasso(NET, markings, tuple(frozenset(names) for names in fired), loop)
+
+
+def satisfied(run: Lasso, formula: Temporal, deadline: Deadline = NEVER) -> bool:
+    """What the tableau says of a run."""
+    try:
+        Unfolding(Run(run), formula, deadline).check()
+    except InputError:
+        return False
+    return True
+
+
+@st.composite
+def runs(draw: st.DrawFn) -> Lasso:
+    letters = draw(st.lists(st.tuples(st.integers(0, 15), st.sampled_from(["", "t", "u"])), min_size=1, max_size=5))
+    return lasso(letters, draw(st.integers(0, len(letters) - 1)))
+
+
+@given(run=runs(), formula=ltl_formulas(list("pqrs"), list("tu"), leaves=8))
+@examples(300)
+def test_the_tableau_refuses_a_run_iff_it_does_not_satisfy_the_formula(run: Lasso, formula: Temporal) -> None:
+    assert satisfied(run, formula) is run.values(formula)[0]
+
+
+@pytest.mark.parametrize("text", NESTED)
+def test_nested_operators_are_unfolded_right_with_few_looks_at_the_deadline(text: str) -> None:
+    formula = parse_temporal(text)
+    answers = set()
+    for seed in seeds(40):
+        draw = random.Random(seed)
+        letters = [(draw.choice((0, 15, draw.randrange(16))), draw.choice("tu")) for _ in range(draw.randint(1, 6))]
+        run = lasso(letters, draw.randrange(len(letters)))
+        answers.add(value := run.values(formula)[0])
+        for asked, truth in ((formula, value), (parse_temporal(f"not ({text})"), not value)):
+            assert satisfied(run, asked, Deadline(cancelled=Countdown(5_000))) is truth
+    assert answers == {True, False}
+
+
+def test_nothing_is_unfolded_when_the_time_is_over() -> None:
+    with pytest.raises(TimeIsOverError):
+        satisfied(lasso([(1, "t")], 0), parse_temporal("G p"), Deadline.after(0))
+
+
+def test_the_time_is_looked_at_while_one_node_is_unfolded() -> None:
+    with pytest.raises(TimeIsOverError):
+        satisfied(lasso([(1, "t")], 0), parse_temporal(CLAUSES), Deadline(cancelled=Countdown(200)))
+
+
+def test_a_formula_that_cannot_be_unfolded_in_time_is_only_claimed() -> None:
+    claim, certificate = Claim(ClaimKind.LTL, parse_temporal(CLAUSES)), Unfolded(Markings((1, 2)))
+    assert check_evidence(Evidence(NET, Discipline.INTERLEAVING, claim, certificate), timeout_ms=50).shown is None
+    document = Document(NET, Discipline.INTERLEAVING, (Record("", True, ((claim, certificate),)),))
+    (checked,) = check_document(document, timeout_ms=50)
+    assert (checked.shown, checked.only_claimed) == (False, "the time was over")
+
+
+def test_the_time_is_looked_at_at_every_node_though_what_is_owed_there_is_known() -> None:
+    with pytest.raises(TimeIsOverError):
+        satisfied(lasso([(1, "t")] * 100, 0), parse_temporal("G p"), Deadline(cancelled=Countdown(50)))
