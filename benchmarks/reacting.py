@@ -105,6 +105,11 @@ class PingPong:
         """Something always comes."""
         return False
 
+    @property
+    def unconfirmed(self) -> tuple[str, ...]:
+        """None: there is no device that could be out of reach."""
+        return ()
+
     def readings(self) -> Mapping[str, Reading]:
         """Nothing that would be asked for."""
         return {}

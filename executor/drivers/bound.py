@@ -73,6 +73,11 @@ class BoundDriver:
         """Never: what machines and workpieces do next is not to be known."""
         return False
 
+    @property
+    def unconfirmed(self) -> tuple[str, ...]:
+        """The devices that have safe outputs and have not confirmed them since the stop."""
+        return tuple(name for name, device in self.devices.items() if not device.kept.is_safe)
+
     def readings(self) -> Mapping[str, Reading]:
         """The process image."""
         return {name: reading for device in self.devices.values() for name, reading in device.image.readings.items()}
@@ -100,9 +105,8 @@ class BoundDriver:
         if stopping:
             await asyncio.wait(stopping, timeout=3 * longest)
         await ended([*tasks, *stopping])
-        for device in self.devices.values():
-            if not device.kept.is_safe:
-                device.note("has not confirmed its safe outputs: they are left to its watchdog")
+        for name in self.unconfirmed:
+            self.devices[name].note("has not confirmed its safe outputs: they are left to its watchdog")
         for device in self.devices.values():
             if device.kept.error is not None:
                 raise device.kept.error

@@ -24,7 +24,7 @@ that can only be polled do so inside, behind this protocol. Real machines are re
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, MutableSequence
+from collections.abc import Collection, Iterable, Mapping, MutableSequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, TypeVar
@@ -105,6 +105,11 @@ class Driver(Protocol):
     @property
     def at_rest(self) -> bool:
         """Whether nothing will happen any more unless a command is sent; False where the driver cannot know."""
+        ...
+
+    @property
+    def unconfirmed(self) -> Collection[str]:
+        """The devices that have not confirmed the safe outputs of the stop; asked once `run` has ended."""
         ...
 
     def readings(self) -> Mapping[str, Reading]:

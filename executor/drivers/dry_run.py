@@ -33,6 +33,11 @@ class DryRunDriver:
         """Never: what an operator changes of the sensors is not to be known."""
         return False
 
+    @property
+    def unconfirmed(self) -> tuple[str, ...]:
+        """None: there is no device that could be out of reach."""
+        return ()
+
     def readings(self) -> Mapping[str, Reading]:
         """What the sensors show."""
         return {name: Reading(value, quality=Quality.GOOD, why="") for name, value in self.shown.items()}

@@ -78,6 +78,11 @@ class SimulatedDriver:
         """Whether no event is scheduled in the plant."""
         return self.plant.next_seconds is None
 
+    @property
+    def unconfirmed(self) -> tuple[str, ...]:
+        """None: there is no device that could be out of reach."""
+        return ()
+
     def readings(self) -> Mapping[str, Reading]:
         """What each sensor of the plant showed in the report told last."""
         return self.image

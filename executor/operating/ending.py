@@ -96,6 +96,17 @@ def with_hanging(ended: Situation, hanging: Collection[str]) -> Situation:
     return replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, message))))
 
 
+def with_unconfirmed(ended: Situation, devices: Collection[str]) -> Situation:
+    """The end of a run after which these devices have not confirmed safe outputs: a fault, whatever it was before."""
+    if not devices:
+        return ended
+    have = "have" if len(devices) > 1 else "has"
+    message = (
+        f"{' and '.join(devices)} {have} not confirmed the safe outputs: look at the machines, they may not be safe"
+    )
+    return replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, message))))
+
+
 def with_failed(ended: Situation, driver: asyncio.Task[None]) -> Situation:
     """The end of a run whose driver failed when it was to stop the machines: a fault, whatever it was before."""
     if not driver.done() or driver.cancelled() or (error := driver.exception()) is None:

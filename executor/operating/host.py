@@ -174,7 +174,8 @@ class Host:
             ended = await self._outcome(self.outcome)
         finally:
             hanging = await ending.close(self, tasks)
-        ended = ending.with_failed(ending.with_hanging(ended, hanging), tasks[0])
+        ended = ending.with_unconfirmed(ending.with_hanging(ended, hanging), self.driver.unconfirmed)
+        ended = ending.with_failed(ended, tasks[0])
         if self.left_nothing_open:
             self.recorder.end(self.now_seconds(), self.marking, ended.state.value)
         else:

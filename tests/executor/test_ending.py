@@ -348,6 +348,31 @@ def test_a_driver_that_fails_when_it_is_to_stop_the_machines_makes_the_end_a_fau
     run_in_virtual_time(main())
 
 
+class Unconfirmed(Machine):
+    """A machine of which nobody knows whether it is stopped."""
+
+    unconfirmed = ("R",)
+
+
+@pytest.mark.parametrize("fault", [False, True])
+def test_safe_outputs_that_a_device_has_not_confirmed_make_the_end_a_fault(fault: bool) -> None:
+    async def main() -> None:
+        run, machine = run_of(MemoryJournal())
+        run.driver = unsafe = Unconfirmed([split(run.net).subnet("robot")], 1.0)
+        unsafe.sent = machine.sent
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(1)
+        if fault:
+            run.driver_fault("R", "failed")
+        else:
+            run.stop()
+        ended = await ending
+        assert ended.state is State.FAULT
+        assert ended.message.startswith("R: failed; R has not confirmed" if fault else "stopped by the operator; R has")
+
+    run_in_virtual_time(main())
+
+
 @pytest.mark.parametrize(
     ("act", "state"),
     [
