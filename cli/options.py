@@ -154,10 +154,19 @@ def net_files(arguments: Sequence[str]) -> tuple[str, ...]:
     found: dict[str, None] = {}
     for argument in arguments:
         folder = Path(argument)
-        below = [] if argument.startswith(CATALOGUE) or not folder.is_dir() else sorted(folder.rglob(f"*{NET_FILE}"))
+        below = (
+            sorted(folder.rglob(f"*{NET_FILE}")) if not argument.startswith(CATALOGUE) and _is_folder(folder) else []
+        )
         shown = [path for path in below if not _is_hidden(path.relative_to(folder)) and path.is_file()]
         found |= dict.fromkeys(map(str, shown) if shown else [argument])
     return tuple(found)
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:  # a name that no file can have
+        return False
 
 
 def _is_hidden(path: Path) -> bool:
