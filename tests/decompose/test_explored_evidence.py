@@ -55,6 +55,16 @@ def bundled(name: str) -> Bundle:
     return make_bundle(check(example(name)), protocol=True, faults=True)
 
 
+def of_the_living(name: str) -> Bundle:
+    """The bundle without what stands still while somebody is dead, which rests on other evidence."""
+    bundle = bundled(name)
+    return replace(
+        bundle,
+        verdicts=tuple(verdict for verdict in bundle.verdicts if not verdict.name.startswith("faults.dead")),
+        evidence={file: data for file, data in bundle.evidence.items() if not file.startswith("faults.dead")},
+    )
+
+
 # --------------------------------------------------------------------------------------------------------------------
 # What is shown
 
@@ -107,7 +117,9 @@ def test_bundles_with_the_protocol_are_shown() -> None:
     assert [name.removeprefix("explored.") for name in names[:6]] == [
         *("follows", "agrees", "orders-fit", "complete", "one-token", "divergence")
     ]
-    assert [name.removeprefix("faults.") for name in names[6:]] == ["follows", "agrees", "orders-fit", "resumes"]
+    assert [name.removeprefix("faults.") for name in names[6:10]] == ["follows", "agrees", "orders-fit", "resumes"]
+    assert all(name.startswith("faults.dead") for name in names[10:])
+    assert len(names) > 10
     assert all(checked[name].shown for name in names)
 
 
@@ -187,7 +199,7 @@ def stated_once(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_single_change_of_a_verdict_on_the_protocol_is_refused(
     remembered: Callable[[str, int], tuple[str, ...]],
 ) -> None:
-    bundle = bundled("shuttle")
+    bundle = of_the_living("shuttle")
     assert not refused(bundle, remembered)
     mutants = [
         (how, make) for how, make in verdict_mutants(bundle) if how.startswith(("verdict explored", "verdict f"))
@@ -217,7 +229,8 @@ def test_every_single_change_of_a_line_of_the_evidence_is_refused(family: str) -
 def test_evidence_on_the_protocol_that_is_missing_or_exchanged_is_refused(
     remembered: Callable[[str, int], tuple[str, ...]],
 ) -> None:
-    bundle = bundled("shuttle")
+    bundle = of_the_living("shuttle")
+    assert not refused(bundle, remembered)
     mutants = [
         (how, make) for how, make in evidence_mutants(bundle) if how.startswith(("explored.smt2", "faults.smt2"))
     ]
@@ -227,7 +240,7 @@ def test_evidence_on_the_protocol_that_is_missing_or_exchanged_is_refused(
 
 
 def test_evidence_on_the_protocol_that_no_verdict_names_is_refused() -> None:
-    bundle = bundled("shuttle")
+    bundle = of_the_living("shuttle")
     verdicts = tuple(verdict for verdict in bundle.verdicts if not verdict.name.startswith("faults."))
     with pytest.raises(InputError, match=r"no verdict rests on 'faults\.smt2'"):
         check_bundle(replace(bundle, verdicts=verdicts))
@@ -280,7 +293,7 @@ def test_the_evidence_on_the_protocol_of_one_net_is_that_of_no_other() -> None:
 
 
 def test_verdicts_on_the_protocol_that_were_left_out_are_missed() -> None:
-    bundle = bundled("shuttle")
+    bundle = of_the_living("shuttle")
     for family in TITLES:
         for kept in [v for v in bundle.verdicts if v.name.startswith(f"{family}.")][:2]:
             verdicts = tuple(v for v in bundle.verdicts if v is kept or not v.name.startswith(f"{family}."))
@@ -289,7 +302,7 @@ def test_verdicts_on_the_protocol_that_were_left_out_are_missed() -> None:
 
 
 def test_a_family_that_was_left_out_with_its_evidence_claims_nothing() -> None:
-    bundle = bundled("shuttle")
+    bundle = of_the_living("shuttle")
     verdicts = tuple(v for v in bundle.verdicts if v.name.partition(".")[0] not in TITLES)
     evidence = {name: text for name, text in bundle.evidence.items() if name not in {"explored.smt2", "faults.smt2"}}
     assert all(one.shown for one in check_bundle(replace(bundle, verdicts=verdicts, evidence=evidence)))
