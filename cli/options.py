@@ -151,14 +151,14 @@ def net_files(arguments: Sequence[str]) -> tuple[str, ...]:
 
     Folders whose names begin with a dot are left out. A folder without a net file stays, for its reader to refuse.
     """
-    found: dict[str, None] = {}
+    found: list[str] = []
     for argument in arguments:
         folder = Path(argument)
         below = (
             sorted(folder.rglob(f"*{NET_FILE}")) if not argument.startswith(CATALOGUE) and _is_folder(folder) else []
         )
         shown = [path for path in below if not _is_hidden(path.relative_to(folder)) and path.is_file()]
-        found |= dict.fromkeys(map(str, shown) if shown else [argument])
+        found += map(str, shown) if shown else [argument]
     return tuple(found)
 
 
