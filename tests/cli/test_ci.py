@@ -21,7 +21,7 @@ WORKFLOW = ".github/workflows/firable.yml"
 LATE = catalogue_path("one_robot_mc_late").read_text("utf-8")
 SAFE = catalogue_path("one_robot").read_text("utf-8")
 KNOWN = "\nexpect:\n  deadlock-free: violated\n  property.no_deadlock: violated\n  property.restart: violated\n"
-PLUGIN = ("-p", "firable.cli.pytest_plugin", "-p", "no:cacheprovider")
+PLUGIN = ("-p", "no:firable", "-p", "firable.cli.pytest_plugin", "-p", "no:cacheprovider")
 
 
 def fits(schema: str, file: Path) -> bool:

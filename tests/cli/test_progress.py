@@ -124,7 +124,7 @@ def test_ctrl_c_in_a_proof_shows_what_is_known_so_far(
 def test_ctrl_c_in_the_exploration_of_a_protocol_shows_what_is_known_so_far(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("firable.decompose.protocol.outages.outages", interrupt)
+    monkeypatch.setattr("firable.decompose.protocol.outages.inquests", interrupt)
     assert main(["prove", NET, "--faults"]) == 3
     told = capsys.readouterr().out
     assert "✓ proved    explored.follows" in told
