@@ -5,13 +5,16 @@ gate arc is dashed and ends at the transition in a black dot, an inhibitive one 
 short stubs with the name of the signal. A place with an output signal has a small arrow going out to the command.
 
 The text is deterministic: the same net, marking and steps give the same bytes, so that pictures can be compared in
-reviews. It contains no script, no link and no font; every name is escaped.
+reviews. It contains no script, no link and no font; every name is escaped. What is of the net bears a stable id, of its
+kind and its names, which hold no colon: `place:robot.free`, `transition:G2`, `lane:robot`, `input:G2:robot.free` (and
+output, permissive, inhibitive), `gate:G1:conveyor.part_at_entry`. Pages and style sheets find it by that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
+from urllib.parse import quote
 from xml.sax.saxutils import escape
 
 from firable.nets.drawing.layout import label_lines, layout, transition_lines
@@ -143,8 +146,9 @@ class _Writer:
     def _lane(self, i: int, lane: Lane) -> Iterator[str]:
         fill, stroke = self._colours(i)
         top, bottom = self.where.top, self.where.bottom
+        name = "" if lane.owner is None else f"{_id('lane', lane.owner)} "
         yield (
-            f'<rect x="{_n(lane.x)}" y="{_n(top)}" width="{_n(lane.width)}" height="{_n(bottom - top)}" rx="10" '
+            f'<rect {name}x="{_n(lane.x)}" y="{_n(top)}" width="{_n(lane.width)}" height="{_n(bottom - top)}" rx="10" '
             f'fill="{fill}" stroke="{stroke}"/>'
         )
         if lane.owner is None:
@@ -186,7 +190,8 @@ class _Writer:
 
     def _edge(self, edge: Edge) -> Iterator[str]:
         gate = edge.kind in {Kind.PERMISSIVE, Kind.INHIBITIVE}
-        yield f'<path class="{"gate" if gate else "arc"}" d="{self._path(edge)}"/>'
+        ends = (self.net.transitions[edge.transition].name, self.net.places[edge.place].name)
+        yield f'<path {_id(edge.kind, *ends)} class="{"gate" if gate else "arc"}" d="{self._path(edge)}"/>'
         spot, bar = self.where.places[edge.place], self.where.bars[edge.transition]
         sign = -1.0 if bar.y < spot.y else 1.0
         if edge.kind is Kind.INPUT:
@@ -208,7 +213,7 @@ class _Writer:
     def _bar(self, t: int, bar: Bar) -> Iterator[str]:
         transition = self.net.transitions[t]
         steps = self.steps.get(transition.name, ())
-        yield f"<g><title>{_x(self._told(t))}</title>"
+        yield f"<g {_id('transition', transition.name)}><title>{_x(self._told(t))}</title>"
         for start, end in bar.segments:
             yield (
                 f'<rect class="{"fired" if steps else "bar"}" x="{_n(start)}" y="{_n(bar.y - BAR_HALF_HEIGHT)}" '
@@ -232,15 +237,17 @@ class _Writer:
         y = self.where.bars[stub.transition].y - BAR_HALF_HEIGHT - 4
         x = stub.x + BAR_HALF_WIDTH - 7 - 9 * (stub.slot % 4)  # each its own end: one may be a dot, the other a circle
         far_x, far_y = stub.x + BAR_HALF_WIDTH + 6, y - 7 - 12 * stub.slot
+        not_wanted = () if stub.gate.wanted else ("0",)  # a signal may be wanted both 1 and 0
+        yield f"<g {_id('gate', self.net.transitions[stub.transition].name, stub.gate.signal, *not_wanted)}>"
         yield f'<path class="stub" d="M{_n(far_x)} {_n(far_y)}L{_n(x)} {_n(y)}"/>'
         yield _end(x, y, permissive=stub.gate.wanted)
-        yield f'<text class="signal" x="{_n(far_x + 3)}" y="{_n(far_y + 2.5)}">{_x(stub.label)}</text>'
+        yield f'<text class="signal" x="{_n(far_x + 3)}" y="{_n(far_y + 2.5)}">{_x(stub.label)}</text></g>'
 
     def _place(self, p: int, spot: Spot) -> Iterator[str]:
         place = self.net.places[p]
         lines = label_lines(place)
         hint = " — ".join(text for text in (place.name, place.description) if text)
-        yield f"<g><title>{_x(hint)}</title>"
+        yield f"<g {_id('place', place.name)}><title>{_x(hint)}</title>"
         yield f'<circle class="place" cx="{_n(spot.x)}" cy="{_n(spot.y)}" r="{_n(RADIUS)}"/>'
         if self.marking >> p & 1:
             yield f'<circle class="token" cx="{_n(spot.x)}" cy="{_n(spot.y)}" r="5.5"/>'
@@ -348,6 +355,11 @@ def _end(x: float, y: float, *, permissive: bool) -> str:
     """The end of a gate at the transition: a black dot or a hollow circle."""
     css, radius = ("dot", "3.2") if permissive else ("hollow", "3.6")
     return f'<circle class="{css}" cx="{_n(x)}" cy="{_n(y)}" r="{radius}"/>'
+
+
+def _id(kind: str, *names: str) -> str:
+    """The attribute by which a part of the net is found; what XML forbids in names is percent-encoded."""
+    return f'id="{":".join((kind, *(quote(name) for name in names)))}"'
 
 
 def _n(value: float) -> str:

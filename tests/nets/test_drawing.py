@@ -1,6 +1,7 @@
 """Drawings: complete, deterministic, and readable by construction whatever the net."""
 
 import xml.etree.ElementTree as ET
+from urllib.parse import quote
 
 import pytest
 from hypothesis import given
@@ -133,3 +134,22 @@ def test_a_time_limit_stands_below_the_command_and_its_timer_beside_the_completi
     assert drawn.count(">within 5s<") == 5
     stubs = {"".join(stub.itertext()): stub.get("x") for stub in elements(drawn, "text", "signal")}
     assert stubs["to_cv1_overdue"] == stubs["at_cv1"]
+
+
+@examples(100)
+@given(whole_nets())
+def test_what_is_of_the_net_is_found_by_an_id_of_its_own(net: Net) -> None:
+    ids = [found for element in ET.fromstring(draw_net(net)).iter() if (found := element.get("id")) is not None]
+    assert len(set(ids)) == len(ids)
+    wanted = {f"place:{quote(place.name)}" for place in net.places}
+    for transition in net.transitions:
+        name = quote(transition.name)
+        wanted |= {f"transition:{name}"}
+        wanted |= {f"input:{name}:{quote(place)}" for place in transition.inputs}
+        wanted |= {f"output:{name}:{quote(place)}" for place in transition.outputs}
+        wanted |= {f"permissive:{name}:{quote(place)}" for place in transition.permissive}
+        wanted |= {f"inhibitive:{name}:{quote(place)}" for place in transition.inhibitive}
+        wanted |= {f"gate:{name}:{quote(g.signal)}{'' if g.wanted else ':0'}" for g in transition.external}
+    assert wanted == {one for one in ids if not one.startswith("lane:")}
+    owners = {place.owner for place in net.places} | {signal.owner for signal in net.signals}
+    assert {f"lane:{quote(owner)}" for owner in owners if owner} == {one for one in ids if one.startswith("lane:")}
