@@ -9,16 +9,17 @@ fire is seen in the central net:
   opens no round that disturbs an open one, nor one that disturbs a group that waits for that, and so on; whoever has
   promised fires nothing that disturbs the promise, and reads no signal anew that it reads or clears. Such a round may
   be opened after the crash, too, on reports from before. So whatever it would keep back is held up throughout.
-- *A coordinator is dead.* It decides nothing any more, and what it was promised stays promised: of the parts that are
-  firable where it died, as many as do not disturb each other. What would disturb one of them fires no more (O1), nor
-  what shares a signal with it.
+- *A coordinator is dead.* It decides nothing any more, and what it was promised stays promised: parts that do not
+  disturb each other. What would disturb one of them fires no more (O1), nor what shares a signal with it. A part that
+  is promised is firable; or it is behind: its transition was decided before, so the central net has its tokens moved
+  already, and others may have gone on from there, but its order never comes.
 
 Everything else can be brought to rest, and is then fired as if nobody were dead. So the net here is the central one,
 the life of who dies, and the promises that a dead coordinator leaves:
 
     not-begun ─begins──▶ alive ─dies──▶ dying ─is-dead──▶ dead        what the dead hold up fires while they are alive,
     not-begun ─dies-at-once──▶ dead, early                            the rest then, and when they are dead
-    hold/t/c: while dying, c has promised its part of t
+    hold/t/c: while dying, c has promised its part of t             behind/t/c: and t was decided before
 
 Each question is a property of this net (`outages`), with evidence as any property. That what goes on here goes on in
 the protocol is argued in docs/protocol.md, and tests hold it to an exploration of the protocol's net, in which rounds
@@ -171,13 +172,24 @@ class Bereft:
             Transition("life/dies", (ALIVE,), (DYING,)),
             Transition("life/is-dead", (DYING,), (DEAD,)),
         )
-        holding = sorted((self._holding(part, held) for part in held), key=lambda t: t.name)
+        holding = sorted((t for part in held for t in self._holding(part, held)), key=lambda t: t.name)
         return Net(f"bereft-{central.name}", places, (*lives, *holding, *self._central(held)))
 
-    def _holding(self, part: Part, held: Mapping[Part, str]) -> Transition:
-        others = (held[other] for other in self.parts.excluding(part) if other in held)
-        full, empty = (DYING, *part.inputs, *part.permissive), (*part.outputs, *part.inhibitive, *others)
-        return Transition(f"hold/{part.whole}/{part.controller}", (), (held[part],), _sorted(full), _sorted(empty))
+    def _holding(self, part: Part, held: Mapping[Part, str]) -> Iterator[Transition]:
+        """The part is promised and firable, but for what others of its round may have moved; or it is behind."""
+        others = {held[other] for other in self.parts.excluding(part) if other in held}
+        moved = {
+            place
+            for t in self.parts.groups[self.parts.group_of[part.whole]]
+            for mate in self.parts.coordinated[t]
+            if t != part.whole and mate.controller == part.controller
+            for place in mate.writes
+        }
+        full, empty = {*part.inputs, *part.permissive} - moved, {*part.outputs, *part.inhibitive} - moved
+        name, here = f"{part.whole}/{part.controller}", (held[part],)
+        yield Transition(f"hold/{name}", (), here, _sorted({DYING, *full}), _sorted(empty | others))
+        full, empty = {*part.outputs, *part.permissive}, {*part.inputs, *part.inhibitive}
+        yield Transition(f"behind/{name}", (), here, _sorted({DYING, *full}), _sorted(empty | others))
 
     def _central(self, held: Mapping[Part, str]) -> Iterator[Transition]:
         disturbed: dict[str, list[str]] = {}

@@ -243,18 +243,30 @@ class Wake:
         places += [Place(place.name, marked=place.marked) for place in central.places]
         return Net(f"bereft-{central.name}", tuple(places), tuple(self._transitions()))
 
+    def _promised(self, part: Part) -> tuple[set[str], set[str]]:
+        """What is full and what is empty in the central net, of a part that is promised and of which no order is on."""
+        own, moved = part.own, set[str]()
+        for other in self.voting.all_parts:
+            if other.controller == part.controller and other.whole in self.voting.group_of[part.whole]:
+                moved |= other.writes if other is not part else set()
+        return {*own.inputs, *own.permissive} - moved, {*own.outputs, *own.inhibitive} - moved
+
+    def _behind(self, part: Part) -> tuple[set[str], set[str]]:
+        """The same of one that has been decided: the central net has moved its tokens."""
+        own = part.own
+        return {*own.outputs, *own.permissive}, {*own.inputs, *own.inhibitive}
+
     def _transitions(self) -> Iterator[Transition]:
         yield Transition("life/begins", (_NOT_BEGUN,), (_ALIVE,))
         yield Transition("life/dies-at-once", (_NOT_BEGUN,), (_DEAD, _EARLY))
         yield Transition("life/dies", (_ALIVE,), (_DYING,))
         yield Transition("life/is-dead", (_DYING,), (_DEAD,))
-        for place, part in sorted(self.promises.items()):
-            own = part.own
-            full = {_DYING, *own.inputs, *own.permissive}
-            empty = {*own.outputs, *own.inhibitive} | self._places_of(self.voting.others(part))
-            yield Transition(
-                f"hold{place.removeprefix('held')}", (), (place,), tuple(sorted(full)), tuple(sorted(empty))
-            )
+        for act in ("behind", "hold"):
+            for place, part in sorted(self.promises.items()):
+                full, empty = self._promised(part) if act == "hold" else self._behind(part)
+                full, empty = full | {_DYING}, empty | self._places_of(self.voting.others(part))
+                name = f"{act}{place.removeprefix('held')}"
+                yield Transition(name, (), (place,), tuple(sorted(full)), tuple(sorted(empty)))
         stopped: dict[str, set[str]] = {}
         for part in (*self.voting.local, *self.voting.all_parts):
             stopped[part.whole] = stopped.get(part.whole, set()) | self.left_by(part)

@@ -52,6 +52,28 @@ def gated(a: str = "a", together: str = "G") -> Net:
     return Net("gated", places, transitions, controllers=(Controller(a), Controller("b")))
 
 
+def overtaken() -> Net:
+    """`u` is decided by the line, and `p` goes on from it by `l`; `r` may be behind, and then `y` never comes.
+
+    Before `l` has fired, `x` goes on without `y`, and where `r` is not behind, by it.
+    """
+    marked = dict.fromkeys(("p.a", "p.q", "p.r", "p.z", "p.k", "p.j", "r.b", "r.d", "r.e", "s.g", "s.h"), False)
+    marked |= dict.fromkeys(("p.a", "p.r", "r.b", "s.g"), True)
+    transitions = (
+        Transition("u", ("p.a", "r.b", "s.g"), ("p.q", "r.d", "s.h")),
+        Transition("back", ("r.e", "s.h"), ("p.a", "r.b", "s.g")),
+        Transition("l", ("p.q", "p.r"), ("p.z",)),
+        Transition("alone", ("p.r",), ("p.k",)),
+        Transition("y", ("p.z", "r.d"), ("p.k", "r.e")),
+        Transition("x", ("p.k",), ("p.j",)),
+        Transition("again", ("p.j",), ("p.r",)),
+    )
+    places = tuple(Place(name, name[0], marked=token) for name, token in marked.items())
+    layers = (Controller("line", coordinator=True), Controller("cell"), Controller("s"))
+    below = (Controller("p", under="cell"), Controller("r", under="cell"))
+    return Net("overtaken", places, transitions, controllers=(*layers, *below))
+
+
 @cache
 def bundled(make: Callable[[], Net]) -> Bundle:
     """What a bundle holds of who is dead, and nothing else."""
@@ -121,6 +143,12 @@ def test_what_the_dead_keep_back_is_what_exploring_the_protocol_finds(seed: int)
     assert is_as_explored(owned_net(seed))
 
 
+def test_a_part_whose_order_never_comes_keeps_back_what_needs_its_tokens_after_others_have_gone_on() -> None:
+    assert is_as_explored(overtaken())
+    dead = {outage.name: outage for outage in outages(split(overtaken()))}
+    assert dead["coordinator line"].at_last == ("l", "alone", "y", "x", "again")
+
+
 def test_a_promise_that_nobody_takes_back_keeps_still_what_it_reads() -> None:
     dead = {outage.name: outage for outage in outages(split(gated()))}
     assert dead["the coordinator"].at_once == ("G", "H")
@@ -164,7 +192,7 @@ def both(net: Net) -> Iterator[tuple[Bereft, Wake]]:
 @pytest.mark.parametrize("make", [looping_net, owned_net])
 def test_both_texts_make_the_same_net_of_random_nets(make: Callable[[int], Net]) -> None:
     left = 0
-    for net in (cells_in_a_line(), *map(make, range(40))):
+    for net in (cells_in_a_line(), overtaken(), *map(make, range(40))):
         for here, there in both(net):
             left += len(here.left)
             assert net_digest(here.net) == net_digest(there.net)
