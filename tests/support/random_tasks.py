@@ -99,7 +99,7 @@ def nested(draw: random.Random, task: Task, catalogue: Catalogue) -> Task:
         out_of = Move(f"{move.name}_", (name,), move.targets, external=move.external)
         return replace(
             task,
-            subtasks=(*task.subtasks, Subtask(name, TaskUse(inner.name, tuple(arguments.items())))),
+            subtasks=(*task.subtasks, Subtask(name, TaskUse(inner.name, tuple(sorted(arguments.items()))))),
             moves=(*(one for one in task.moves if one is not move), into, out_of),
         )
     return task
