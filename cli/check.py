@@ -235,6 +235,7 @@ def _queries(loaded: Loaded, asked: _Asked) -> tuple[Query, ...]:
 def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> tuple[CheckReport, Kept]:
     """What the techniques find of a net, and what is kept of it."""
     from firable.analysis.check import check as check_net
+    from firable.analysis.cures.finding import explained
     from firable.cli.cache import Kept
     from firable.cli.progress import progress_line
 
@@ -248,7 +249,7 @@ def _found(net: Net, asked: _Asked, queries: Sequence[Query]) -> tuple[CheckRepo
         figures["structure"] = structure_json(
             net, contact_free=contact_free, seconds=asked.budget.seconds, discipline=asked.discipline
         )
-    return found, Kept(found.verdicts, figures, found.course)
+    return found, Kept(explained(found), figures, found.course)
 
 
 def _traces(net: Net, verdicts: Iterable[Verdict], discipline: str) -> dict[str, str]:

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from firable.cli.story import cures_told, waits_told
+
 if TYPE_CHECKING:
     from firable.cli.report import Report
     from firable.nets.diagnostics import Diagnostic
@@ -162,6 +164,13 @@ def reasons(
         yield from _witness(net, verdict.name, verdict.witness, told)
     if status != "proved" and verdict.hint:
         yield f"hint: [{rule_of(verdict)}] {verdict.hint}"
+    if verdict.cures and (verbose or verdict.weight.value == "required"):
+        key = tuple(cure.changes for cure in verdict.cures)
+        if key in told:
+            yield f"cured by the same change as {told[key]}"
+        else:
+            told[key] = verdict.name
+            yield from cures_told(verdict)
 
 
 def _cost(cost: Cost) -> str:
@@ -191,6 +200,9 @@ def _witness(net: Net, name: str, witness: Witness, told: dict[tuple[object, ...
         yield witness.note
     if witness.marking:
         yield f"then hold a token: {', '.join(witness.marking)}"
+    if witness.waits:
+        yield "in a circle, each waiting for the next:"
+        yield from (f"  {line}" for line in waits_told(net, witness.waits))
     if witness.cycle:
         yield "and then for ever again:"
         yield from (f"  {line}" for line in told_steps(net, witness.cycle, len(witness.firings) + 1))

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict
 
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
 from firable.nets.net import ArbitrationRule
-from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
+from firable.nets.verdict import Cost, Cure, Status, Verdict, Wait, Weight, Witness
 
 
 class _Record(BaseModel):
@@ -105,12 +105,42 @@ def table_to_json(decomposition: Decomposition) -> dict[str, Any]:
     }
 
 
+class _WaitRecord(_Record):
+    place: str
+    transition: str
+    lacks: str
+    wanted: bool
+    holder: str
+    by: tuple[str, ...]
+
+    def wait(self) -> Wait:
+        """The wait."""
+        return Wait(self.place, self.transition, self.lacks, self.wanted, self.holder, self.by)
+
+
 class _WitnessRecord(_Record):
     firings: tuple[tuple[str, ...], ...]
     cycle: tuple[tuple[str, ...], ...]
     marking: tuple[str, ...]
     assignment: tuple[tuple[str, bool], ...]
     note: str
+    waits: tuple[_WaitRecord, ...] = ()
+
+    def witness(self) -> Witness:
+        """The witness."""
+        waits = tuple(wait.wait() for wait in self.waits)
+        return Witness(self.firings, self.cycle, self.marking, self.assignment, self.note, waits)
+
+
+class _CureRecord(_Record):
+    changes: tuple[str, ...]
+    proves: tuple[str, ...]
+    loses: tuple[str, ...]
+    markings: int
+
+    def cure(self) -> Cure:
+        """The cure."""
+        return Cure(self.changes, self.proves, self.loses, self.markings)
 
 
 class VerdictRecord(_Record):
@@ -130,10 +160,10 @@ class VerdictRecord(_Record):
     markings: int | None = None
     edges: int | None = None
     discipline: str = ""
+    cures: tuple[_CureRecord, ...] = ()
 
     def verdict(self) -> Verdict:
         """The verdict."""
-        seen = self.witness
         return Verdict(
             self.name,
             self.status,
@@ -144,10 +174,11 @@ class VerdictRecord(_Record):
             self.hint,
             self.bound,
             self.subjects,
-            Witness(seen.firings, seen.cycle, seen.marking, seen.assignment, seen.note) if seen else None,
+            self.witness.witness() if self.witness else None,
             self.evidence,
             Cost(self.markings, self.edges),
             self.discipline,
+            cures=tuple(record.cure() for record in self.cures),
         )
 
 

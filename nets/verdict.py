@@ -32,6 +32,56 @@ class Weight(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Wait:
+    """A token that waits in a deadlock: `transition` would take it from `place`, and lacks something of another place.
+
+    It lacks a token on `lacks` where one is `wanted`, or else finds one there. `holder` is the place whose token would
+    change that, by the transitions `by` in their order.
+    """
+
+    place: str
+    transition: str
+    lacks: str
+    wanted: bool
+    holder: str
+    by: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """The wait as JSON data."""
+        return {
+            "place": self.place,
+            "transition": self.transition,
+            "lacks": self.lacks,
+            "wanted": self.wanted,
+            "holder": self.holder,
+            "by": list(self.by),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Cure:
+    """A change of the net after which a violated verdict is proved, as checking the changed net has shown.
+
+    `changes` say what to write, a sentence each; `proves` names the verdicts that come out well besides, and `loses`
+    those that do no longer; `markings` is how many the changed net has.
+    """
+
+    changes: tuple[str, ...]
+    proves: tuple[str, ...]
+    loses: tuple[str, ...]
+    markings: int
+
+    def to_json(self) -> dict[str, Any]:
+        """The cure as JSON data."""
+        return {
+            "changes": list(self.changes),
+            "proves": list(self.proves),
+            "loses": list(self.loses),
+            "markings": self.markings,
+        }
+
+
+@dataclass(frozen=True, slots=True)
 class Witness:
     """A firing sequence from M0: each element is the set of transitions fired together.
 
@@ -45,6 +95,7 @@ class Witness:
     marking: tuple[str, ...] = ()
     assignment: tuple[tuple[str, bool], ...] = ()
     note: str = ""
+    waits: tuple[Wait, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +113,8 @@ class Verdict:
 
     `discipline` says how transitions fire, where the verdict depends on it: `interleaving` or `step`. `bound` says how
     far an UNKNOWN was looked at. `subjects` are the transitions or places concerned. `evidence` names
-    the files that an independent checker reads. `expected` is how the net file says that it ends.
+    the files that an independent checker reads. `expected` is how the net file says that it ends. `cures` are changes
+    of the net that make a violated one proved, the best first.
     """
 
     name: str
@@ -79,6 +131,7 @@ class Verdict:
     cost: Cost = Cost()
     discipline: str = ""
     expected: Status | None = None
+    cures: tuple[Cure, ...] = ()
 
     @property
     def holds(self) -> bool:
@@ -120,6 +173,10 @@ class Verdict:
                 "assignment": [[name, value] for name, value in self.witness.assignment],
                 "note": self.witness.note,
             }
+            if self.witness.waits:
+                data["witness"]["waits"] = [wait.to_json() for wait in self.witness.waits]
+        if self.cures:
+            data["cures"] = [cure.to_json() for cure in self.cures]
         if self.expected is not None:
             data["expected"] = self.expected.value
         for key in ("markings", "edges"):

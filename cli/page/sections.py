@@ -19,12 +19,14 @@ from firable.cli.page.protocol import is_of_protocol, lives_on, while_dead
 from firable.cli.page.runs import strip
 from firable.cli.page.swimlanes import swimlanes
 from firable.cli.report import Report
+from firable.cli.story import outcome_told, waits_told
 from firable.cli.text import counted, rule
 from firable.nets.decomposition import Decomposition
 from firable.nets.verdict import Status, Verdict, Weight, Witness
 
 if TYPE_CHECKING:
     from firable.decompose.proofs.family import Family
+    from firable.nets.net import Net
 
 LISTED_MAX: Final = 300
 """How many verdicts of one family are listed; of more, those that are not proved come first."""
@@ -234,11 +236,32 @@ def _counterexamples(report: Report) -> Markup | None:
         told[key] = (verdict.name, anchor)
         hint = tag("p", verdict.hint, cls="hint") if verdict.hint else None
         drawn = _drawn(report, verdict, witness)
-        parts.append(tag("div", head, drawn, hint, cls="counter", id=anchor))
+        story = _story(report.net_of(verdict), verdict, told, anchor)
+        parts.append(tag("div", head, drawn, story, hint, cls="counter", id=anchor))
     if not parts:
         return None
     if len(some) > COUNTEREXAMPLES_MAX:
         parts.append(tag("p", f"{len(some) - COUNTEREXAMPLES_MAX:,} more are in the report as JSON", cls="soft"))
+    return together(*parts)
+
+
+def _story(net: Net, verdict: Verdict, told: dict[tuple[object, ...], tuple[str, str]], anchor: str) -> Markup:
+    """Who waits for whom where the run ends, and what would cure it; `told` holds where the same was told before."""
+    parts: list[Markup] = []
+    if verdict.witness is not None and verdict.witness.waits:
+        waits = (tag("li", line) for line in waits_told(net, verdict.witness.waits))
+        parts += [tag("p", "There the tokens wait in a circle, each for the next:"), tag("ol", *waits)]
+    changes = tuple(cure.changes for cure in verdict.cures)
+    if changes and changes in told:
+        name, where = told[changes]
+        parts.append(tag("p", "Cured by the same change as ", tag("a", name, href=f"#{where}"), "."))
+    elif changes:
+        told[changes] = (verdict.name, anchor)
+        cures = (
+            tag("li", "; and ".join(cure.changes), tag("p", f"checked: {outcome_told(cure)}", cls="soft"))
+            for cure in verdict.cures
+        )
+        parts += [tag("p", "What would cure it, each change by itself:"), tag("ul", *cures)]
     return together(*parts)
 
 

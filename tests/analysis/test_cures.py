@@ -1,0 +1,135 @@
+"""Changes that cure a violated verdict: the smallest that is found, and shown by checking the changed net."""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
+
+import pytest
+from support.examples import seeds
+from support.lively_nets import lively_net
+
+from firable.analysis.check import check
+from firable.analysis.cures.changes import Arbitration, CapacityPlace, Gate, capacity, changed, free_name
+from firable.analysis.cures.finding import explained
+from firable.nets.catalogue import catalogue_net
+from firable.nets.net import Arbiter, Net, Place, Transition
+from firable.nets.verdict import Cure, Status, Verdict, Weight
+
+_CAPACITY_PLACE: Final = r"add the place `(\S+)`, marked at the start, to `from` of (.+) and to `to` of (.+)"
+
+
+def _explained(net: Net) -> dict[str, Verdict]:
+    return {verdict.name: verdict for verdict in explained(check(net))}
+
+
+def test_the_late_machine_is_cured_by_a_gate_or_by_the_capacity_place_of_the_paper() -> None:
+    late = _explained(catalogue_net("one_robot_mc_late"))["deadlock-free"]
+    proves = ("doomed-markings", "live", "property.no_deadlock", "property.restart")
+    loses = ("property.robot_held_at_a_full_mc",)
+    markings = check(catalogue_net("one_robot_mc_late_capacity")).figures.markings
+    capacity_place = "add the place `system.capacity`, marked at the start, to `from` of G2 and to `to` of G6"
+    assert late.cures == (
+        Cure(("give G2 the gate `unless: system.processing`",), proves, loses, 40),
+        Cure((capacity_place,), proves, loses, markings),
+    )
+
+
+def test_one_cure_is_told_of_all_verdicts_that_it_cures() -> None:
+    found = _explained(catalogue_net("one_robot_mc_late"))
+    changes = [cure.changes for cure in found["deadlock-free"].cures]
+    for name in ("property.no_deadlock", "property.restart"):
+        assert [cure.changes for cure in found[name].cures] == changes
+        assert all("deadlock-free" in cure.proves and name not in cure.proves for cure in found[name].cures)
+
+
+def test_competitors_without_an_arbiter_are_offered_one() -> None:
+    (cure,) = _explained(catalogue_net("philosophers-4"))["effective-conflicts"].cures
+    assert len(cure.changes) == 4
+    assert cure.changes[0] == (
+        "add to `arbiters`: `p1_takes_left_or_p4_takes_right: {among: [p1_takes_left, p4_takes_right], by: priority}`"
+    )
+
+
+def test_what_the_file_wants_reachable_is_told_where_it_is_the_price() -> None:
+    late = catalogue_net("one_robot_mc_late")
+    held = tuple(of for of in late.properties if of.name == "robot_held_at_a_full_mc")
+    for properties, loses in (((), ()), (held, ("property.robot_held_at_a_full_mc",))):
+        cures = _explained(replace(late, properties=properties))["deadlock-free"].cures
+        assert [cure.loses for cure in cures] == [loses, loses]
+
+
+def test_a_change_by_which_somebody_starves_comes_last() -> None:
+    by_place, by_gates = _explained(catalogue_net("philosophers-3"))["deadlock-free"].cures
+    assert "capacity" in by_place.changes[0]
+    assert by_place.loses == ("effective-conflicts",)
+    assert by_gates.loses == ("starvation",)
+
+
+def test_nothing_is_offered_where_the_start_is_lost_already() -> None:
+    net = Net("end", (Place("a", marked=True), Place("b")), (Transition("t", ("a",), ("b",)),))
+    assert _explained(net)["deadlock-free"].cures == ()
+
+
+@pytest.mark.seeds
+def test_each_change_that_is_offered_does_what_is_said_of_it() -> None:
+    offered = 0
+    for seed in seeds(300):
+        net = lively_net(random.Random(seed), 8)
+        before = check(net)
+        for verdict in explained(before):
+            for cure in verdict.cures:
+                offered += 1
+                _does_what_it_says(net, before.verdicts, verdict.name, cure)
+    assert offered > 30
+
+
+def _does_what_it_says(net: Net, before: Iterable[Verdict], name: str, cure: Cure) -> None:
+    after = check(_by_hand(net, cure))
+    ended = {one.name: one for one in after.verdicts}
+    assert after.figures.markings == cure.markings
+    assert not any(_fails(ended[of]) for of in (name, *cure.proves))
+    for one in before:
+        if one.name not in cure.loses and one.weight is not Weight.INFORMATION and not _fails(one):
+            assert not _fails(ended[one.name]), one.name
+
+
+def _fails(verdict: Verdict) -> bool:
+    return verdict.status is not Status.PROVED and verdict.weight is not Weight.INFORMATION
+
+
+def _by_hand(net: Net, cure: Cure) -> Net:
+    """The net changed as the sentences say, read as an engineer reads them."""
+    for change in cure.changes:
+        if gate := re.fullmatch(r"give (\S+) the gate `(if|unless): (\S+)`", change):
+            net = Gate(gate[1], gate[3], gate[2] == "if").made(net)
+        elif place := re.fullmatch(_CAPACITY_PLACE, change):
+            takers, givers = place[2].split(" and "), place[3].split(" and ")
+            net = CapacityPlace(place[1], None, tuple(takers), tuple(givers)).made(net)
+        else:
+            arbiter = re.fullmatch(r"add to `arbiters`: `(\S+): \{among: \[(.+)\], by: priority\}`", change)
+            assert arbiter is not None, change
+            net = replace(net, arbiters=(*net.arbiters, Arbiter(arbiter[1], tuple(arbiter[2].split(", ")))))
+    return net
+
+
+@pytest.mark.parametrize("permissive", [True, False])
+def test_a_gate_is_open_by_its_kind(permissive: bool) -> None:
+    net = Net("n", (Place("p", marked=True), Place("q")), (Transition("t", ("p",), ()),))
+    gated = changed(net, [Gate("t", "q", permissive)]).transition("t")
+    assert (gated.permissive, gated.inhibitive) == ((("q",), ()) if permissive else ((), ("q",)))
+
+
+def test_a_capacity_place_belongs_to_the_coordinator_and_has_a_free_name() -> None:
+    net = catalogue_net("one_robot_mc_late_capacity")
+    assert capacity(net, ["G1"], ["G9"]).place == "system.capacity_2"
+    assert capacity(net, ["G1"], ["G9"]).owner == "system"
+    assert free_name("a", {"b"}) == "a"
+
+
+def test_an_arbiter_counts_by_what_it_names() -> None:
+    assert Arbitration(Arbiter("a", ("t", "u", "v"))).size == 3
+    assert CapacityPlace("c", None, ("t",), ("u", "v")).size == 4
