@@ -37,7 +37,7 @@ def circle(net: Net, marking: Marking) -> tuple[Wait, ...]:
     >>> net = catalogue_net("philosophers-2")
     >>> for wait in circle(net, net.marking(["p1.left", "p2.left"])):
     ...     print(wait.place, wait.transition, wait.lacks, wait.holder)
-    p1.left p1_takes_right fork2 p2.left
+    p1.left p1_takes_right p2.fork p2.left
     p2.left p2_takes_right p1.fork p1.left
     """
     waits = _Waits(net, marking)

@@ -20,7 +20,7 @@ from firable.nets.formula import Holds
 from firable.nets.interchange import canonical_json
 from firable.nets.net import ArbitrationRule, Command, Controller, Net, Place, Property, PropertyKind, Transition
 from firable.nets.right_to_run import CHECKED, PROTOCOL, required_verdicts, unproved
-from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
+from firable.nets.verdict import Cost, Cure, Status, Verdict, Wait, Weight, Witness
 
 A, B = Controller("a"), Controller("b")
 P, Q, R = (
@@ -217,6 +217,7 @@ def with_judged_hashes(files: Mapping[str, bytes]) -> bytes:
 
 def test_every_field_of_a_verdict_is_read_back() -> None:
     witness = Witness((("G",), ("l", "G")), (("l",),), ("a.p",), (("a.p", True), ("b.q", False)), "so")
+    witness = replace(witness, waits=(Wait("a.p", "G", "b.q", wanted=True, holder="b.p", by=("l", "G")),))
     full = Verdict(
         *("v", Status.VIOLATED, "it holds", "by hand", Weight.WARNING),
         code="F4002",
@@ -227,6 +228,7 @@ def test_every_field_of_a_verdict_is_read_back() -> None:
         evidence=("eq7-G.smt2",),
         cost=Cost(3, 0),
         discipline="step",
+        cures=(Cure(("give G the gate `if: b.q`",), ("live",), ("starvation",), 3),),
     )
     assert {field.name for field in fields(full) if not getattr(full, field.name)} == {"expected"}
     bundle = replace(BUNDLE, verdicts=(*VERDICTS, full))
