@@ -23,7 +23,7 @@ from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import printable
 
-PROTOCOL_VERSION: Final = 3
+PROTOCOL_VERSION: Final = 4
 """Which messages there are and what they mean; hosts of different versions do not talk."""
 
 COORDINATOR: Final = ""

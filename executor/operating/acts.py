@@ -116,6 +116,8 @@ class Acts:
         """Whether anything is said to other hosts for the first time."""
         self.halted = False
         """Whether nothing may fire here by itself, nor be promised to the coordinators of other hosts."""
+        self.is_leaving = False
+        """Whether all votes are taken back, and nothing is withheld any more: each request is answered by no."""
         self.withheld: dict[tuple[str, int], VoteRequest | Decision] = {}
         """What those have asked for meanwhile, and what they have decided on votes that stood before the halt."""
         self.standing: dict[str, set[str]] = {name: set() for name, one in self.controllers.items() if one.free}
@@ -173,11 +175,29 @@ class Acts:
         """End a halt: what was withheld is answered, and everybody has a turn."""
         self.halted = False
         self.permit(None)
+        self._answer_withheld()
+        for machine in self.controllers:
+            self.post(machine, None)
+
+    def leave(self) -> None:
+        """Take all votes of the controllers here back, and obey whatever was decided on them before."""
+        if not self.is_leaving:
+            self.is_leaving = True
+            for machine, controller in self.controllers.items():
+                self.act(machine, controller.leave())
+            self._answer_withheld()
+
+    def stay(self) -> None:
+        """Give votes again after all."""
+        self.is_leaving = False
+        for machine, controller in self.controllers.items():
+            controller.stay()
+            self.post(machine, None)
+
+    def _answer_withheld(self) -> None:
         for message in self.withheld.values():
             self.post(message.controller, message)
         self.withheld.clear()
-        for machine in self.controllers:
-            self.post(machine, None)
 
     def forgo(self, names: Collection[str]) -> None:
         """Let these transitions fire no more, nor be promised here."""
@@ -213,12 +233,10 @@ class Acts:
             return
         controller = self.controllers[machine]
         match item:
-            case VoteRequest() if self.halted and item.coordinator not in self.coordinators:
+            case VoteRequest() if self._withholds(item):
                 self.withheld[machine, item.round] = item
                 return
-            case Decision() if (
-                self.halted and item.coordinator not in self.coordinators and item.committed in controller.free
-            ):
+            case Decision() if self._withholds(item) and item.committed in controller.free:
                 self.withheld[machine, item.round] = item  # as if it were still on its way
                 return
             case VoteRequest() | Decision() | Hello():
@@ -238,6 +256,9 @@ class Acts:
             if controller.may_fire:
                 self.posted.append((machine, None))
         self.act(machine, controller.report())
+
+    def _withholds(self, item: VoteRequest | Decision) -> bool:
+        return self.halted and not self.is_leaving and item.coordinator not in self.coordinators
 
     def _receive(self, machine: str, controller: LocalController, item: ToController) -> None:
         known = frozenset(controller.promises)
@@ -353,6 +374,10 @@ class Acts:
         return leaving
 
     # What is open
+
+    def awaited(self) -> dict[str, set[str]]:
+        """For each controller that is leaving, the coordinators whose word it waits for."""
+        return {name: set(controller.awaited) for name, controller in self.controllers.items()}
 
     @property
     def is_settled(self) -> bool:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Collection
 from dataclasses import replace
-from itertools import takewhile
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.operating import restart
@@ -152,10 +151,6 @@ def beginnings(net: Net) -> tuple[str, ...]:
 
 
 def _nobody_waits(run: Host) -> bool:
-    """Whether nothing is open here, all rounds of coordinators here are closed, and those above have ended.
-
-    Hosts end from the top down: each waits for the coordinators before its own, without any for all.
-    """
-    before = takewhile(lambda name: name not in run.coordinators, run.deciding)
-    is_heard = all(each.idle for each in run.coordinators.values()) and run.peers.connected_to.isdisjoint(before)
-    return run.acts.is_settled and is_heard
+    """Whether nothing is open here, all rounds of coordinators here are closed, and none elsewhere has any for it."""
+    is_idle = all(each.idle for each in run.coordinators.values())
+    return run.acts.is_settled and is_idle and run.peers.have_let_go

@@ -10,13 +10,15 @@ an operator's step is over.
 
 *Operator*, on each host, for what is on it. *Pause*: no further firing; rounds that are not decided are aborted, and
 nothing more is promised to coordinators elsewhere; machines end the command they are at. *Step*: while paused, one
-firing. *Stop*: no further firing, ever; the host waits, for a while, until what was decided is applied and acknowledged
-(hosts of controllers wait for those of their coordinators to end, so that their last words arrive; where all machines
-are here it takes no time), then the driver drives the safe outputs, which stop every machine where it is. *Stop at the
-end of the cycle*: no new work comes in, and the run ends when the cell is at rest. *Emergency stop*: the safe outputs
-first, before anything is written or said, and whatever has become of coordinator and link; what was decided is applied
-all the same, so that nobody waits for it, and its commands are asked after at the restart. A *fault* of the driver, or
-a command that is overdue, does the same by itself.
+firing. *Stop*: no further firing, ever, and no command; the controllers take their votes back, and the host waits, for
+a while, until what was decided is applied and acknowledged, and each coordinator that can be reached has said that no
+order is open, so that hosts may be stopped in any order; then the driver drives the safe outputs, which stop every
+machine where it is. Where all machines are here it takes no time. *Stop at the end of the cycle*: no new work comes
+in, and the run ends when the cell is at rest; a host among others takes its votes back when it is at rest, and goes on
+if an order comes before the word that none is open. *Emergency stop*: the safe outputs first, before anything is
+written or said, and whatever has become of coordinator and link; what was decided is applied all the same, so that
+nobody waits for it, and its commands are asked after at the restart. A *fault* of the driver, or a command that is
+overdue, does the same by itself.
 
 A whole run ends by itself, too: when its work is done, or nothing can go on. A host among others does not: its machines
 rest because others work. Its trace has a last line only where nothing was open.
@@ -95,8 +97,7 @@ class Host:
         self.driver = driver
         self.recorder = recorder
         self.journal = journal or MemoryJournal()
-        self.deciding = coordinators(decomposition)
-        everything = (*self.deciding, *(subnet.name for subnet in decomposition.subnets))
+        everything = (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))
         self.dispatch = Dispatch(self, overdue_seconds)
         here = everything if machines is None else machines
         self.acts = Acts(decomposition, here, self.journal, recorder, figures, self._wake, self.dispatch.left)
@@ -220,6 +221,8 @@ class Host:
     def pause(self) -> None:
         """Let nothing fire any more; machines end the command they are at."""
         if not self.paused:
+            if self.acts.is_leaving:
+                self.acts.stay()
             self._halt("paused")
 
     def resume(self) -> bool:
@@ -341,15 +344,17 @@ class Host:
         for effect in self.acts.commit():
             if not isinstance(effect, Sending):
                 self.peers.send(effect)
-            elif not self.is_safe:
+            elif (
+                self.is_safe or self.stopping
+            ):  # the trace has it as issued; a restart asks after it, and gives it then
+                self.note("kept back", place=effect.place)
+            else:
                 self.dispatch.send(effect.place, effect.entry)
 
     def _settle(self) -> None:
         """At quiescence, wake who waits for it, and end the run if nothing will happen."""
         self._release()
-        if self.ends_at_home and not self.stopping and not self.paused and ending.is_home(self):
-            self.ended_by = ending.AT_THE_END if self.is_whole else ""
-            self._end_soon(ending.AT_THE_END, **({} if self.is_whole else {"message": ending.alone(self)}))
+        if self.ends_at_home and not self.stopping and not self.paused and self._ends_cycle():
             return
         ended = ending.ended(self)
         if ended is not None and self.outcome is not None:
@@ -357,8 +362,22 @@ class Host:
                 self.journal.write(TRACE, [Keep(_END, ended.state.value)])
                 self.acts.unsynced = True
             self.acts.commit()
-            self.left_nothing_open = self.acts.is_settled  # what comes while the link is closed is not heard
+            # What comes while the link is closed is not heard.
+            self.left_nothing_open = self.acts.is_settled and self.peers.have_let_go
             self.outcome.set_result(ended)
+
+    def _ends_cycle(self) -> bool:
+        """Whether there is more to be done before the cycle is at its end, and is begun."""
+        if not ending.is_home(self):
+            if self.acts.is_leaving:
+                self.acts.stay()  # an order has come on a vote that stood
+            return False
+        if not self.is_whole and not self.acts.is_leaving:
+            self.acts.leave()
+        elif self.is_whole or self.peers.have_let_go:
+            self.ended_by = ending.AT_THE_END if self.is_whole else ""
+            self._end_soon(ending.AT_THE_END, **({} if self.is_whole else {"message": ending.alone(self)}))
+        return True
 
     def _release(self) -> None:
         """Wake who waits for quiescence."""
@@ -413,6 +432,8 @@ class Host:
         """End when nothing is open, or after a while."""
         self.stopping = True
         self._halt(note, **data)
+        if not self.is_whole:
+            self.acts.leave()
         if self.clock is not None and not self.is_whole:
             self.clock.loop.call_later(SETTLE_SECONDS, self._wait_no_longer)
 

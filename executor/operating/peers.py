@@ -100,6 +100,14 @@ class Peers:
         yield from map(_missing, self.never_met)
 
     @property
+    def have_let_go(self) -> bool:
+        """Whether each coordinator that can be reached has said to each controller here that no order is open.
+
+        One that cannot be reached has ended, or must wait for a restart of these in any case.
+        """
+        return all(self.connected_to.isdisjoint(awaited) for awaited in self.acts.awaited().values())
+
+    @property
     def never_met(self) -> tuple[str, ...]:
         """The machines that should have come by now and have not, of those that some machine here talks to."""
         return tuple(name for name in self.needed if name not in self.met) if self.is_due else ()

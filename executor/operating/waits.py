@@ -1,7 +1,8 @@
 """What waits for whom between the machines of a cell, in sentences: asked of the machines of one host, told to people.
 
-A promise waits for a decision, an undecided round for votes, a decided one for its parts. That is all that can wait for
-another host; what waits for a token or a gate is in `situation.py`.
+A promise waits for a decision, an undecided round for votes, a decided one for its parts, a controller that leaves for
+the word that no order is open. That is all that can wait for another host; what waits for a token or a gate is in
+`situation.py`.
 """
 
 from __future__ import annotations
@@ -32,6 +33,9 @@ def waits(
             if promise.promised:
                 what, decider = " or ".join(sorted(promise.promised)), controller.coordinator_of(number)
                 yield f"{called(name)} has promised {what}, and waits for {reached(decider, away)} to decide"
+        for above in controller.awaited:
+            if above not in coordinators and above not in away:
+                yield f"{called(name)} has taken its votes back, and waits for {called(above)} to say that none is used"
         if controller.held:
             yield f"{called(name)} is held after a restart, until it is resumed"
 

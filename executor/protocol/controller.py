@@ -23,6 +23,12 @@ A pure machine: inputs are method calls, outputs the effects that they return. I
 only until the coordinator says that nobody will speak of it again. The alternative, a promise with a time limit, needs
 clocks that agree; here a lost decision is repeated until acknowledged, and until then the part stays blocked (O6).
 
+A controller whose host is about to end is *leaving*: it fires nothing, names nothing in its reports and votes no, so
+that no round waits for it and no vote of it stands. But an order may be under way on a vote that stood before. So its
+report asks each coordinator for the word that no open round needs it any more, and until that has come it obeys
+whatever arrives. Rejected: to end when all is quiet here. Of an order on a standing vote a controller knows nothing
+before it comes.
+
 What is kept in stable storage, and the fault that would show if it were not:
 
 - `word`, the marking and the completion signals in the image, in pieces (`stored_word`), whenever a firing, a promise
@@ -115,6 +121,8 @@ class Above:
     """Every round of the coordinator with a smaller number is closed."""
     kept_below: int = 0
     """What is kept of that."""
+    dismissed: int = -1
+    """The sequence number of the last report to which the coordinator has said that no round needs the controller."""
 
 
 class LocalController:
@@ -162,6 +170,8 @@ class LocalController:
         self.untold: Word = 0
         """The sensors that have shown nothing since the restart."""
         self.held = False
+        self.leaving = False
+        """Whether its host is about to end."""
         self.forgone = 0
         """The transitions that an operator lets fire no more, by their indexes."""
         self.index_of = {row: t for t, row in self.rows.items()}
@@ -210,17 +220,34 @@ class LocalController:
         effects = list(self._close_below(above, message.closed_below))
         if message.epoch > above.epoch:
             # It has restarted, and has forgotten which rounds were open: to name them makes it abort them.
-            above.epoch, above.seen = message.epoch, -1
+            above.epoch, above.seen, above.dismissed = message.epoch, -1, -1
             effects += self._say_again(above)
         if message.epoch == above.epoch:
             above.seen = max(above.seen, message.seen)
+            if isinstance(message, Hello):
+                above.dismissed = max(above.dismissed, message.seen)
         match message:
             case VoteRequest():
-                return [*effects, *self._vote(message)]
+                effects += self._vote(message)
             case Decision():
-                return [*effects, *self._decided(message)]
+                effects += self._decided(message)
             case Hello():
                 return effects
+        return [*effects, *self._last_words(above)]
+
+    def leave(self) -> list[Effect]:
+        """Take all votes back and fire no more; the end may come when `awaited` names nobody and no promise is open."""
+        self.leaving = True
+        return [effect for above in self.above.values() for effect in self._last_words(above)]
+
+    def stay(self) -> None:
+        """Leave no more: votes are given again."""
+        self.leaving = False
+
+    @property
+    def awaited(self) -> tuple[str, ...]:
+        """The coordinators that have not said yet that no round needs it; nobody unless it is leaving."""
+        return tuple(name for name, above in self.above.items() if self._is_unanswered(above))
 
     def applies(self, decision: Decision) -> bool:
         """Whether this order would fire a part here: it commits one, and has not been obeyed."""
@@ -268,7 +295,7 @@ class LocalController:
 
     def fire(self) -> list[Effect]:
         """Fire one local transition, if one is enabled and disturbs no promise; no effect means that none is."""
-        if self.held:
+        if self.held or self.leaving:
             return []
         enabled = self.enabled.at(self.word) & self.local_mask & ~self.forgone
         if not enabled:
@@ -290,11 +317,7 @@ class LocalController:
 
     def report(self) -> list[Effect]:
         """Tell each coordinator which parts are enabled, if that has changed since it was last told."""
-        return [
-            Report(self.name, self._told(above), above.name)
-            for above in self.above.values()
-            if self._readiness(above).sequence > above.told
-        ]
+        return [self._report(above) for above in self.above.values() if self._readiness(above).sequence > above.told]
 
     def resend(self) -> list[Effect]:
         """Repeat what is unanswered, for links that lose messages: votes, and the last report if it is not seen."""
@@ -304,7 +327,16 @@ class LocalController:
         promised = [n for n, promise in self.promises.items() if promise.promised and self._above(n) is above]
         if promised:
             return [Vote(self.name, n, self.promises[n].promised, self._told(above), above.name) for n in promised]
-        return [Report(self.name, self._told(above), above.name)] if above.told > above.seen else []
+        return [self._report(above)] if above.told > above.seen or self._is_unanswered(above) else []
+
+    def _report(self, above: Above) -> Report:
+        return Report(self.name, self._told(above), above.name, self.leaving)
+
+    def _last_words(self, above: Above) -> list[Effect]:
+        return [self._report(above)] if self._is_unanswered(above) else []
+
+    def _is_unanswered(self, above: Above) -> bool:
+        return self.leaving and above.dismissed < self._readiness(above).sequence
 
     def _restore(self, kept: Mapping[str, Stored]) -> None:
         self.held = True
@@ -333,7 +365,8 @@ class LocalController:
         if self._is_closed(request.round):
             return  # an old copy: the round is decided
         if request.round not in self.promises:
-            asked = [n for n in request.transitions if n in self.parts and n not in self.free and not self.held]
+            is_asked = not (self.held or self.leaving)
+            asked = [n for n in request.transitions if n in self.parts and n not in self.free and is_asked]
             asked = [name for name in asked if not self.forgone >> self.index_of[name] & 1]
             # The parts of one round may disturb each other: one of them is chosen. Those of other rounds may not.
             yes = [n for n in asked if self._is_enabled(self.parts[n]) and not self._disturbs_promises(self.parts[n])]
@@ -486,7 +519,7 @@ class LocalController:
         return _union(promise.reads | promise.writes for promise in self.promises.values())
 
     def _readiness(self, above: Above) -> Readiness:
-        ready = 0 if self.held else self.enabled.at(self.word) & above.mask & ~self.forgone
+        ready = 0 if self.held or self.leaving else self.enabled.at(self.word) & above.mask & ~self.forgone
         if self.untold or self.unsent:
             ready = sum(1 << t for t in bits(ready) if self._is_enabled(self.transitions[t]))
         if self.promises and ready & self.free_mask:

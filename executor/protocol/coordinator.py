@@ -20,6 +20,10 @@ acknowledgement brings a report along; and (b) if the report is of this epoch of
 knows nothing of the acknowledgements before, and any report from then may come late. `Hello` is repeated until there is
 a report of this epoch. A round in which nobody has to promise is decided when it is opened.
 
+*Leaving*: the last report of a controller is answered by `Hello` when no open round has asked it for anything or given
+it an order, but those that it has acknowledged; until then by what is open, said again. No round needs it afterwards:
+none is opened over what its newest report does not name, and who has restarted counts no vote of before.
+
 A pure machine, as the controllers are. What is kept in stable storage, and the fault that would show if it were not:
 
 - `round/<number>`, what was asked and what is committed, from the decision until all have acknowledged: a transition
@@ -153,7 +157,8 @@ class Coordinator:
         match message:
             case Report():
                 self._hear(message.controller, message.readiness)
-                return list(self._open())
+                last = self._last_words(message.controller) if message.last else ()
+                return [*self._open(), *last]
             case Vote():
                 self._hear(message.controller, message.readiness)
                 return list(self._voted(message))
@@ -178,13 +183,16 @@ class Coordinator:
                 if self.seen[controller] < 0 or not self.lately.get(controller, True):
                     effects.append(Hello(controller, self.closed_below, -1, self.epoch, self.name))
         for open_round in self.rounds.values():
-            for controller in self.ordered(open_round):
-                if controller not in open_round.acknowledged:
-                    effects.append(self._decision(controller, open_round.number, open_round.committed))
-            for controller in () if open_round.decided else open_round.participants:
-                if controller not in open_round.votes:
-                    effects.append(self._request(open_round, controller))
+            effects += self._unanswered(open_round)
         return effects
+
+    def _unanswered(self, opened: Round) -> Iterator[VoteRequest | Decision]:
+        for controller in self.ordered(opened):
+            if controller not in opened.acknowledged:
+                yield self._decision(controller, opened.number, opened.committed)
+        for controller in () if opened.decided else opened.participants:
+            if controller not in opened.votes:
+                yield self._request(opened, controller)
 
     def ordered(self, decided: Round) -> tuple[str, ...]:
         """Who gets an order in a round that is decided, and has to acknowledge it; nobody before."""
@@ -192,6 +200,19 @@ class Coordinator:
             return ()
         commits = () if decided.committed is None else self.participants[decided.committed]
         return tuple(dict.fromkeys((*decided.participants, *commits)))
+
+    def needs(self, controller: str) -> bool:
+        """Whether an open round has to do with a controller that has not acknowledged its decision."""
+        return any(
+            controller in (*opened.participants, *self.ordered(opened)) and controller not in opened.acknowledged
+            for opened in self.rounds.values()
+        )
+
+    def _last_words(self, controller: str) -> Iterator[Effect]:
+        if not self.needs(controller):
+            yield Hello(controller, self.closed_below, self.seen[controller], self.epoch, self.name)
+        for opened in self.rounds.values():
+            yield from (effect for effect in self._unanswered(opened) if effect.controller == controller)
 
     def _hear(self, controller: str, readiness: Readiness) -> None:
         if readiness.sequence <= self.seen[controller]:

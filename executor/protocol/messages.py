@@ -17,6 +17,9 @@ a vote count is said in `executor/protocol/coordinator.py`, and why it may, in d
 Rejected: promises given unasked, as soon as a part is enabled. Two parts of one controller in conflict could then
 hold each other's transitions up for ever, each promised where the other is needed.
 
+A controller whose host is about to end takes its votes back: its *last* report names nothing, and asks for the word
+that no order is open, which `Hello` gives. Until then an order that was decided before may come, and is obeyed.
+
 `closed_below` lets a controller forget: every round with a smaller number is decided and acknowledged by all, so
 that whatever still arrives of it is an old copy. `seen` tells which report has arrived, so that only lost ones are
 repeated. Messages may be lost, delayed, doubled and overtaken; none is trusted for more than its round.
@@ -60,11 +63,15 @@ class Readiness:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A controller's readiness has changed."""
+    """A controller's readiness has changed.
+
+    `last`: it is leaving, nothing of it counts any more, and it waits for the word that no round needs it.
+    """
 
     controller: str
     readiness: Readiness
     coordinator: str = TOP
+    last: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +113,10 @@ class Decision:
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """The coordinator has restarted, and knows nothing of this controller: which of its parts are enabled?"""
+    """The coordinator has restarted, and knows nothing of this controller: which of its parts are enabled?
+
+    With the number of a last report in `seen` it says that it has heard it, and that no round needs its controller.
+    """
 
     controller: str
     closed_below: int

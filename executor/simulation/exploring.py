@@ -9,8 +9,9 @@ meets the same message in another configuration; the code runs some thousand tim
 What may happen: a message arrives, in any order; a controller fires or reports; whoever has something unanswered
 repeats it when nothing is under way; a command is completed; a sensor changes; a time begins, or is over. And with a
 *budget* for each: a message is lost; one arrives and stays under way; a machine is killed, before or after an act but
-before anything of it leaves, and restored from what it kept; the operator has everything undecided given up. A
-controller that was restored is resumed at any time, with the answers of its machines.
+before anything of it leaves, and restored from what it kept; the operator has everything undecided given up, or a
+controller leave, and stay after all. A controller that was restored is resumed at any time, with the answers of its
+machines.
 
 Messages under way are a set: the same one twice is once, since one that stays is a copy too. Numbers are counted from
 the beginning (`numbering`), so that it ends. What an explored space is held to is the caller's: a `Watcher` sees each
@@ -22,7 +23,7 @@ from __future__ import annotations
 import random
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 from typing import Any, Final
@@ -69,6 +70,8 @@ class Budget:
     copies: int = 0
     crashes: int = 0
     giving_up: int = 0
+    leaving: int = 0
+    """How often a controller takes its votes back, because its host is about to end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,6 +307,11 @@ class Explorer:
             yield from self._does(at, "resume", which, answers, partial(_resumed, answers), always=True)
         if isinstance(machine, LocalController):
             yield from self._times(at, which, machine)
+            if machine.leaving:
+                yield from self._does(at, "stay", which, None, _stay)
+            elif at.budget.leaving:
+                less = replace(at, budget=_less(at.budget, "leaving"))
+                yield from self._does(less, "leave", which, None, lambda machine: machine.leave(), before=at)
 
     def _times(self, at: Configuration, which: int, machine: LocalController) -> Iterator[tuple[Step, Configuration]]:
         if machine.deadline() == -inf:
@@ -476,9 +484,12 @@ def wander(explorer: Explorer, budget: Budget, seed: int, length: int, watch: Wa
 
 
 def _less(budget: Budget, kind: str) -> Budget:
-    values = {name: getattr(budget, name) for name in ("losses", "copies", "crashes", "giving_up")}
-    values[kind] -= 1
-    return Budget(**values)
+    return replace(budget, **{kind: getattr(budget, kind) - 1})
+
+
+def _stay(machine: LocalController) -> list[Effect]:
+    machine.stay()
+    return []
 
 
 def _resumed(answers: Sequence[tuple[str, int, Answer]], machine: LocalController) -> list[Effect]:

@@ -41,6 +41,7 @@ KINDS: Final[Mapping[str, str]] = MappingProxyType(
         "pause": "the operator pauses and resumes",
         "step": "the operator steps",
         "stop": "the operator stops everything, and starts it again",
+        "leave": "the operator stops one host, and starts it again; some stay after all",
     }
 )
 """Each kind of fault, and what it does. To add one: a row here, and where `Faults` is asked for it."""

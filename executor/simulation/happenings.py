@@ -107,6 +107,28 @@ def _stop(world: World) -> None:
             world.kill(process)
 
 
+def _leave(world: World) -> None:
+    process = world.any_controller()
+    if (machine := process.machine) is None:
+        return
+    if not machine.leaving:
+        if world.draw.random() < 0.3:
+            world.note("takes its votes back", process.name)
+            world.act(process, machine.leave())
+    elif world.draw.random() < 0.1:
+        stay(world, process)
+    elif not machine.awaited and not any(promise.promised for promise in machine.promises.values()):
+        world.ends(process)
+
+
+def stay(world: World, process: Process[LocalController]) -> None:
+    """The operator lets a host that is about to end go on."""
+    world.note("stays after all", process.name)
+    if process.machine is not None:
+        process.machine.stay()
+        world.turn(process)
+
+
 def _crash(world: World) -> None:
     process = world.any_process()
     if world.cell.working and world.draw.random() < 0.5:  # the hard moment: somebody waits for a machine
@@ -165,5 +187,6 @@ _HAPPENINGS: Final[Mapping[str, Callable[[World], None]]] = MappingProxyType(
         "pause": _pause,
         "step": _step,
         "stop": _stop,
+        "leave": _leave,
     }
 )

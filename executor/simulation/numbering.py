@@ -45,7 +45,7 @@ _CONTROLLER: Final = frozenset(
     {
         *("name", "subnet", "player", "parts", "transitions", "enabled", "rows", "local_mask", "arbiter", "kept_turns"),
         *("word", "kept_word", "promises", "closed", "coordinators", "above", "latched", "commands", "timers"),
-        *("unsent", "untold", "held", "forgone", "index_of", "epoch", "free", "free_mask", "lasting"),
+        *("unsent", "untold", "held", "leaving", "forgone", "index_of", "epoch", "free", "free_mask", "lasting"),
     }
 )
 _COORDINATOR: Final = frozenset(
@@ -180,6 +180,7 @@ def apply(machine: LocalController | Coordinator, kept: Kept, on: Numbering) -> 
         above.readiness = _readiness(machine.name, above.name, above.readiness, on)
         above.told = on.report(machine.name, above.name, above.told)
         above.seen = on.report(machine.name, above.name, above.seen)
+        above.dismissed = on.report(machine.name, above.name, above.dismissed)
     _commands(machine.commands, on)
     return {_key(key, renumbered): _value(key, value, machine.subnet, on) for key, value in kept.items()}
 

@@ -4,6 +4,7 @@ After the random part of a run the network delivers, disks write, machines end w
 restarted and whatever is held is resumed. Then, with nothing allowed to fire, it must fall quiet:
 
 - every round closes, and no promise is left;
+- who was about to end has been told that no order is open;
 - where machines stay at work while time passes, the timer of every time limit is set;
 - every sensor is in the image of its controller as it shows, and so is every completion of a command that is done;
 - the controllers hold the marking that the central net is in.
@@ -20,7 +21,7 @@ from typing import Final
 from firable.executor.protocol.messages import Message, Report
 from firable.executor.protocol.token_player import Word
 from firable.executor.simulation.faults import Faults
-from firable.executor.simulation.happenings import pause, resume, tend
+from firable.executor.simulation.happenings import pause, resume, stay, tend
 from firable.executor.simulation.world import World
 from firable.semantics.trace import End
 
@@ -35,6 +36,7 @@ class ProgressLostError(AssertionError):
 def recover(world: World) -> None:
     """Mend everything and check that the run goes on; raises `ProgressLostError`, or what the run itself raises."""
     mend(world)
+    check_leaving(world)
     if world.timekeepers and world.draw.random() < 0.5:
         check_timers(world)
     for _ in range(_FIRINGS):
@@ -72,6 +74,20 @@ def mend(world: World) -> None:
         tend(process, world)
     for process in world.processes:
         tend(process, world)
+
+
+def check_leaving(world: World) -> None:
+    """Let who is leaving be told that no order is open, and stay then."""
+    leaving = [each for each in world.controllers.values() if each.machine is not None and each.machine.leaving]
+    if leaving:
+        pause(world)
+        quieten(world)
+        for process in leaving:
+            if process.machine is not None and (awaited := process.machine.awaited):
+                who = ", ".join(name or "the coordinator" for name in awaited)
+                raise ProgressLostError(f"{process.name} leaves, and {who} does not say that no order is open")
+            stay(world, process)
+        resume(world)
 
 
 def check_timers(world: World) -> None:

@@ -8,6 +8,7 @@ and a seed is a run. How much goes wrong is drawn as well (`faults`). Checked wh
 - no machine gets a command twice, or one while it is certainly at another (`machinery`), or one whose token has left;
 - no token without completion leaves its place before the machine has its command;
 - nothing fires while the operator has paused, and nothing moves after a restart before the operator has resumed;
+- no host ends in order while an order for its controller is open, or one on a vote of it could still be given;
 - time limits are kept by the clock of their controller (`timekeeper`), however the clocks run.
 
 In the end everything is mended and the operator resumes; what must hold then is in `recovery`.
@@ -333,6 +334,22 @@ class World:
             self.note("killed", process.name)
             self.counts["kills"] += 1
             self._happened(process.kill())
+
+    def ends(self, process: Process[LocalController]) -> None:
+        """Let the host of a controller end in order, which leaves nothing open."""
+        self.note("ends in order", process.name)
+        self.sync(process)
+        if process.machine is None:
+            return
+        for coordinator in (each.machine for each in self.coordinators.values() if each.machine is not None):
+            for opened in coordinator.rounds.values():
+                is_waited_for = process.name in coordinator.ordered(opened)
+                if opened.committed is not None and is_waited_for and process.name not in opened.acknowledged:
+                    raise RunFailedError(f"{process.name} ends in order, and its order of '{opened.committed}' is open")
+            if votes := coordinator.ready[process.name] & coordinator.of_free.get(process.name, frozenset()):
+                raise RunFailedError(f"{process.name} ends in order, and its votes for {sorted(votes)} still count")
+        self.counts["ends"] += 1
+        self.kill(process)
 
     def restart(self, process: Process[Any]) -> None:
         """Start a process that is down."""

@@ -92,11 +92,9 @@ def test_two_hosts_run_a_cell_and_end_in_order(bundle: str, tmp_path: Path, caps
             assert time.monotonic() < end
             time.sleep(0.05)
     finally:
-        # The coordinator's host first: an order that is under way finds the others, as docs/operating.md says.
-        said = {}
-        for name, sent in (("system", signal.SIGTERM), ("robot", signal.SIGINT)):
-            processes[name].send_signal(sent)
-            said[name] = processes[name].communicate(timeout=60)
+        for process in processes.values():
+            process.send_signal(signal.SIGINT if process is processes["robot"] else signal.SIGTERM)
+    said = {name: process.communicate(timeout=60) for name, process in processes.items()}
     assert [process.returncode for process in processes.values()] == [0, 0], said
     assert "is connected" in said["system"][1]
     report = json.loads(said["robot"][0])["reports"][0]

@@ -2,6 +2,7 @@
 
 import asyncio
 from pathlib import Path
+from unittest.mock import ANY, Mock
 
 import pytest
 from support.free_parts import freed
@@ -137,29 +138,36 @@ def test_the_firing_of_a_free_part_gives_up_what_its_tokens_leave_behind() -> No
 
 
 @pytest.mark.parametrize("after", [2.1, 8.1, 12.1])
-@pytest.mark.parametrize("how", ["paused", "emergency stop"])
-def test_nothing_is_applied_or_commanded_at_a_halted_host_of_a_cell(how: str, after: float, tmp_path: Path) -> None:
-    """The others decide on what the conveyor has said before; what it is told of that waits."""
+@pytest.mark.parametrize("how", ["paused", "emergency stop", "stopped by the operator"])
+def test_nothing_is_commanded_at_a_host_that_is_halted_or_stops(how: str, after: float, tmp_path: Path) -> None:
+    """The others decide on what the conveyor has said before: a pause lets that wait, and an end obeys it."""
+    given: list[str] = []
 
     async def main() -> None:
         cell = Cell(tmp_path, free=True)
         await asyncio.sleep(after)
         host = cell.hosts[CONVEYOR]
+        host.driver.send = Mock(side_effect=lambda place, _: given.append(place.name))  # type: ignore[method-assign]
         if how == "paused":
             host.pause()
-        else:
+        elif how == "emergency stop":
             host.emergency_stop("a person in the cell")
+        else:
+            host.stop()
         await asyncio.sleep(1.9)
-        assert any(isinstance(message, Decision) for message in host.acts.withheld.values())
-        await cell.stop()
+        assert how != "paused" or any(isinstance(message, Decision) for message in host.acts.withheld.values())
+        ended = await cell.stop()
+        assert [each.message for each in ended.values()] == ["" if how != "emergency stop" else ANY] * len(ended)
 
     run_in_virtual_time(main())
+    assert given == []
     events = read_trace(tmp_path / "conveyor.trace").events
     notes = [event.note if isinstance(event, Noted) else "" for event in events]
     since = notes.index(how)
     assert APPLIED in notes[:since]
-    assert APPLIED not in notes[since:]
-    assert not [event for event in events[since:] if isinstance(event, CommandSent)]
+    assert how != "paused" or APPLIED not in notes[since : notes.index("stopped by the operator")]
+    issued = [event.place for event in events[since:] if isinstance(event, CommandSent)]
+    assert issued == [e.data["place"] for e in events[since:] if isinstance(e, Noted) and e.note == "kept back"]
 
 
 def test_what_a_halted_host_was_told_is_applied_when_it_goes_on(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from support.planted import without
 from firable.decompose.splitting.persistence import persistence
 from firable.executor.protocol.controller import Above, LocalController
 from firable.executor.protocol.coordinator import Coordinator, Round
-from firable.executor.protocol.messages import Acknowledgement, Decision, Effect, Readiness
+from firable.executor.protocol.messages import Acknowledgement, Decision, Effect, Readiness, Report, ToController
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
 
@@ -128,3 +128,53 @@ class AcknowledgesBeforeItObeys(LocalController):
                 yield replace(effect, readiness=replace(effect.readiness, transitions=old))
             else:
                 yield effect
+
+
+# --- Hosts that end
+
+
+class DismissesAtOnce(Coordinator):
+    """Who takes its votes back is told that no order is open, whatever is."""
+
+    def needs(self, controller: str) -> bool:
+        del controller
+        return False
+
+
+class NeverDismisses(Coordinator):
+    """Nobody is ever told that no order is open."""
+
+    def needs(self, controller: str) -> bool:
+        del controller
+        return True
+
+
+class EndsWithoutAsking(LocalController):
+    """Whose votes are taken back ends at once, with an order on its way."""
+
+    @property
+    def awaited(self) -> tuple[str, ...]:
+        return ()
+
+
+class TakesAnyWord(LocalController):
+    """Whatever comes after the votes were taken back is believed to be the last."""
+
+    def receive(self, message: ToController) -> list[Effect]:
+        effects = super().receive(message)
+        for above in self.above.values() if self.leaving else ():
+            above.dismissed = max(above.dismissed, above.seen)
+        return effects
+
+
+class LeavesItsVotes(LocalController):
+    """The end is announced, and the votes still stand."""
+
+    def _report(self, above: Above) -> Report:
+        self.leaving, leaving = False, self.leaving
+        report = super()._report(above)
+        self.leaving = leaving
+        return replace(report, last=leaving)
+
+    def _is_unanswered(self, above: Above) -> bool:
+        return self.leaving and above.dismissed < above.readiness.sequence
