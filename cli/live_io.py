@@ -62,8 +62,11 @@ def live_io(
     import asyncio
 
     from firable.executor.drivers.binding import read_binding
+    from firable.nets.diagnostics import InputError
 
     binding = read_binding(bind)
+    if unreadable := tuple(binding.unreadable()):
+        raise InputError(unreadable)
     forced = [_forced(binding, text) for text in force]
     places = _sent(binding, send, of)
     try:

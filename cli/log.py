@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import logging.handlers
+import os
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -37,11 +40,22 @@ def log_to(path: str | None) -> Log | None:
     if path == "-":
         return Log(logger_to(logging.StreamHandler(sys.stderr)))
     try:
-        return Log(logger_to(_InFile(path, encoding="utf-8")))
+        _demand_writable(path)
+        return Log(logger_to(_InFile(path, encoding="utf-8", delay=True)))
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         message = f"{printable(path)}: the log cannot be written: {reason}"
         raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
+
+
+def _demand_writable(path: str) -> None:
+    """Raise `OSError` where a log cannot be written; a run that is refused before it begins leaves no file behind."""
+    if (file := Path(path)).exists():
+        with file.open("ab"):
+            return
+    file.parent.stat()
+    if not os.access(file.parent, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
 class _InFile(logging.handlers.WatchedFileHandler):

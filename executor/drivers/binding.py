@@ -21,15 +21,17 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from firable.executor.drivers.device import DeviceKind, Options, Point, Use, Value, Writes
+from firable.executor.drivers.device import DeviceKind, Options, Point, Use, Value, Writes, files_of
 from firable.executor.drivers.kinds import kind_named
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
 from firable.nets.document_errors import Shape, document_problems, keys_of, version_problem
-from firable.nets.source import Source, quoted, read_source
+from firable.nets.source import Source, printable, quoted, read_bytes, read_source
 from firable.nets.yaml_tree import Data, Node, data, node_span, nodes_along, parse_tree
 from firable.nets.yaml_tree import Path as TreePath
 
 SIZE_BYTES_MAX: Final = 1024 * 1024
+FILE_BYTES_MAX: Final = 1_000_000
+"""More than any certificate or key needs."""
 
 ACKNOWLEDGED: Final = "acknowledged"
 """How the binding writes of a completion that no sensor has a part in it."""
@@ -179,6 +181,22 @@ class Binding:
         """A diagnostic at a path of the file."""
         return _problem(self.source, self.tree, code, path, message, hint)
 
+    def unreadable(self) -> Iterator[Diagnostic]:
+        """The files of its devices that cannot be read (F1001, F1003): certificates and keys.
+
+        Asked of the devices that are served here: another host's files are on that host.
+        """
+        for name in self.document.devices:
+            for keys, file in files_of(self.options[name]):
+                try:
+                    read_bytes(file, FILE_BYTES_MAX)
+                except InputError as error:
+                    for one in error.diagnostics:
+                        hint = "a path in a binding begins at the folder of the binding, unless it begins with /"
+                        yield self.problem(
+                            one.code, ("devices", name, *keys), f"{printable(file)}: {one.message}", hint
+                        )
+
     def watching(self) -> Binding:
         """The binding for who only looks: without safe outputs and heartbeats, which are another's to write.
 
@@ -297,7 +315,8 @@ class _Reading:
                 continue
             own: dict[str, Data] = dict(device.model_extra or {})
             try:
-                self.options[name] = kind.options.model_validate(own)
+                folder = Path(self.source.file).parent
+                self.options[name] = kind.options.model_validate(own, context={"folder": folder})
             except ValidationError as error:
                 keys = (*keys_of(DeviceDocument), *keys_of(kind.options))
                 shape = Shape(SHAPE.version, SHAPE.file, {("devices", name): keys}, {})

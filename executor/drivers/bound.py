@@ -32,7 +32,8 @@ _LOOK_SECONDS: Final = 0.01
 def bound_driver(binding: Binding, net: Net, part: Net | None = None) -> BoundDriver:
     """The driver of a net's binding, or of a part of the net, whose machines are all that this host has.
 
-    Raises `InputError` F5101 where binding and net do not fit. One binding serves all hosts of a cell: each takes from
+    Raises `InputError` F5101 where binding and net do not fit, and F1001 or F1003 where a file that a device needs, a
+    certificate or a key, cannot be read. One binding serves all hosts of a cell: each takes from
     it the devices of its own machines.
     """
     if problems := misfits(binding, net):
@@ -43,6 +44,8 @@ def bound_driver(binding: Binding, net: Net, part: Net | None = None) -> BoundDr
     names = {*served.signal_index, *served.place_index}
     if part is not None:
         binding = binding.serving(names, [controller.name for controller in part.controllers])
+    if unreadable := tuple(binding.unreadable()):
+        raise InputError(unreadable)
     return BoundDriver(binding, completions, answered)
 
 

@@ -13,12 +13,13 @@ mistakes are, into every one of them.
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Final, Protocol
+from pathlib import Path
+from typing import Annotated, Any, Final, Protocol
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
 
 Point = str
 """The address of something that a device shows or takes, as the binding writes it."""
@@ -37,10 +38,39 @@ class LinkError(Exception):
     """A connection cannot be made, has failed, has timed out, or brought what nobody can read."""
 
 
+class Beside(str):
+    """The path of a file that a binding names, found from the folder of the binding."""
+
+    __slots__ = ()
+
+
+def _beside(path: str, info: ValidationInfo) -> Beside:
+    """The path from here; `folder` in the context is that of the binding."""
+    return Beside((info.context["folder"] if info.context else Path()) / path)
+
+
+File = Annotated[str, AfterValidator(_beside)]
+"""The type of an option that names a file: a certificate, a key. One that cannot be read is refused with its line."""
+
+
 class Options(BaseModel):
     """The keys of a device in a binding that its kind knows, beside those that all kinds have."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def files_of(options: BaseModel) -> Iterator[tuple[tuple[str, ...], Beside]]:
+    """The files that options name, with the keys that name them.
+
+    >>> class Tls(Options): ...     ca: File >>> [(keys, str(file)) for keys, file in
+    files_of(Tls.model_validate({"ca": "a.pem"}, context={"folder": Path("d")}))] [(('ca',), 'd/a.pem')]
+    """
+    for name in type(options).model_fields:
+        value = getattr(options, name)
+        if isinstance(value, Beside):
+            yield (name,), value
+        elif isinstance(value, BaseModel):
+            yield from (((name, *keys), file) for keys, file in files_of(value))
 
 
 class Use(StrEnum):

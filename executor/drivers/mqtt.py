@@ -22,7 +22,18 @@ from typing import TYPE_CHECKING, Final
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes, quiet
+from firable.executor.drivers.device import (
+    Connection,
+    File,
+    LinkError,
+    Options,
+    Point,
+    Use,
+    Value,
+    Wanted,
+    Writes,
+    quiet,
+)
 
 if TYPE_CHECKING:
     from aiomqtt import Client
@@ -32,9 +43,9 @@ class MqttTls(BaseModel):
     """The files of TLS: the authority of the broker, and a certificate of one's own where the broker asks for one."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-    ca: str | None = None
-    certificate: str | None = None
-    key: str | None = None
+    ca: File | None = None
+    certificate: File | None = None
+    key: File | None = None
 
 
 class MqttOptions(Options):

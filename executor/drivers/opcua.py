@@ -20,7 +20,18 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes, quiet
+from firable.executor.drivers.device import (
+    Connection,
+    File,
+    LinkError,
+    Options,
+    Point,
+    Use,
+    Value,
+    Wanted,
+    Writes,
+    quiet,
+)
 
 if TYPE_CHECKING:
     from asyncua.client.client import Client
@@ -43,9 +54,9 @@ class OpcUaSecurity(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
     policy: Literal["Basic256Sha256", "Aes128Sha256RsaOaep", "Aes256Sha256RsaPss"] = "Basic256Sha256"
     mode: Literal["Sign", "SignAndEncrypt"] = "SignAndEncrypt"
-    certificate: str
-    key: str
-    server: str
+    certificate: File
+    key: File
+    server: File
     application: str | None = None
 
 

@@ -110,9 +110,9 @@ def with_failed(ended: Situation, driver: asyncio.Task[None]) -> Situation:
     """The end of a run whose driver failed when it was to stop the machines: a fault, whatever it was before."""
     if not driver.done() or driver.cancelled() or (error := driver.exception()) is None:
         return ended
-    message = (
-        f"the driver failed at the end, {type(error).__name__}: {error}: look at the machines, they may not be safe"
-    )
+    named = f"{type(error).__name__}: {error}"
+    failed = "the driver has failed" if named in ended.message else f"the driver failed at the end, {named}"
+    message = f"{failed}: look at the machines, they may not be safe"
     return replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, message))))
 
 

@@ -17,10 +17,11 @@ from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.driver import Answer, Clock, Listener
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.operating.ending import with_failed
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.service import terminable
-from firable.executor.operating.situation import State
+from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.uncut import GIVEN_UP, HURRY_SECONDS, STOP_SECONDS
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
@@ -436,3 +437,18 @@ def test_a_program_that_blocks_the_event_loop_is_ended_by_a_second_ctrl_c() -> N
     assert done.returncode == GIVEN_UP
     assert "the run hangs and is given up" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(("known", "named"), [("R: its driver has failed, ValueError: bad", 1), ("stopped", 1)])
+def test_an_error_of_a_driver_is_named_once_in_how_the_run_ended(known: str, named: int) -> None:
+    async def fails() -> None:
+        raise ValueError("bad")
+
+    async def main() -> str:
+        task = asyncio.create_task(fails())
+        await asyncio.wait((task,))
+        return with_failed(Situation(State.FAULT, (), message=known), task).message
+
+    message = run_in_virtual_time(main())
+    assert message.count("ValueError: bad") == named
+    assert message.endswith("look at the machines, they may not be safe")

@@ -175,13 +175,13 @@ def test_who_leaves_votes_no_and_names_nothing_until_it_stays() -> None:
     vote, again = controller.receive(asked)
     assert not getattr(vote, "promised", None)
     assert again == last
-    assert controller.awaited == (COORDINATOR,)
+    assert list(controller.awaited) == [COORDINATOR]
     controller.receive(Hello("robot", 0, first.readiness.sequence, 0))
-    assert controller.awaited == (COORDINATOR,), "that was said of an earlier report"
+    assert list(controller.awaited) == [COORDINATOR], "that was said of an earlier report"
     controller.receive(Decision("robot", 0, None, 0, last.readiness.sequence))
-    assert controller.awaited == (COORDINATOR,), "an order says that there are orders"
+    assert list(controller.awaited) == [COORDINATOR], "an order says that there are orders"
     controller.receive(Hello("robot", 0, last.readiness.sequence, 0))
-    assert not controller.awaited
+    assert not list(controller.awaited)
     controller.stay()
     (anew,) = controller.report()
     assert isinstance(anew, Report)

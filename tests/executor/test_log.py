@@ -107,3 +107,12 @@ def test_a_run_that_an_error_ends_says_so_in_its_log() -> None:
     assert [(line["event"], line.get("message")) for line in lines(stream.getvalue())][1:] == [
         ("broke", "no space left")
     ]
+
+
+def test_a_run_that_is_refused_before_it_begins_leaves_no_log(tmp_path: Path) -> None:
+    path = tmp_path / "run.log"
+    log = log_to(str(path))
+    assert log is not None
+    assert not path.exists(), "it is opened when there is something to tell"
+    log.ended(Situation(State.STOPPED, ()))
+    assert lines(path.read_text())[0]["event"] == "ended"

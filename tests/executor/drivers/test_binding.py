@@ -9,6 +9,7 @@ from firable.decompose.splitting.cut import split
 from firable.executor.drivers import kinds
 from firable.executor.drivers.binding import parse_binding, read_binding
 from firable.executor.drivers.bound import BoundDriver, bound_driver
+from firable.executor.drivers.device import files_of
 from firable.executor.drivers.far_side.ends import ends_of
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
@@ -245,3 +246,42 @@ def test_a_driver_of_others_is_found_by_its_entry_point(monkeypatch: pytest.Monk
     # What is firable's own cannot be taken over.
     monkeypatch.setattr(kinds, "entry_points", lambda **_: [EntryPoint("modbus-tcp", "os:path", kinds.GROUP)])
     assert kinds.kind_named("modbus-tcp") is not None
+
+
+TLS = """
+  broker:
+    driver: mqtt
+    host: 10.0.0.2
+    tls: {ca: keys/site.pem, certificate: own.pem, key: own.key}
+"""
+
+
+def test_files_are_found_from_the_folder_of_the_binding_wherever_the_program_runs(tmp_path: Path) -> None:
+    (tmp_path / "keys").mkdir()
+    for name in ("keys/site.pem", "own.pem", "own.key"):
+        (tmp_path / name).write_text("a key")
+    path = tmp_path / "c.bind.yaml"
+    path.write_text(GOOD.replace("signals:\n", f"{TLS.strip(chr(10))}\nsignals:\n", 1))
+    binding = read_binding(path)
+    assert not [*binding.unreadable()]
+    assert {keys: str(file) for keys, file in files_of(binding.options["broker"])} == {
+        ("tls", "ca"): str(tmp_path / "keys/site.pem"),
+        ("tls", "certificate"): str(tmp_path / "own.pem"),
+        ("tls", "key"): str(tmp_path / "own.key"),
+    }
+
+
+def test_a_file_that_cannot_be_read_is_refused_with_its_line_where_its_device_is_served(tmp_path: Path) -> None:
+    path = tmp_path / "c.bind.yaml"
+    path.write_text(GOOD.replace("signals:\n", f"{TLS.strip(chr(10))}\nsignals:\n", 1))
+    (tmp_path / "own.pem").write_text("a certificate")
+    (tmp_path / "own.key").mkdir()
+    with pytest.raises(InputError) as refused:
+        bound_driver(read_binding(path), NET)
+    lines = path.read_text().splitlines()
+    found = {(one.code, lines[one.span.line - 1].strip()) for one in refused.value.diagnostics if one.span}
+    assert found == {("F1001", "tls: {ca: keys/site.pem, certificate: own.pem, key: own.key}")}
+    assert len(refused.value.diagnostics) == 2
+    assert str(tmp_path / "keys/site.pem") in refused.value.diagnostics[0].message
+    assert "folder of the binding" in refused.value.diagnostics[0].hint
+    assert bound_driver(read_binding(path), NET, NET), "the broker is another host's"
