@@ -1,4 +1,4 @@
-"""`firable prove NET --protocol`: the protocol of the split, explored as a net of its own.
+"""`firable prove NET --protocol`: the protocol of the split, explored as a net of its own, with its free parts.
 
 Three options, from the question to the details: does the protocol do what the net does (`--protocol`), what does a
 fault do to the cell (`--faults`), and which of the protocols known to be wrong would go wrong on this very net
@@ -51,6 +51,8 @@ class Answered:
     files: Mapping[str, str | bytes] = field(default_factory=dict)
     outages: tuple[Outage, ...] = ()
     refutations: tuple[Refutation, ...] = ()
+    free: int = 0
+    """How many parts need no promise in the protocol that was explored."""
 
 
 def protocol_options(command: F) -> F:
@@ -84,11 +86,13 @@ def ask(
     from firable.decompose.protocol.refuting import readable, refute
     from firable.decompose.protocol.verdicts import protocol_verdicts
     from firable.decompose.protocol.wrong import wrong_protocols
+    from firable.decompose.splitting.persistence import freed
 
     def limits() -> Limits:
         return Limits(Deadline.after(seconds))
 
     verdicts: tuple[Verdict, ...] = ()
+    free = 0
     protocols: dict[str, ProtocolNet] = {}
     files: dict[str, str | bytes] = {}
     dead: list[tuple[Outage, Verdict]] = []
@@ -96,9 +100,12 @@ def ask(
     interrupted: tuple[Verdict, ...] = ()
     try:
         if asked.protocol or asked.faults:
+            begins("asking which parts need no promise")
+            running = freed(decomposition)
             begins("exploring the protocol" + " with and without faults" * asked.faults)
             timeout_ms = max(1, round(seconds * 1000))
-            found = protocol_verdicts(decomposition, limits, faults=asked.faults, timeout_ms=timeout_ms)
+            found = protocol_verdicts(running, limits, faults=asked.faults, timeout_ms=timeout_ms)
+            free = len(running.free)
             verdicts, protocols = found.verdicts, found.protocols
             begins("writing the evidence of it")
             files = found.evidence() if evidence else {}
@@ -115,7 +122,7 @@ def ask(
         interrupted = (_interrupted(),)
     verdicts += tuple(verdict for _, verdict in dead) + tuple(one.verdict for one in refutations) + interrupted
     protocols |= {refutation.verdict.name: refutation.protocol for refutation in refutations}
-    return Answered(verdicts, protocols, files, tuple(outage for outage, _ in dead), tuple(refutations))
+    return Answered(verdicts, protocols, files, tuple(outage for outage, _ in dead), tuple(refutations), free)
 
 
 def _packed(file: str, document: Document) -> tuple[str, bytes]:
@@ -141,7 +148,8 @@ def show(answered: Answered) -> None:
             click.echo(text.verdict_line(verdict, width))
         cost = shown[0].cost
         if cost.markings is not None:
-            click.echo(f"  {text.counted(cost.markings, 'configuration')} of the protocol ({shown[0].method})")
+            told = f"; {text.counted(answered.free, 'part')} without a promise" if answered.free else ""
+            click.echo(f"  {text.counted(cost.markings, 'configuration')} of the protocol ({shown[0].method}){told}")
     if answered.outages:
         from firable.decompose.protocol.outages import outage_text
 

@@ -56,10 +56,10 @@ def make_bundle(
 
     `limits` are for each kind of evidence anew: what of the report cannot be shown in that time is only claimed.
     `firable verify` will say so of a warning; a verdict that is required is no reason to run without evidence. With
-    `protocol` and `faults` the bundle holds the verdicts on the protocol of this very net, too, proved by an
-    invariant; these are on the protocol in which every part promises, so no part of that bundle is free of promise.
-    With the text of a `plant` file, the bundle holds it and that its machines keep what votes rely on (O4); with an
-    `origin`, the conceptual net and the tasks of which the net is made, and that it does what that one does.
+    `protocol` and `faults` the bundle holds the verdicts on the protocol of this very net, too, with the parts that are
+    free of promise, proved by an invariant. With the text of a `plant` file, the bundle holds it and that its machines
+    keep what votes rely on (O4); with an `origin`, the conceptual net and the tasks of which the net is made, and that
+    it does what that one does.
 
     Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the report is not that of exploring
     this net by interleaving, which is how it will be executed, and for everything that must be proved and is not, or
@@ -76,8 +76,7 @@ def make_bundle(
     proof = prove(decomposition, timeout_ms=timeout_ms)
     found = persistence(decomposition, report.space)
     voted, shown = found.with_evidence()
-    if not protocol and not faults:
-        decomposition = replace(decomposition, free=found.free_as_shown(voted))
+    decomposition = replace(decomposition, free=found.free_as_shown(voted))
     document = evidence_of_report(report, (), _anew(limits, seconds))
     named = {record.name for record in document.records if not record.lacking}
     on_the_net = (replace(v, evidence=(*v.evidence, EVIDENCE)) if v.name in named else v for v in report.verdicts)

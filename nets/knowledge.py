@@ -24,7 +24,7 @@ from typing import Any
 from firable.nets.contention import contentions
 from firable.nets.decomposition import Decomposition
 from firable.nets.layers import Layers
-from firable.nets.net import Net, SignalKind, Transition
+from firable.nets.net import ExternalGate, Net, SignalKind, Transition
 
 
 class Because(StrEnum):
@@ -265,6 +265,15 @@ def _keeping(subnet: Net) -> Callable[[Transition], bool]:
             for t in readers[signal]
         )
 
+    def is_closed_but_for_a_signal(part: Transition) -> bool:
+        """Whether someone would close a gate of the part and is kept from it by a completion that the part waits for.
+
+        By the places alone such a yes does not stand, and the net of the protocol has nothing but places.
+        """
+        awaited = {gate.signal for gate in part.external if gate.wanted}
+        kept = (t for s in awaited & readers.keys() for t in readers[s] if ExternalGate(s, wanted=False) in t.external)
+        return any({*t.inputs} & {*part.permissive} or {*t.outputs} & {*part.inhibitive} for t in kept)
+
     def keeps(part: Transition) -> bool:
         alone = all(takers[p] == 1 for p in part.inputs) and all(putters[p] == 1 for p in part.outputs)
         inputs = set(part.inputs)
@@ -273,6 +282,6 @@ def _keeping(subnet: Net) -> Callable[[Transition], bool]:
             subnet.signal(gate.signal).kind is SignalKind.COMPLETION and gate.wanted and senders[gate.signal] <= inputs
             for gate in part.external
         )
-        return alone and lasting and not shows_what_it_clears(part)
+        return alone and lasting and not shows_what_it_clears(part) and not is_closed_but_for_a_signal(part)
 
     return keeps

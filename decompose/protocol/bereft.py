@@ -12,7 +12,8 @@ fire is seen in the central net:
 - *A coordinator is dead.* It decides nothing any more, and what it was promised stays promised: parts that do not
   disturb each other. What would disturb one of them fires no more (O1), nor what shares a signal with it. A part that
   is promised is firable; or it is behind: its transition was decided before, so the central net has its tokens moved
-  already, and others may have gone on from there, but its order never comes.
+  already, and others may have gone on from there, but its order never comes. A part that is *free of promise* locks
+  nothing; but it may be behind, too, beside whatever else is promised, and its gates may have changed since.
 
 Everything else can be brought to rest, and is then fired as if nobody were dead. So the net here is the central one,
 the life of who dies, and the promises that a dead coordinator leaves:
@@ -56,6 +57,8 @@ class Bereft:
     parts: Parts
     who: str
     coordinator: str = ""
+    free: frozenset[tuple[str, str]] = frozenset()
+    """The transition and the controller of each part that is free of promise; `parts` take them for such as promise."""
 
     @cached_property
     def held_up(self) -> frozenset[str]:
@@ -177,7 +180,9 @@ class Bereft:
 
     def _holding(self, part: Part, held: Mapping[Part, str]) -> Iterator[Transition]:
         """The part is promised and firable, but for what others of its round may have moved; or it is behind."""
-        others = {held[other] for other in self.parts.excluding(part) if other in held}
+        free = self._is_free(part)
+        excluding = () if free else self.parts.excluding(part)
+        others = {held[other] for other in excluding if other in held and not self._is_free(other)}
         moved = {
             place
             for t in self.parts.groups[self.parts.group_of[part.whole]]
@@ -188,8 +193,13 @@ class Bereft:
         full, empty = {*part.inputs, *part.permissive} - moved, {*part.outputs, *part.inhibitive} - moved
         name, here = f"{part.whole}/{part.controller}", (held[part],)
         yield Transition(f"hold/{name}", (), here, _sorted({DYING, *full}), _sorted(empty | others))
-        full, empty = {*part.outputs, *part.permissive}, {*part.inputs, *part.inhibitive}
+        full, empty = {*part.outputs}, {*part.inputs}
+        if not free:
+            full, empty = full.union(part.permissive), empty.union(part.inhibitive)
         yield Transition(f"behind/{name}", (), here, _sorted({DYING, *full}), _sorted(empty | others))
+
+    def _is_free(self, part: Part) -> bool:
+        return (part.whole, part.controller) in self.free
 
     def _central(self, held: Mapping[Part, str]) -> Iterator[Transition]:
         disturbed: dict[str, list[str]] = {}
@@ -219,10 +229,11 @@ class Bereft:
         return TemporalProperty(f"goes-on.{name}", Logic.CTL, parse_temporal(text))
 
 
-def deaths(parts: Parts) -> Iterator[Bereft]:
+def deaths(parts: Parts, free: Iterable[tuple[str, str]] = ()) -> Iterator[Bereft]:
     """Everybody who can be dead: each controller, then each coordinator."""
-    yield from (Bereft(parts, subnet.name) for subnet in parts.decomposition.subnets)
-    yield from (Bereft(parts, "", coordinator) for coordinator in parts.deciders)
+    known = frozenset(free)
+    yield from (Bereft(parts, subnet.name, free=known) for subnet in parts.decomposition.subnets)
+    yield from (Bereft(parts, "", coordinator, known) for coordinator in parts.deciders)
 
 
 def _sorted(places: Iterable[str]) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from functools import cached_property
 from typing import Final
 
 from firable.decompose.protocol.bare import ORDER, add_bare
-from firable.decompose.protocol.draft import ASTRAY, CHANNELS, Draft, Step, at, central, down, late
+from firable.decompose.protocol.draft import ASTRAY, CHANNELS, Draft, Step, at, central, channels_of, down, late
 from firable.decompose.protocol.faulty import add_faults, declare_faults, is_numbered
 from firable.decompose.protocol.parts import Part, Parts
 from firable.decompose.protocol.rounds import add_rounds, asked, committed, copy, decided
@@ -38,6 +38,8 @@ from firable.nets.net import Net, Property, PropertyKind, Transition
 
 _MEMORY = ("noted", "acknowledgement", "abort-order", "commit-order", "heard", "vote", "request", "obeyed", "promised")
 """The places of a part in the skeleton with rounds, in the order that diagrams like."""
+_FREE_MEMORY = ("noted", "acknowledgement", "commit-order", "heard", "vote", "obeyed", "stands")
+"""Those of one that is free of promise."""
 _BARE_MEMORY = ("commit-order", "counted", "promised")
 
 
@@ -107,17 +109,35 @@ class ProtocolNet:
         for part in self._all:
             missing = [Not(Holds(place)) for place in (*part.inputs, *part.permissive)]
             in_the_way: list[Formula] = [Holds(place) for place in (*part.outputs, *part.inhibitive)]
-            unfit = Or((*missing, *in_the_way))
-            cases.append(And((Holds(at("commit-order", part)), Holds(at("promised", part)), unfit)))
+            if part.free:  # its gates may have changed since the decision
+                missing = [Not(Holds(at("stands", part))), *(Not(Holds(place)) for place in part.inputs)]
+                in_the_way = [Holds(place) for place in part.outputs]
+            waits = Not(Holds(at("obeyed", part))) if part.free else Holds(at("promised", part))
+            cases.append(And((Holds(at("commit-order", part)), waits, Or((*missing, *in_the_way)))))
         return Or(tuple(cases))
 
     @cached_property
+    def standing(self) -> frozenset[str]:
+        """The places that tell of votes which stand, and may stand for ever: those of parts free of promise."""
+        free = (part for part in self._all if part.free)
+        return frozenset(at(kind, part) for part in free for kind in ("stands", "heard"))
+
+    @cached_property
     def quiet(self) -> Formula:
-        """Nothing is asked, promised or on its way: the coordinator knows nothing, and all agree."""
+        """Nothing is asked, promised or on its way, all agree, and every vote that can stand does, and is heard.
+
+        Else the coordinator knows nothing. A part is firable here where it is in the central net.
+        """
         own = {place.name for place in self.parts.net.places}
-        own |= {central(place) for place in own}
+        own |= {central(place) for place in own} | self.standing
         rest = [place.name for place in self.net.places if place.name not in own and not place.marked]
-        return And((*(Not(Holds(place)) for place in rest), Not(self.differs)))
+        voted: list[Formula] = []
+        for part in (part for part in self._all if part.free):
+            full = [Holds(place) for place in (*part.inputs, *part.permissive)]
+            firable = And((*full, *(Not(Holds(place)) for place in (*part.outputs, *part.inhibitive))))
+            for vote in (Holds(at(kind, part)) for kind in ("stands", "heard")):
+                voted.append(Or((And((vote, firable)), And((Not(vote), Not(firable))))))
+        return And((*(Not(Holds(place)) for place in rest), Not(self.differs), *voted))
 
     def sentences(self) -> Iterator[Property]:
         """What must hold of every run for the protocol to refine the central net, as properties of its net."""
@@ -147,9 +167,8 @@ def protocol_net(decomposition: Decomposition, variant: Variant = PROTOCOL, faul
     parts = Parts(decomposition, variant)
     _require_distinct(parts)
     draft = Draft(decomposition.net, onward=not variant.is_true)
-    channels = _channels(parts)
     _declare(draft, parts, faults)
-    declare_faults(draft, parts, faults, channels)
+    declare_faults(draft, parts, faults, _channels(parts))
     draft.place(ASTRAY)
     if variant.acknowledged:
         add_rounds(draft, parts)
@@ -157,14 +176,23 @@ def protocol_net(decomposition: Decomposition, variant: Variant = PROTOCOL, faul
         stale = nonpersistent(decomposition) if variant.votes is Votes.STALE else ()
         add_bare(draft, parts, stale)
     _local(draft, parts)
-    add_faults(draft, parts, faults, channels)
+    add_faults(draft, parts, faults, lambda part: _channels(parts, part))
     built = ProtocolNet(parts, faults, draft.net(f"protocol-of-{decomposition.net.name}"), draft.steps)
     return replace(built, net=replace(built.net, properties=tuple(built.sentences())))
 
 
-def _channels(parts: Parts) -> tuple[str, ...]:
-    """The kinds of messages that there are."""
-    return CHANNELS if parts.variant.acknowledged else (ORDER,)
+def _channels(parts: Parts, part: Part | None = None) -> tuple[str, ...]:
+    """The kinds of messages that there are, of a part or of any."""
+    if not parts.variant.acknowledged:
+        return (ORDER,)
+    return CHANNELS if part is None else channels_of(part)
+
+
+def _memory(parts: Parts, part: Part) -> tuple[str, ...]:
+    """The places of a part."""
+    if not parts.variant.acknowledged:
+        return _BARE_MEMORY
+    return _FREE_MEMORY if part.free else _MEMORY
 
 
 def _require_distinct(parts: Parts) -> None:
@@ -173,7 +201,7 @@ def _require_distinct(parts: Parts) -> None:
     made = [*own, *map(central, own), ASTRAY, *(down(subnet.name) for subnet in parts.decomposition.subnets)]
     made += [name(t) for t in parts.coordinated for name in (asked, committed)]
     made += [decided(parts, group[0]) for group in parts.groups]
-    made += [at(kind, part) for _, its in part_of for part in its for kind in _MEMORY]
+    made += [at(kind, part) for _, its in part_of for part in its for kind in {*_MEMORY, *_FREE_MEMORY}]
     for place, times in Counter(made).items():
         if times > 1:
             message = f"two names of the net make one place of the net of its protocol, '{place}'"
@@ -194,15 +222,15 @@ def _gathered(parts: Parts) -> Iterator[Transition]:
 def _flow(parts: Parts, faults: Faults, transitions: Iterable[Transition]) -> Iterator[str]:
     """The places that belong to these transitions, by transitions; some of them more than once."""
     acknowledged = parts.variant.acknowledged
-    channels = _channels(parts)
     for t in transitions:
         for part in parts.coordinated.get(t.name, ()):
-            for kind in _MEMORY if acknowledged else _BARE_MEMORY:
+            for kind in _memory(parts, part):
                 yield at(kind, part)
-                if faults.duplication and kind in channels and not is_numbered(parts, kind):
+                if faults.duplication and kind in _channels(parts, part) and not is_numbered(parts, kind):
                     yield late(at(kind, part))
         if t.name in parts.coordinated and acknowledged:
-            yield asked(t.name)
+            if parts.promising(t.name):
+                yield asked(t.name)
             yield committed(t.name)
             if parts.groups[parts.group_of[t.name]][-1] == t.name:
                 yield decided(parts, t.name)

@@ -10,8 +10,9 @@ Weijland 1996) between the protocol, all steps hidden by which nothing fires, an
 
 The relation is a function of the configuration, so no partition has to be refined, and one closure for each marking of
 the central net decides it, in a table or in a diagram. In the true protocol two arguments make it quicker still: all
-configurations of a central marking lead *home*, to one where nothing is asked, promised or on its way, and from there
-the transition is asked for, promised, heard and decided, a run that is written down and played by the reference player.
+configurations of a central marking lead *home*, to one where nothing is asked, promised or on its way, and the votes of
+parts that are free of promise are heard. From there the transition is asked for, promised, heard and decided, a run
+that is written down and played by the reference player.
 Where this does not succeed, the closures are made for each transition.
 
 A transition without inputs and outputs changes no marking when it fires, so the closure within one central marking
@@ -30,8 +31,9 @@ from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore
 from firable.analysis.spaces.space import StateSpace, WitnessError, Witnesses
 from firable.decompose.protocol.building import ProtocolNet
-from firable.decompose.protocol.draft import ASTRAY, central
+from firable.decompose.protocol.draft import ASTRAY, at, central
 from firable.decompose.protocol.faulty import GO_ON
+from firable.decompose.protocol.parts import Part
 from firable.nets.formula import And, Holds, Not, Or
 from firable.nets.net import Marking, Net
 from firable.nets.verdict import Witness
@@ -133,13 +135,16 @@ class _Completeness:
             name for place in self.central.places for name in (place.name, central(place.name)) if place.marked
         )
         start |= self.net.marking(name for place in names for name in (place, central(place)))
+        free = (part for its in self.protocol.parts.coordinated.values() for part in its if part.free)
+        voting = [part for part in free if _is_firable(part, frozenset(names))]
+        start |= self.net.marking(at(kind, part) for part in voting for kind in ("stands", "heard"))
 
         def starts(t: int) -> bool:
             """Whether the run that asks for the transition, and for nothing else, fires it from a quiet configuration.
 
             It touches no place of the faults, so it can be played wherever nobody is down.
             """
-            run = way(self.protocol, self.central.transitions[t].name)
+            run = way(self.protocol, self.central.transitions[t].name, voted=True)
             if run is None:
                 return False
             try:
@@ -151,17 +156,32 @@ class _Completeness:
         return starts
 
 
-def way(protocol: ProtocolNet, t: str) -> tuple[str, ...] | None:
-    """The steps by which a transition fires where nothing else is asked; None in the bare skeleton."""
+def way(protocol: ProtocolNet, t: str, *, voted: bool = False) -> tuple[str, ...] | None:
+    """The steps by which a transition fires where nothing else is asked; None in the bare skeleton.
+
+    Those by which parts free of promise vote, and are heard, may have been taken before; where they were, they are left
+    out with `voted`.
+    """
     its = protocol.parts.coordinated.get(t)
     if its is None:
         return (f"fire/{t}",)
     if not protocol.variant.acknowledged:
         return None
-    steps = [f"ask/{t}"]
+    steps = [f"ask/{t}"] if protocol.parts.promising(t) else []
     for part in its:
-        steps += [f"{step}/{t}/{part.controller}" for step in ("send-request", "promise", "hear")]
+        at_it = f"{t}/{part.controller}"
+        if not part.free:
+            steps += [f"{step}/{at_it}" for step in ("send-request", "promise", "hear")]
+        elif not voted:
+            steps += [f"stand/{at_it}", f"stand/{at_it}/again", f"hear/{at_it}"]
     return (*steps, f"decide/{t}")
+
+
+def _is_firable(part: Part, marking: frozenset[str]) -> bool:
+    """Eq. (1) of a part."""
+    return marking.issuperset((*part.inputs, *part.permissive)) and marking.isdisjoint(
+        (*part.outputs, *part.inhibitive)
+    )
 
 
 __all__ = ["CENTRAL_MARKINGS_MAX", "IncompleteGraph", "Lost", "carrying", "central_markings", "first_lost", "way"]

@@ -43,7 +43,7 @@ FOCI_MAX: Final = 200
 FOCI_MORE: Final = 12
 """How many after one that has a run, for a shorter one."""
 
-_KINDS: Final = (*CHANNELS, "noted", "heard", "obeyed", "promised", "counted")
+_KINDS: Final = (*CHANNELS, "noted", "heard", "obeyed", "promised", "stands", "counted")
 """The places of a part."""
 
 
@@ -210,8 +210,8 @@ class Search:
             index = self.protocol.net.transition_index
             voting = [name for name in (f"promise/{one}" for one in at_each) if name in index]
             return [*voting, f"decide/{t}", *(f"apply/{one}" for one in at_each)]
-        steps = [f"ask/{t}"]
-        steps += [f"{step}/{one}" for one in at_each for step in ("send-request", "promise", "hear")]
+        steps = [f"ask/{t}"] if self.protocol.parts.promising(t) else []
+        steps += [f"{step}/{t}/{p.controller}" for p in self.coordinated[t] for step in _voting(p)]
         steps.append(f"decide/{t}")
         steps += [f"{step}/{one}" for one in at_each for step in ("order-commit", "apply", "note")]
         group = self.protocol.parts.group_of[t]
@@ -221,8 +221,9 @@ class Search:
     def exchanges(self, part: Part) -> Iterator[_Leap]:
         """What is asked of a part, and told to it."""
         t, c = part.whole, part.controller
+        asked_for = "gives" if part.free else "is asked for"
         for name, kinds, text in (
-            ("yes", ("send-request", "promise", "hear"), f"{c} is asked for its vote on {t}, and its yes arrives"),
+            ("yes", _voting(part), f"{c} {asked_for} its vote on {t}, and its yes arrives"),
             ("obeys", ("order-commit", "apply", "note"), f"{c} is ordered to fire its part of {t}, and obeys"),
         ):
             if leap := self.leap(f"{name}/{t}/{c}", [f"{kind}/{t}/{c}" for kind in kinds], text):
@@ -250,6 +251,11 @@ class Search:
         every = ((True, False), (False, True), (True, True), (False, False))
         inputs, outputs, permissive, inhibitive = (_where(needs, now, *values) for values in every)
         return _Leap(Transition(f"leap/{name}", inputs, outputs, permissive, inhibitive), tuple(steps), text)
+
+
+def _voting(part: Part) -> tuple[str, ...]:
+    """The steps by which a part votes, and is heard."""
+    return ("stand", "hear") if part.free else ("send-request", "promise", "hear")
 
 
 def _where(needs: dict[str, bool], now: dict[str, bool], before: bool, after: bool) -> tuple[str, ...]:

@@ -28,6 +28,12 @@ ASTRAY: Final = "astray"
 
 CHANNELS: Final = ("request", "vote", "commit-order", "abort-order", "acknowledgement")
 """The messages of a part, each with a place that holds a token while it is on its way."""
+_OF_FREE: Final = ("vote", "commit-order", "acknowledgement")
+
+
+def channels_of(part: Part) -> tuple[str, ...]:
+    """The messages of this part: one that is free of promise is not asked, and has nothing to give up."""
+    return _OF_FREE if part.free else CHANNELS
 
 
 def central(place: str) -> str:

@@ -8,8 +8,9 @@ few and in a decision diagram where there are many:
   the marking that the central net then has) this is *refinement*: every run is, seen from outside, a run of the central
   net. Of the true protocol also `orders-fit`: an order always finds its part firable, so promises are kept.
 - `complete`: nothing is lost (`completeness`), and so no deadlock is added.
-- `one-token`: contact is where the central net has it, and nowhere else. So no step waits for a place to be empty
-  that it was not told to look at, and every place holds one token at most by what the steps do, not by the rule.
+- `one-token`: contact is where the central net has it, and nowhere else, but at what a part that is free of promise
+  takes when its order comes: who fills such a place waits for that by the firing rule. Else no step waits for a place
+  to be empty that it was not told to look at, and a place holds one token at most by what the steps do.
 - `divergence`: which runs are busy for ever (`divergence`).
 
 Each is proved, violated with a firing sequence of the protocol net, told in the words of who watches, or unknown.
@@ -50,7 +51,7 @@ MORE_MEMORY: Final = "the diagram needs more memory than `prove` gives it; `expl
 STATEMENTS: Final = {
     FOLLOWS: "whatever the protocol fires, the central net can fire",
     AGREES: "where no order is on its way, the controllers hold the marking of the central net",
-    FIT: "an order to fire finds its part firable",
+    FIT: "an order to fire finds its part firable, or free of promise with inputs full and outputs empty",
 }
 COMPLETE: Final = Question(
     "explored.complete",
@@ -60,12 +61,13 @@ COMPLETE: Final = Question(
 )
 ONE_TOKEN: Final = Question(
     "explored.one-token",
-    "no step finds a full place that it would fill, but where the central net has contact",
+    "no step finds a full place that it would fill, but where the central net has contact, or an order under way takes "
+    "the token of a part free of promise",
     code="F4002",
 )
 DIVERGENCE: Final = Question(
     "explored.divergence",
-    "while nothing fires, a run goes on for ever only by repeating requests or orders, or giving rounds up, for ever",
+    "while nothing fires, a run goes on for ever only by repeating requests, votes or orders, or giving rounds up",
     code="F4002",
     method="weights on places that every other hidden step lowers",
 )

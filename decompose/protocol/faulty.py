@@ -19,7 +19,7 @@ is down may lose any of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Final
 
 from firable.decompose.protocol.draft import Draft, Step, at, coordinator_down, down, late
@@ -78,8 +78,8 @@ def crashing_coordinators(parts: Parts, faults: Faults) -> tuple[str, ...]:
     return (faults.doomed,) if faults.doomed else parts.deciders
 
 
-def add_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[str]) -> None:
-    """Add the steps of every fault that may happen."""
+def add_faults(draft: Draft, parts: Parts, faults: Faults, channels: Callable[[Part], Iterable[str]]) -> None:
+    """Add the steps of every fault that may happen; `channels` are those of each part."""
 
     def taken(kind: str) -> list[str]:
         return [budget(kind)] if getattr(faults, kind) is Often.ONCE else []
@@ -91,7 +91,7 @@ def add_faults(draft: Draft, parts: Parts, faults: Faults, channels: Iterable[st
         draft.step("cease", Step("cease", "no fault happens from now on"), [GO_ON])
 
     for part in (part for its in parts.coordinated.values() for part in its):
-        for channel in channels:
+        for channel in channels(part):
             message, words = at(channel, part), WORDS[channel].format(t=part.whole, c=part.controller)
             if faults.loss:
                 draft.step(
@@ -139,6 +139,6 @@ def is_numbered(parts: Parts, channel: str) -> bool:
 
 def _forget(draft: Draft, parts: Iterable[Part], controller: str) -> None:
     for part in parts:
-        if part.controller == controller:
+        if part.controller == controller and not part.free:  # a yes that promises nothing rests on the marking alone
             forget = Step("forget", f"{controller} forgets in the crash that it promised {part.whole}", controller)
             draft.step(f"forget/{part.whole}/{controller}", forget, [at("promised", part)], (), [down(controller)])

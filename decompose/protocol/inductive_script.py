@@ -7,6 +7,7 @@
     (define-fun |to do 1| () Bool SENTENCE) ...
     (push 1) (echo "starts") ... (check-sat) (pop 1)
     (assert |the invariant|)
+    (assert |votes stand|)                          where parts are free of promise
     (push 1) (echo "keeps.STEP") (assert DEMANDS) (assert (not (let (CHANGES) SENTENCES))) (check-sat) (pop 1)
     ...
 
@@ -40,32 +41,37 @@ from firable.decompose.protocol.inductive import (
     invariant,
     may_go_on,
     negated,
+    persistent,
     still_to_be_done,
     touched,
 )
-from firable.decompose.protocol.rounds import decided
+from firable.decompose.protocol.rounds import committed, decided
 from firable.nets.net import Transition
 from firable.nets.source import printable
 
 LOGIC: Final = "(set-logic QF_LIA)"
 INVARIANT: Final = "|the invariant|"
+PERSISTENT: Final = "|votes stand|"
 OPEN: Final = "|something is open|"
 _HEAD: Final = (
     "Each block asserts that its sentence does not hold, so the answer `unsat` proves it.",
     "The constants: a place of the protocol's net holds a token; `let` says what a step changes.",
     "To check it with another solver: cvc5 --incremental FILE, or z3 FILE; every name is followed by `unsat`.",
 )
+GIVEN: Final = (
+    "; Given of the marking that the central net then has; the verdicts `persistent` of the same net show it."
+)
 SAYS: Final = {
     "starts": "the invariant holds at the start",
     "keeps": "the step keeps the invariant",
     "follows": "whatever fires, the central net can fire",
     "agrees": "where no order is on its way, the controllers hold the central marking",
-    "orders-fit": "an order finds its part firable",
-    "one-token": "the step would fill a full place only where the central net has contact",
+    "orders-fit": "an order finds its part firable, or free of promise with inputs full and outputs empty",
+    "one-token": "the step fills a full place only where the central net has contact, or an order takes the token",
     "home": "without faults, a step homeward can be taken, or all is at rest",
     "homeward": "the step leaves less to be done",
     "way": "from rest, what the central net can fire is fired by these steps",
-    "divergence": "every step that fires nothing, but for asking, ordering and giving up, lowers the weighted sum",
+    "divergence": "every step that fires nothing, but for repeating and giving up, lowers the weighted sum",
 }
 """What each kind of obligation says, in the order of the file."""
 
@@ -79,6 +85,9 @@ RESTS_ON: Final = {
     "divergence": ("divergence",),
 }
 """For each verdict, the kinds of obligations that show it."""
+
+VOTING: Final = frozenset({"stand", "repeat"})
+"""The kinds of steps on a way to a firing that are left out where they were taken before; so is hearing of them."""
 
 
 def all_of(texts: Iterable[str]) -> str:
@@ -109,6 +118,14 @@ def after(changes: Mapping[str, bool], text: str) -> str:
     return f"(let ({bound}) {text})" if bound else text
 
 
+def tried(step: Transition, text: str) -> str:
+    """What a formula says when a step has been taken, if it may be: as of votes that stand, or are given now."""
+    may = all_of(map(literal, demands(step)))
+    bound = [f"({symbol(p)} {any_of([symbol(p), may])})" for p in step.outputs]
+    bound += [f"({symbol(p)} {all_of([symbol(p), f'(not {may})'])})" for p in step.inputs]
+    return f"(let ({' '.join(sorted(bound))}) {text})"
+
+
 @dataclass(frozen=True)
 class Obligations:
     """The obligations on one protocol net; under faults those on its tokens and on what is busy for ever are left out.
@@ -127,6 +144,11 @@ class Obligations:
     def invariant(self) -> tuple[Sentence, ...]:
         """What holds of every configuration."""
         return tuple(invariant(self.protocol))
+
+    @cached_property
+    def given(self) -> str:
+        """What is given of the marking of the central net, as an assertion; nothing where every part promises."""
+        return f"(assert {PERSISTENT})\n" if any(True for _ in persistent(self.protocol)) else ""
 
     @cached_property
     def facts(self) -> dict[Sentence, str]:
@@ -148,7 +170,10 @@ class Obligations:
         lines = [f"; {printable(line)}" for line in (says, *_HEAD)]
         places = sorted(place.name for place in protocol.net.places)
         lines += [LOGIC, *(f"(declare-const {symbol(place)} Bool)" for place in places)]
-        lines += [_defined(INVARIANT, all_of(map(sentence, self.invariant))), _defined(OPEN, self._open)]
+        lines.append(_defined(INVARIANT, all_of(map(sentence, self.invariant))))
+        if self.given:
+            lines += [GIVEN, _defined(PERSISTENT, all_of(map(sentence, persistent(protocol))))]
+        lines.append(_defined(OPEN, self._open))
         lines += [_defined(name, sentence(fact)) for fact, name in self.facts.items()]
         return "\n".join(lines) + "\n"
 
@@ -185,8 +210,12 @@ class Obligations:
         for part in (part for its in parts.coordinated.values() for part in its):
             wrong = [(place, False) for place in (*part.inputs, *part.permissive)]
             wrong += [(place, True) for place in (*part.outputs, *part.inhibitive)]
-            there = [symbol(at("commit-order", part)), symbol(at("promised", part))]
-            unfit.append(all_of([*there, any_of(map(literal, wrong))]))
+            there = [(at("commit-order", part), True), (at("promised", part), True)]
+            if part.free:
+                wrong = [(place, False) for place in (at("stands", part), *part.inputs)]
+                wrong += [(place, True) for place in part.outputs]
+                there[1] = (at("obeyed", part), False)
+            unfit.append(all_of([*map(literal, there), any_of(map(literal, wrong))]))
         if unfit:
             yield _block("orders-fit", "orders-fit", [any_of(unfit)])
 
@@ -197,11 +226,17 @@ class Obligations:
         return any_of(f"(not (= {symbol(name)} {symbol(central(name))}))" for name in names)
 
     def _tokens(self) -> Iterator[str]:
+        taking: dict[str, list[str]] = {}
+        for part in (part for its in self.protocol.parts.coordinated.values() for part in its if part.free):
+            underway = all_of([symbol(committed(part.whole)), literal((at("obeyed", part), False))])
+            for place in part.inputs:
+                taking.setdefault(place, []).append(underway)
         for t in self.steps:
             given = [literal((place, True)) for place in (*t.inputs, *t.permissive)]
             given += [literal((place, False)) for place in t.inhibitive]
             if fires := self.protocol.steps[t.name].fires:
                 given.append(f"(not {self._contact(self.protocol.parts.net.transition(fires))})")
+                given += [f"(not {underway})" for place in t.outputs for underway in taking.get(place, ())]
             if t.outputs:
                 yield _block(f"one-token.{t.name}", "one-token", [all_of(given), any_of(map(symbol, t.outputs))])
 
@@ -215,7 +250,7 @@ class Obligations:
     def _open(self) -> str:
         """Something is asked, promised or on its way, or the controllers differ from the central net."""
         own = {place.name for place in self.protocol.parts.net.places}
-        own |= {central(name) for name in own}
+        own |= {central(name) for name in own} | self.protocol.standing
         rest = (place.name for place in self.protocol.net.places if place.name not in own and not place.marked)
         return any_of([*map(symbol, rest), self._differs])
 
@@ -236,11 +271,16 @@ class Obligations:
 
     def _ways(self) -> Iterator[str]:
         ceased = list(map(literal, may_go_on(self.protocol)))
+        free = (part for its in self.protocol.parts.coordinated.values() for part in its if part.free)
+        unasked = {at("hear", part) for part in free}
         for t in sorted(self.protocol.parts.transitions, key=lambda t: t.name):
             fired = "true"
             for name in reversed(way(self.protocol, t.name) or ()):
                 step = self.protocol.net.transition(name)
-                fired = all_of([*map(literal, demands(step)), after(effect(step), fired)])
+                if self.protocol.steps[name].kind in VOTING or name in unasked:
+                    fired = tried(step, fired)
+                else:
+                    fired = all_of([*map(literal, demands(step)), after(effect(step), fired)])
             can = all_of(literal((central(place), full)) for place, full in demands(t))
             yield _block(f"way.{t.name}", "way", [*ceased, can, f"(not {OPEN})", f"(not {fired})"])
 
@@ -291,7 +331,8 @@ def prove_inductively(protocol: ProtocolNet, timeout_ms: int) -> Proof:
     ([], True)
     """
     obligations = Obligations(protocol)
-    beginning, starts, kept = obligations.beginning(), obligations.starts(), f"\n(assert {INVARIANT})\n"
+    beginning, starts = obligations.beginning(), obligations.starts()
+    kept = f"\n(assert {INVARIANT})\n{obligations.given}"
     text, open_ = [beginning, starts, kept], set[str]()
     if Reader(timeout_ms, beginning).answer(starts) is not Answer.UNSAT:
         open_.add("starts")

@@ -115,8 +115,12 @@ def outages(decomposition: Decomposition, limits: Callable[[], Limits] = Limits)
 
 
 def inquests(decomposition: Decomposition, limits: Callable[[], Limits] = Limits) -> Iterator[Inquest]:
-    """The same, each with what it rests on."""
-    yield from (Inquest(bereft, limits()) for bereft in deaths(Parts(decomposition, PROTOCOL)))
+    """The same, each with what it rests on.
+
+    What a part would keep back that promises, one that is free of promise is said to keep back, too.
+    """
+    promising = Parts(replace(decomposition, free=()), PROTOCOL)
+    yield from (Inquest(bereft, limits()) for bereft in deaths(promising, decomposition.free))
 
 
 def sealed_outages(

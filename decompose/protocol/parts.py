@@ -1,8 +1,9 @@
 """Who takes part in what: the parts of the coordinated transitions, their groups, who decides, and what disturbs what.
 
 A part is what one controller has of a coordinated transition: a transition of its subnet. Two parts *disturb* each
-other if firing one could change what the other reads (O1). What can never fire (no valuation opens its external gates,
-or Eq. (1) wants a place both full and empty) takes no part in anything and is left out.
+other if firing one could change what the other reads (O1). A part that is free of promise votes unasked, and nobody
+waits for a promise of it; it waits for all that it would disturb. What can never fire (no valuation opens its external
+gates, or Eq. (1) wants a place both full and empty) takes no part in anything and is left out.
 
 The variants that break the split itself are made here, so that the steps need not know of them: with copies of gates,
 who owns only gates takes no part, and one of the others reads a copy; without arbitration, the local members of a
@@ -25,7 +26,8 @@ from firable.nets.net import Net, Transition
 class Part:
     """A transition, or the part of one, at one controller; places are those of the central net.
 
-    `copied_full` and `copied_empty` are places of others, of which the controller reads copies.
+    `copied_full` and `copied_empty` are places of others, of which the controller reads copies. One that is `free` of
+    promise votes unasked.
     """
 
     whole: str
@@ -38,6 +40,7 @@ class Part:
     has_signals: bool
     copied_full: tuple[str, ...] = ()
     copied_empty: tuple[str, ...] = ()
+    free: bool = False
 
     @property
     def writes(self) -> frozenset[str]:
@@ -137,20 +140,25 @@ class Parts:
     def _named(self, at: str) -> str:
         return COORDINATOR if len(self._deciding) == 1 or at == COORDINATOR else f"coordinator {at}"
 
+    def promising(self, t: str) -> tuple[Part, ...]:
+        """The parts of a transition that are asked for a promise; without any, it is not asked for at all."""
+        return tuple(part for part in self.coordinated[t] if not part.free)
+
     def excluding(self, part: Part) -> tuple[Part, ...]:
-        """The parts whose promise keeps this one from being promised or fired."""
+        """The parts whose promise keeps this one from being promised, voted on or fired."""
         return tuple(
             other
             for its in self.coordinated.values()
             for other in its
-            if other.controller == part.controller and self._excludes(other, part)
+            if other.controller == part.controller and not other.free and self._excludes(other, part)
         )
 
     def _excludes(self, promised: Part, part: Part) -> bool:
         if promised.whole == part.whole or self.variant.lock is Lock.NOTHING:
             return False
         group = self.group_of.get(part.whole)
-        if group is not None and group == self.group_of[promised.whole] and self.variant.acknowledged:
+        together = group is not None and group == self.group_of[promised.whole] and self.variant.acknowledged
+        if together and not part.free:
             return False  # the round is theirs together, and has one commit
         if not self.variant.arbitrated and self._conflict(promised.whole, part.whole):
             return False
@@ -185,7 +193,22 @@ class Parts:
 
     def _part(self, whole: str, controller: str, name: str) -> Part:
         t = self.decomposition.subnet(controller).transition(name)
-        return Part(whole, controller, name, t.inputs, t.outputs, t.permissive, t.inhibitive, bool(t.external))
+        arcs = (t.inputs, t.outputs, t.permissive, t.inhibitive)
+        return Part(whole, controller, name, *arcs, bool(t.external), free=self._is_free(whole, controller))
+
+    def _is_free(self, whole: str, controller: str) -> bool:
+        """Whether a part is said to be free of promise; in the bare skeleton none is."""
+        if not self.variant.acknowledged:
+            return False
+        return (whole, controller) in self._free or (self.variant.all_free and whole in self._rows)
+
+    @cached_property
+    def _free(self) -> frozenset[tuple[str, str]]:
+        return frozenset(self.decomposition.free)
+
+    @cached_property
+    def _rows(self) -> frozenset[str]:
+        return frozenset(row.name for row in self.decomposition.coordinated)
 
 
 def _copied(part: Part) -> Iterator[str]:

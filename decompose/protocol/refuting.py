@@ -165,7 +165,7 @@ def is_true_here(decomposition: Decomposition, variant: Variant) -> bool:
     groups, or of what a promise excludes.
     """
     by_parts = replace(PROTOCOL, gate_copies=variant.gate_copies, lock=variant.lock, arbitrated=variant.arbitrated)
-    if variant != replace(by_parts, common=variant.common):
+    if variant != replace(by_parts, common=variant.common, all_free=variant.all_free):
         return False
     its, true = Parts(decomposition, variant), Parts(decomposition, PROTOCOL)
     same = (its.coordinated, its.local, its.copies) == (true.coordinated, true.local, true.copies)

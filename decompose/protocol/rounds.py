@@ -15,13 +15,18 @@ and why nothing is lost by it:
   not so, and their channels stay as they are.
 - *A close takes its parts one after the other*, transition by transition of the group, while the group is decided and
   nothing can be asked.
+- *A part that is free of promise* votes when it is firable and no promise at its controller is disturbed. The yes
+  stands until an order is applied, whatever rounds come between, and so it may arrive, and be heard, at any time until
+  its transition is committed. From then on it is used up: what is still on its way, or is said again before the order
+  comes, is older than the acknowledgement, and known for that by its number. A transition without any part that
+  promises is not asked for; it is decided when the votes are heard.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from firable.decompose.protocol.draft import CHANNELS, Draft, Effect, Step, at, blind, guarded
+from firable.decompose.protocol.draft import Draft, Effect, Step, at, blind, channels_of, guarded
 from firable.decompose.protocol.parts import Part, Parts
 
 
@@ -31,12 +36,17 @@ def add_rounds(draft: Draft, parts: Parts) -> None:
         for t in group:
             _coordinator(draft, parts, t, group, decided(parts, t))
             for part in parts.coordinated[t]:
-                _voting(draft, parts, part, decided(parts, t))
+                if part.free:
+                    _standing(draft, parts, part)
+                else:
+                    _promising(draft, parts, part, decided(parts, t))
                 _ordering(draft, parts, part, decided(parts, t))
                 _obeying(draft, parts, part)
         if len(group) > 1:
             close = Step("close", f"the round of {_listed(group)} is closed", coordinator=parts.decider(group[0]))
-            draft.step(f"close-round/{g}", close, [decided(parts, group[0])], (), (), [asked(t) for t in group])
+            draft.step(
+                f"close-round/{g}", close, [decided(parts, group[0])], (), (), [is_open(parts, t) for t in group]
+            )
 
 
 def asked(t: str) -> str:
@@ -49,22 +59,29 @@ def committed(t: str) -> str:
     return f"committed/{t}"
 
 
+def is_open(parts: Parts, t: str) -> str:
+    """The place that keeps the round of a transition open: asked for, or committed where nobody has to be asked."""
+    return asked(t) if parts.promising(t) else committed(t)
+
+
 def decided(parts: Parts, t: str) -> str:
     """The present round of the group of a transition is decided, one way or the other."""
     return f"decided/{'+'.join(parts.groups[parts.group_of[t]])}"
 
 
 def _coordinator(draft: Draft, parts: Parts, t: str, group: Sequence[str], over: str) -> None:
-    its = parts.coordinated[t]
+    its, promising = parts.coordinated[t], parts.promising(t)
     heard = [at("heard", part) for part in its]
-    others = [asked(u) for u in parts.coordinated if u != t] if parts.variant.one_round else []
+    others = [is_open(parts, u) for u in parts.coordinated if u != t] if parts.variant.one_round else []
     who, by = parts.decider(t), _by(parts, t)
-    ask = Step("ask", f"{who} asks for {t}", coordinator=who)
-    draft.step(f"ask/{t}", ask, (), [asked(t)], (), [asked(t), over, *others])
-    given_up = Step("give-up", f"the round of {_listed(group)} is given up{by}", coordinator=who)
-    draft.step(f"give-up/{t}", given_up, (), [over], [asked(t)], [over])
+    asks = [asked(t)] if promising else []
+    if promising:
+        ask = Step("ask", f"{who} asks for {t}", coordinator=who)
+        draft.step(f"ask/{t}", ask, (), asks, (), [*asks, over, *others])
+        given_up = Step("give-up", f"the round of {_listed(group)} is given up{by}", coordinator=who)
+        draft.step(f"give-up/{t}", given_up, (), [over], asks, [over])
     decide = Step("decide", f"{t} is decided{by}", fires=t, coordinator=who)
-    draft.fire(f"decide/{t}", decide, heard, [committed(t), over], [asked(t)], [over])
+    draft.fire(f"decide/{t}", decide, heard, [committed(t), over], asks, [over])
     if not parts.variant.unanimous and len(its) > 1:
         for part in its:
             words = f"{t} is decided{by} without the vote of {part.controller}"
@@ -75,26 +92,34 @@ def _coordinator(draft: Draft, parts: Parts, t: str, group: Sequence[str], over:
                 without,
                 votes,
                 [committed(t), over],
-                [asked(t)],
+                asks,
                 [over, at("heard", part)],
             )
-    left = [at(channel, part) for part in its for channel in _cleared(parts)]
-    answered = [at(kind, part) for part in its for kind in ("noted", "obeyed")]
+
+    def left(some: Sequence[Part]) -> list[str]:
+        return [at(channel, part) for part in some for channel in _cleared(parts, part)]
+
+    def answered(some: Sequence[Part]) -> list[str]:
+        return [at(kind, part) for part in some for kind in ("noted", "obeyed")]
+
     words = f"the round of {t} is closed" if len(group) == 1 else f"{t} is settled in its round"
     close = Step("close", words, coordinator=who)
     ends, needs = ([over], []) if len(group) == 1 else ([], [over])
-    draft.step(f"close/{t}", close, [asked(t), *answered, *ends, committed(t)], (), needs, left)
-    draft.step(f"close/{t}/aborted", close, [asked(t), *answered, *ends], (), needs, [*left, committed(t)])
+    draft.step(f"close/{t}", close, [*asks, *answered(its), *ends, committed(t)], (), needs, left(its))
+    if promising:
+        empty = [*left(promising), committed(t)]
+        draft.step(f"close/{t}/aborted", close, [*asks, *answered(promising), *ends], (), needs, empty)
 
 
-def _cleared(parts: Parts) -> list[str]:
-    """The channels that are empty when a round closes, because what comes later is known to be of an older round."""
+def _cleared(parts: Parts, part: Part) -> list[str]:
+    """The channels of a part that are empty when a round closes: what comes later is known to be of an older round."""
     kept = set() if parts.variant.vote_rounds else {"request", "vote"}
     kept |= set() if parts.variant.order_rounds else {"commit-order"}
-    return [channel for channel in CHANNELS if channel not in kept]
+    return [channel for channel in channels_of(part) if channel not in kept]
 
 
-def _voting(draft: Draft, parts: Parts, part: Part, over: str) -> None:
+def _promising(draft: Draft, parts: Parts, part: Part, over: str) -> None:
+    """How a part is asked for a promise, and votes."""
     t, c = part.whole, part.controller
     request, vote, heard, promised, obeyed = (
         at(kind, part) for kind in ("request", "vote", "heard", "promised", "obeyed")
@@ -129,15 +154,41 @@ def _voting(draft: Draft, parts: Parts, part: Part, over: str) -> None:
         draft.step(f"ignore-vote/{t}/{c}", late, [vote], (), [over])
 
 
+def _standing(draft: Draft, parts: Parts, part: Part) -> None:
+    """How a part that is free of promise votes."""
+    t, c, who = part.whole, part.controller, parts.decider(part.whole)
+    vote, heard, stands = (at(kind, part) for kind in ("vote", "heard", "stands"))
+    promised = [at("promised", other) for other in parts.excluding(part)]
+    draft.step(
+        f"stand/{t}/{c}",
+        Step("stand", f"{c} votes yes on {t}, and promises nothing", c),
+        (),
+        [stands, vote],
+        [*part.inputs, *part.permissive, *(copy(c, place) for place in part.copied_full)],
+        [*part.outputs, *part.inhibitive, *(copy(c, place) for place in part.copied_empty), *promised, stands, vote],
+    )
+    again = Step("repeat", f"{c} repeats its yes on {t}", c)
+    draft.step(f"stand/{t}/{c}/again", again, (), [vote], [stands], [vote])
+    heard_of = Step("hear", f"the yes of {c} on {t} arrives", coordinator=who)
+    draft.step(f"hear/{t}/{c}", heard_of, [vote], [heard], (), [heard, committed(t)])
+    known = Step("hear", f"the yes of {c} on {t} arrives again", coordinator=who)
+    draft.step(f"hear/{t}/{c}/again", known, [vote], (), [heard])
+    if parts.variant.vote_rounds:
+        old = Step("ignore", f"the yes of {c} on {t} from before the order arrives", coordinator=who)
+        draft.step(f"ignore-vote/{t}/{c}", old, [vote], (), [committed(t)])
+
+
 def _ordering(draft: Draft, parts: Parts, part: Part, over: str) -> None:
     t, c, who = part.whole, part.controller, parts.decider(part.whole)
     commit, abort, heard, noted = (at(kind, part) for kind in ("commit-order", "abort-order", "heard", "noted"))
     order = Step("order", f"{who} orders {c} to fire its part of {t}", coordinator=who)
     draft.step(f"order-commit/{t}/{c}", order, (), [commit], [committed(t)], [commit, noted])
-    order = Step("order", f"{who} orders {c} to give up its part of {t}", coordinator=who)
-    draft.step(f"order-abort/{t}/{c}", order, (), [abort], [asked(t), over], [abort, committed(t), noted, heard])
-    # Its vote was heard, and is of no use any more.
-    draft.step(f"order-abort/{t}/{c}/voted", order, [heard], [abort], [asked(t), over], [abort, committed(t), noted])
+    if not part.free:
+        order = Step("order", f"{who} orders {c} to give up its part of {t}", coordinator=who)
+        given_up, not_sent = [asked(t), over], [abort, committed(t), noted]
+        draft.step(f"order-abort/{t}/{c}", order, (), [abort], given_up, [*not_sent, heard])
+        # Its vote was heard, and is of no use any more.
+        draft.step(f"order-abort/{t}/{c}/voted", order, [heard], [abort], given_up, not_sent)
     acknowledgement = at("acknowledgement", part)
     note = Step("note", f"{c} is known to have obeyed on {t}", coordinator=who)
     draft.step(f"note/{t}/{c}", note, [acknowledgement], [noted], (), [noted])
@@ -146,23 +197,27 @@ def _ordering(draft: Draft, parts: Parts, part: Part, over: str) -> None:
 
 def _obeying(draft: Draft, parts: Parts, part: Part) -> None:
     t, c = part.whole, part.controller
-    commit, abort, promised, obeyed, acknowledgement = (
-        at(kind, part) for kind in ("commit-order", "abort-order", "promised", "obeyed", "acknowledgement")
+    commit, abort, obeyed, acknowledgement = (
+        at(kind, part) for kind in ("commit-order", "abort-order", "obeyed", "acknowledgement")
     )
+    promised = at("stands" if part.free else "promised", part)
     apply = Step("apply", f"the order for {t} arrives at {c}, which fires its part", c)
     for effect in effects(parts, part):
         inputs, outputs = [commit, *effect.inputs], [acknowledgement, *effect.outputs]
-        draft.step(
-            f"apply/{t}/{c}{effect.suffix}", apply, [*inputs, promised], [*outputs, obeyed], effect.full, effect.empty
-        )
+        empty = [*effect.empty, *([obeyed] if part.free else [])]  # it may stand anew before the round is closed
+        draft.step(f"apply/{t}/{c}{effect.suffix}", apply, [*inputs, promised], [*outputs, obeyed], effect.full, empty)
         if not parts.variant.order_rounds:
             twice = Step("apply", f"the order for {t} arrives at {c} once more, which fires its part again", c)
             draft.step(
                 f"apply-again/{t}/{c}{effect.suffix}", twice, inputs, outputs, effect.full, [*effect.empty, promised]
             )
-    known = Step("apply", f"the order for {t} arrives at {c}, which has nothing promised and acknowledges it", c)
+    why = "has obeyed it before" if part.free else "has nothing promised"
+    known = Step("apply", f"the order for {t} arrives at {c}, which {why} and acknowledges it", c)
     if parts.variant.order_rounds:
         draft.step(f"acknowledge-commit/{t}/{c}", known, [commit], [acknowledgement], [obeyed], [acknowledgement])
+    if part.free:
+        return
+    if parts.variant.order_rounds:
         draft.step(
             f"acknowledge-commit/{t}/{c}/unpromised", known, [commit], [acknowledgement, obeyed], (), [promised, obeyed]
         )

@@ -88,6 +88,8 @@ class Variant:
     `one_round` asks for one transition at a time: fewer runs, so that what goes wrong in one of them is found sooner.
     `common`: a conflict across coordinators is decided by their common ancestor (O8); else each decides what only those
     below it take part in, as if nobody else decided any of the conflict.
+    `all_free`: every part is taken for one that is free of promise, whether its yes stands or not; else those that the
+    decomposition names, in the skeleton with rounds.
 
     Raises `ValueError` for votes other than promised in the skeleton with rounds.
 
@@ -108,6 +110,7 @@ class Variant:
     serial: bool = False
     one_round: bool = False
     common: bool = True
+    all_free: bool = False
 
     def __post_init__(self) -> None:
         if self.acknowledged and (self.votes is not Votes.PROMISED or self.recheck or self.serial):

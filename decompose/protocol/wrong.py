@@ -86,6 +86,27 @@ WRONG: Final = (
         Faults(crash=Often.ONCE),
     ),
     WrongProtocol(
+        "unfounded-freedom",
+        "O1",
+        "every part is taken for one that is free of promise, whether its yes stands or not",
+        Variant(all_free=True),
+        "hood",
+    ),
+    WrongProtocol(
+        "used-votes",
+        "O5",
+        "a yes of a part free of promise counts again after the firing",
+        Variant(all_free=True, vote_rounds=False),
+        "shuttle",
+    ),
+    WrongProtocol(
+        "free-twice",
+        "O5",
+        "an order to a part free of promise that comes again is applied again",
+        Variant(all_free=True, order_rounds=False),
+        "shuttle",
+    ),
+    WrongProtocol(
         "sent-once",
         "O5",
         "an order is sent once, and nobody acknowledges it",

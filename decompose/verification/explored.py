@@ -29,17 +29,19 @@ _FAULTS: Final = "while messages are lost and doubled, and controllers and coord
 _SAFE: Final = {
     "follows": "whatever the protocol fires, the central net can fire",
     "agrees": "where no order is on its way, the controllers hold the marking of the central net",
-    "orders-fit": "an order to fire finds its part firable",
+    "orders-fit": "an order to fire finds its part firable, or free of promise with inputs full and outputs empty",
 }
 _COMPLETE: Final = {
     "complete": (
         "whatever the central net may fire next, the protocol can still fire next "
         "(branching bisimilar, its steps hidden)"
     ),
-    "one-token": "no step finds a full place that it would fill, but where the central net has contact",
+    "one-token": (
+        "no step finds a full place that it would fill, but where the central net has contact, "
+        "or an order under way takes the token of a part free of promise"
+    ),
     "divergence": (
-        "while nothing fires, a run goes on for ever only by repeating requests or orders, "
-        "or giving rounds up, for ever"
+        "while nothing fires, a run goes on for ever only by repeating requests, votes or orders, or giving rounds up"
     ),
 }
 _RESUMES: Final = "when faults have ceased, whatever the central net may fire next, the protocol can fire next"
@@ -60,7 +62,8 @@ def check_explored(examination: Examination, cut: Cut, solver: str, answers: Ans
     """Judge the verdicts on the protocol of the net that was cut; raises `NotShownError` where one is not shown."""
     for family in TITLES:
         if any(verdict.name.startswith(f"{family}.") for verdict in examination.bundle.verdicts):
-            stated = Obligations(Voting(cut, family == "faults"))
+            free = frozenset(examination.bundle.decomposition.free)
+            stated = Obligations(Voting(cut, family == "faults", free))
             open_ = _answered(examination, stated, answers, timeout_ms)
             _judge(examination, stated, solver, open_)
 

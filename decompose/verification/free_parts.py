@@ -1,12 +1,11 @@
 """Parts that are free of promise, judged anew: what the theorem assumes of each, from the central net alone.
 
 Two things are asked. By the arcs: at the controller of the part nobody else takes what it takes or reads that full, nor
-fills what it fills or reads that empty; who reads a signal that it clears needs a place full that it fills; and of
-signals it reads completions of its own input places, at 1. Of the markings: that its vote is persistent must be shown,
-by the arcs or by a document (`votes`), and not only be claimed.
-
-Verdicts on the protocol of this very net are on one in which every part promises; beside free parts they would be on
-another protocol than the one that runs.
+fills what it fills or reads that empty; who reads a signal that it clears needs a place full that it fills; nobody who
+is kept from closing a gate of it is so by a signal alone; and of signals it reads completions of its own input places,
+at 1. Of the markings: that its vote is persistent must be shown,
+by the arcs or by a document (`votes`), and not only be claimed. What is said of the protocol of this very net
+(`explored`) rests on both.
 """
 
 from __future__ import annotations
@@ -31,12 +30,6 @@ def check_free_parts(examination: Examination, cut: Cut) -> None:
     every = [(row.name, part.controller) for row in cut.coordinated for part in row.parts]
     if list(free) != [pair for pair in every if pair in set(free)]:
         raise NotShownError("the parts that are free of promise are not parts of the table, in its order", "table")
-    explored = [name for name in examination.by_name if name.startswith(("explored.", "faults."))]
-    if free and explored:
-        message = (
-            f"'{explored[0]}' is on a protocol in which every part promises, and '{free[0][0]}' has one that is free"
-        )
-        raise NotShownError(message, "verdicts", explored[0])
     subnets = {subnet.name: subnet for subnet in cut.subnets}
     for transition, controller in every if free else ():
         name = next(part.name for part in cut.parts[transition] if part.controller == controller)
@@ -59,6 +52,7 @@ def _against(subnet: Net, part: Transition) -> Iterator[str]:
     places = {place.name: place for place in subnet.places}
     taken, filled = set(part.inputs), set(part.outputs)
     cleared = {signal for name in filled for signal in places[name].cleared}
+    awaited = {gate.signal for gate in part.external if gate.wanted}
     for other in subnet.transitions:
         if other is part:
             continue
@@ -70,6 +64,9 @@ def _against(subnet: Net, part: Transition) -> Iterator[str]:
         for gate in other.external:
             if gate.signal in cleared and not filled & needs_full:
                 yield f"'{other.name}' reads '{gate.signal}', which it clears"
+            if gate.signal in awaited and not gate.wanted:
+                for at in sorted({*part.permissive} & {*other.inputs} | {*part.inhibitive} & {*other.outputs}):
+                    yield f"'{gate.signal}' alone keeps '{other.name}' from closing its gate '{at}'"
     for gate in part.external:
         commanded = [name for name, place in places.items() if gate.signal in place.cleared]
         of_its_own = commanded and set(commanded) <= taken

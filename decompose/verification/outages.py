@@ -46,7 +46,7 @@ def check_outages(examination: Examination, cut: Cut, answers: Answers, timeout_
     """Judge the verdicts on who is dead, if the bundle speaks of faults; raises `NotShownError`."""
     if not any(verdict.name.startswith("faults.") for verdict in examination.bundle.verdicts):
         return
-    for wake in wakes(Voting(cut, faults=True)):
+    for wake in wakes(Voting(cut, faults=True), examination.bundle.decomposition.free):
         verdict = examination.verdict(wake.name)
         sentence = _SAYS.format(wake.told)
         if verdict.status is Status.UNKNOWN:
@@ -147,6 +147,7 @@ class Wake:
     voting: Voting
     controller: str
     coordinator: str
+    free: frozenset[tuple[str, str]] = frozenset()
 
     @property
     def told(self) -> str:
@@ -252,9 +253,17 @@ class Wake:
         return {*own.inputs, *own.permissive} - moved, {*own.outputs, *own.inhibitive} - moved
 
     def _behind(self, part: Part) -> tuple[set[str], set[str]]:
-        """The same of one that has been decided: the central net has moved its tokens."""
+        """The same of one that has been decided: the central net has moved its tokens.
+
+        One that is free of promise has locked nothing, and its gates may be as they like by now.
+        """
         own = part.own
+        if self._is_free(part):
+            return set(own.outputs), set(own.inputs)
         return {*own.outputs, *own.permissive}, {*own.inputs, *own.inhibitive}
+
+    def _is_free(self, part: Part) -> bool:
+        return (part.whole, part.controller) in self.free
 
     def _transitions(self) -> Iterator[Transition]:
         yield Transition("life/begins", (_NOT_BEGUN,), (_ALIVE,))
@@ -264,7 +273,10 @@ class Wake:
         for act in ("behind", "hold"):
             for place, part in sorted(self.promises.items()):
                 full, empty = self._promised(part) if act == "hold" else self._behind(part)
-                full, empty = full | {_DYING}, empty | self._places_of(self.voting.others(part))
+                full = full | {_DYING}
+                if not self._is_free(part):
+                    others = self._places_of(self.voting.others(part))
+                    empty = empty | {other for other in others if not self._is_free(self.promises[other])}
                 name = f"{act}{place.removeprefix('held')}"
                 yield Transition(name, (), (place,), tuple(sorted(full)), tuple(sorted(empty)))
         stopped: dict[str, set[str]] = {}
@@ -279,7 +291,8 @@ class Wake:
             yield Transition(t.name, t.inputs, t.outputs, tuple(sorted(full)), tuple(sorted(empty)))
 
 
-def wakes(voting: Voting) -> Iterator[Wake]:
-    """Everybody who can be dead."""
-    yield from (Wake(voting, subnet.name, "") for subnet in voting.cut.subnets)
-    yield from (Wake(voting, "", coordinator) for coordinator in sorted(voting.coordinators))
+def wakes(voting: Voting, free: Iterable[tuple[str, str]] = ()) -> Iterator[Wake]:
+    """Everybody who can be dead; `voting` is the protocol in which every part promises, `free` those that do not."""
+    known = frozenset(free)
+    yield from (Wake(voting, subnet.name, "", known) for subnet in voting.cut.subnets)
+    yield from (Wake(voting, "", coordinator, known) for coordinator in sorted(voting.coordinators))

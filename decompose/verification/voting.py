@@ -9,6 +9,10 @@ the transition; where several decide something, each may crash by itself, and `c
     INPUTS, OUTPUTS     what the part takes and puts, in the subnet of its controller
     FULL, EMPTY         what Eq. (1) demands of its places
     OTHERS              the promises, of parts of other groups, that it would disturb (O1)
+    ALL-OTHERS          these, of parts of its own group, too
+
+A part that is free of promise has a table of its own: it `stands` where another one would be promised. Where every part
+of a transition is free, nobody is asked, and the transition has no place `asked`.
 
 Two different things whose names would make one place, as transitions `a/b` at `c` and `a` at `b/c`, are refused.
 """
@@ -31,15 +35,20 @@ COORDINATOR_DOWN: Final = "coordinator-down"
 UNNAMED: Final = "the coordinator"
 """The root of the layers where none of the controllers is marked as it."""
 MESSAGES: Final = ("request", "vote", "commit-order", "abort-order", "acknowledgement")
+MESSAGES_OF_FREE: Final = ("vote", "commit-order", "acknowledgement")
 MEMORY: Final = ("promised", "obeyed", "heard", "noted")
+MEMORY_OF_FREE: Final = ("stands", "obeyed", "heard", "noted")
 
 HOME, REPEATS = "h", "r"
 
 T = TypeVar("T")
 
-_OF_PART: Final = tuple(
-    tuple(word.strip() for word in row.split("|"))
-    for row in """
+
+def _rows(text: str) -> tuple[tuple[str, ...], ...]:
+    return tuple(tuple(word.strip() for word in row.split("|")) for row in text.strip().splitlines())
+
+
+_OF_PART: Final = _rows("""
         send-request/*       | coordinator | r  |         | request      | asked         | decided heard request
         promise/*            | controller  |    | request | promised vote | FULL | EMPTY OTHERS promised vote obeyed
         promise/*/again      | controller  |    | request | vote         | promised      | vote
@@ -58,9 +67,23 @@ _OF_PART: Final = tuple(
         acknowledge-abort/*  | controller  | h  | abort-order | acknowledgement | obeyed | acknowledgement
         note/*               | coordinator | h  | acknowledgement | noted | | noted
         note/*/again         | coordinator | h  | acknowledgement | | noted |
-    """.strip().splitlines()
-)
+""")
 """Name, who acts, whether it leads home or repeats, what it takes, puts, and needs full and empty."""
+
+
+_OF_FREE_PART: Final = _rows("""
+        stand/*              | controller  |    |       | stands vote  | FULL          | EMPTY ALL-OTHERS stands vote
+        stand/*/again        | controller  | r  |         | vote         | stands        | vote
+        hear/*               | coordinator | h  | vote    | heard        |               | heard committed
+        hear/*/again         | coordinator | h  | vote    |              | heard         |
+        ignore-vote/*        | coordinator | h  | vote    |              | committed     |
+        order-commit/*       | coordinator | hr |         | commit-order | committed     | commit-order noted
+        apply/*              | controller  | h  | commit-order stands INPUTS | acknowledgement obeyed OUTPUTS | | obeyed
+        acknowledge-commit/* | controller  | h  | commit-order | acknowledgement | obeyed | acknowledgement
+        note/*               | coordinator | h  | acknowledgement | noted | | noted
+        note/*/again         | coordinator | h  | acknowledgement | | noted |
+""")
+"""The same of a part that is free of promise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +93,17 @@ class Part:
     whole: str
     controller: str
     own: Transition
+    free: bool = False
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """The messages about it."""
+        return MESSAGES_OF_FREE if self.free else MESSAGES
+
+    @property
+    def memory(self) -> tuple[str, ...]:
+        """What is remembered of it."""
+        return MEMORY_OF_FREE if self.free else MEMORY
 
     @property
     def writes(self) -> set[str]:
@@ -110,10 +144,11 @@ class Step:
 
 @dataclass(frozen=True)
 class Voting:
-    """The protocol of a net that was cut, without faults or under all."""
+    """The protocol of a net that was cut, without faults or under all; `free` are the parts free of promise."""
 
     cut: Cut
     faults: bool
+    free: frozenset[tuple[str, str]] = frozenset()
 
     @cached_property
     def transitions(self) -> tuple[Transition, ...]:
@@ -137,7 +172,8 @@ class Voting:
 
     def _parts(self, name: str) -> Iterator[Part]:
         for part in self.cut.parts[name]:
-            yield Part(name, part.controller, self._subnets[part.controller][part.name])
+            free = (name, part.controller) in self.free
+            yield Part(name, part.controller, self._subnets[part.controller][part.name], free)
 
     @cached_property
     def _subnets(self) -> dict[str, dict[str, Transition]]:
@@ -168,10 +204,19 @@ class Voting:
         """The parts of all transitions that the coordinator decides."""
         return tuple(part for its in self.parts.values() for part in its)
 
-    def others(self, part: Part) -> Iterator[str]:
-        """The promises that keep a part from being promised, or a local transition from firing (O1)."""
-        mine = self.group_of.get(part.whole, ())
+    def asks(self, t: str) -> bool:
+        """Whether anybody is asked for a promise."""
+        return not all(part.free for part in self.parts[t])
+
+    def others(self, part: Part, *, every: bool = False) -> Iterator[str]:
+        """The promises that keep a part from being promised, or a local transition from firing (O1).
+
+        With `every` those of its own group are among them.
+        """
+        mine = (part.whole,) if every else self.group_of.get(part.whole, ())
         for other in self._at.get(part.controller, ()):
+            if other.free:
+                continue
             if other.whole not in mine and (part.writes & other.reads or part.reads & other.writes):
                 yield other.at("promised")
 
@@ -200,8 +245,9 @@ class Voting:
         some = [(place.name, place.marked) for place in self.cut.net.places]
         some += [(central(place), marked) for place, marked in some]
         some += [(ASTRAY, False), *((f"decided/{'+'.join(group)}", False) for group in self.groups)]
-        some += [(f"{kind}/{t}", False) for t in self.parts for kind in ("asked", "committed")]
-        some += [(part.at(kind), False) for part in self.all_parts for kind in (*MESSAGES, *MEMORY)]
+        some += [(f"asked/{t}", False) for t in self.parts if self.asks(t)]
+        some += [(f"committed/{t}", False) for t in self.parts]
+        some += [(part.at(kind), False) for part in self.all_parts for kind in (*part.messages, *part.memory)]
         if self.faults:
             some += [(GO_ON, True), (LATE, False), *((down, False) for down in self.coordinators_down)]
             some += [(f"down/{subnet.name}", False) for subnet in self.cut.subnets]
@@ -219,9 +265,9 @@ class Voting:
                 yield from self._of_coordinator(t, over, alone=len(group) == 1)
             if len(group) > 1:
                 its = self.coordinator_down(group[0])
-                yield self._step(f"close-round/{number}", its, HOME, {over}, (), (), {f"asked/{t}" for t in group})
+                yield self._step(f"close-round/{number}", its, HOME, {over}, (), (), set(map(self.opened, group)))
         for part in self.all_parts:
-            for row in _OF_PART:
+            for row in _OF_FREE_PART if part.free else _OF_PART:
                 yield self._of_part(part, *row)
         for part in self.local:
             own = part.own
@@ -229,6 +275,10 @@ class Voting:
             yield from self._firing(f"fire/{part.whole}", f"down/{part.controller}", part.whole, *places)
         if self.faults:
             yield from self._of_faults()
+
+    def opened(self, t: str) -> str:
+        """The place by which the round of a transition is open."""
+        return f"asked/{t}" if self.asks(t) else f"committed/{t}"
 
     def _step(
         self,
@@ -247,15 +297,23 @@ class Voting:
 
     def _of_coordinator(self, t: str, over: str, *, alone: bool) -> Iterator[Step]:
         asked, committed, its, down = f"asked/{t}", f"committed/{t}", self.parts[t], self.coordinator_down(t)
-        yield self._step(f"ask/{t}", down, "", (), {asked}, (), {asked, over})
-        yield self._step(f"give-up/{t}", down, HOME + REPEATS, (), {over}, {asked}, {over})
+        asks = {asked} if self.asks(t) else set[str]()
+        if asks:
+            yield self._step(f"ask/{t}", down, "", (), {asked}, (), {asked, over})
+            yield self._step(f"give-up/{t}", down, HOME + REPEATS, (), {over}, {asked}, {over})
         heard = [part.at("heard") for part in its]
-        yield from self._firing(f"decide/{t}", down, t, heard, (committed, over), (asked,), (over,))
-        answered = {asked, *(part.at(kind) for part in its for kind in ("noted", "obeyed"))}
-        on_their_way = {part.at(kind) for part in its for kind in MESSAGES}
-        takes, full = (answered | {over}, set[str]()) if alone else (answered, {over})
-        yield self._step(f"close/{t}", down, HOME, takes | {committed}, (), full, on_their_way)
-        yield self._step(f"close/{t}/aborted", down, HOME, takes, (), full, on_their_way | {committed})
+        yield from self._firing(f"decide/{t}", down, t, heard, (committed, over), asks, (over,))
+        ends, full = ({over}, set[str]()) if alone else (set[str](), {over})
+
+        def closing(name: str, some: Iterable[Part], taken: set[str], empty: set[str]) -> Step:
+            of = tuple(some)
+            takes = asks | ends | taken | {part.at(kind) for part in of for kind in ("noted", "obeyed")}
+            on_their_way = {part.at(kind) for part in of for kind in part.messages}
+            return self._step(name, down, HOME, takes, (), full, on_their_way | empty)
+
+        yield closing(f"close/{t}", its, {committed}, set())
+        if asks:
+            yield closing(f"close/{t}/aborted", (part for part in its if not part.free), set(), {committed})
 
     def _of_part(self, part: Part, name: str, who: str, kind: str, *columns: str) -> Step:
         own = part.own
@@ -265,6 +323,7 @@ class Voting:
             "FULL": (*own.inputs, *own.permissive),
             "EMPTY": (*own.outputs, *own.inhibitive),
             "OTHERS": tuple(self.others(part)),
+            "ALL-OTHERS": tuple(self.others(part, every=True)),
             "asked": (f"asked/{part.whole}",),
             "committed": (f"committed/{part.whole}",),
             "decided": (self.decided(part.whole),),
@@ -301,7 +360,7 @@ class Voting:
     def _of_faults(self) -> Iterator[Step]:
         yield self._step("cease", None, "", {GO_ON})
         yield self._step("late-copy", None, HOME, {LATE})
-        for message in (part.at(kind) for part in self.all_parts for kind in MESSAGES):
+        for message in (part.at(kind) for part in self.all_parts for kind in part.messages):
             yield self._step(f"lose/{message}", None, "", {message}, (), {GO_ON})
             yield self._step(f"double/{message}", None, "", (), {LATE}, {message, GO_ON}, {LATE})
         for subnet in self.cut.subnets:
@@ -313,12 +372,21 @@ class Voting:
             yield self._step(f"crash{name}", None, "", (), {down}, {GO_ON}, {down})
             yield self._step(f"restart{name}", None, HOME, {down})
 
-    def way(self, t: str) -> tuple[Step, ...]:
-        """The steps by which a transition fires where nothing else is asked."""
+    def way(self, t: str) -> tuple[tuple[Step, bool], ...]:
+        """The steps by which a transition fires where nothing else is asked, and whether each has to be taken.
+
+        A vote that promises nothing may stand already, and have been heard.
+        """
         if t not in self.parts:
-            return (self.steps[f"fire/{t}"],)
-        each = (f"{step}/{t}/{p.controller}" for p in self.parts[t] for step in ("send-request", "promise", "hear"))
-        return tuple(self.steps[name] for name in (f"ask/{t}", *each, f"decide/{t}"))
+            return ((self.steps[f"fire/{t}"], True),)
+        found = [(f"ask/{t}", True)] if self.asks(t) else []
+        for part in self.parts[t]:
+            named = f"{t}/{part.controller}"
+            if part.free:
+                found += [(f"stand/{named}", False), (f"stand/{named}/again", False), (f"hear/{named}", False)]
+            else:
+                found += [(f"{step}/{named}", True) for step in ("send-request", "promise", "hear")]
+        return tuple((self.steps[name], must) for name, must in (*found, (f"decide/{t}", True)))
 
 
 def central(place: str) -> str:

@@ -22,12 +22,12 @@ KINDS: Final = {
     "keeps": "the step keeps the invariant",
     "follows": "whatever fires, the central net can fire",
     "agrees": "where no order is on its way, the controllers hold the central marking",
-    "orders-fit": "an order finds its part firable",
-    "one-token": "the step would fill a full place only where the central net has contact",
+    "orders-fit": "an order finds its part firable, or free of promise with inputs full and outputs empty",
+    "one-token": "the step fills a full place only where the central net has contact, or an order takes the token",
     "home": "without faults, a step homeward can be taken, or all is at rest",
     "homeward": "the step leaves less to be done",
     "way": "from rest, what the central net can fire is fired by these steps",
-    "divergence": "every step that fires nothing, but for asking, ordering and giving up, lowers the weighted sum",
+    "divergence": "every step that fires nothing, but for repeating and giving up, lowers the weighted sum",
 }
 """The kinds of obligations, and what each says."""
 
@@ -39,6 +39,12 @@ _ALWAYS: Final = """
 """
 """Of each part: where the first is, one of the others is; with a minus, is not."""
 
+_ALWAYS_OF_FREE: Final = """
+    obeyed > committed; commit-order > committed; acknowledgement > obeyed; noted > obeyed; vote > stands obeyed;
+    heard > stands; heard > -committed; committed > stands obeyed
+"""
+"""The same of one that is free of promise."""
+
 _TO_DO: Final = """
     request; vote; asked -noted; asked -noted -acknowledgement;
     asked -noted -acknowledgement -commit-order -abort-order;
@@ -48,11 +54,22 @@ _TO_DO: Final = """
 """
 """Of each part, what is still to be done: one of these, of which all is so."""
 
+_TO_DO_OF_FREE: Final = """
+    vote; committed -noted; committed -noted -acknowledgement; committed -noted -acknowledgement -commit-order;
+    committed -noted, committed commit-order, committed acknowledgement;
+    committed -noted, committed commit-order; committed -noted, committed commit-order acknowledgement
+"""
+"""The same of one that is free of promise."""
+
 _WEIGHTS: Final = {"request": 4, "commit-order": 4, "abort-order": 4, "vote": 2, "acknowledgement": 2} | dict.fromkeys(
     ("heard", "promised", "noted", "obeyed"), 1
 )
+_WEIGHTS_OF_FREE: Final = {"commit-order": 7, "vote": 2, "acknowledgement": 2, "stands": -3} | dict.fromkeys(
+    ("heard", "noted", "obeyed"), 1
+)
 
 INVARIANT: Final = "|the invariant|"
+STANDING: Final = "|votes stand|"
 OPEN: Final = "|something is open|"
 
 Literals = frozenset[tuple[str, bool]]
@@ -102,6 +119,13 @@ def _then(step: Step, text: str) -> str:
     return f"(let ({changes}) {text})" if changes else text
 
 
+def _where_possible(step: Step, may: str, text: str) -> str:
+    """What a formula says after a step that is taken where it can be."""
+    after = {place: _disjunction([_symbol(place), may]) for place in step.puts}
+    after |= {place: _conjunction([_symbol(place), f"(not {may})"]) for place in step.takes}
+    return f"(let ({' '.join(sorted(f'({_symbol(place)} {then})' for place, then in after.items()))}) {text})"
+
+
 @dataclass(frozen=True)
 class Obligations:
     """The file on the protocol of a net."""
@@ -127,7 +151,8 @@ class Obligations:
             + "(check-sat)\n(pop 1)\n"
             for name, asserted in self._blocks
         )
-        return "".join((self._head(), start, f"\n(assert {INVARIANT})\n", *others))
+        given = f"(assert {STANDING})\n" if self._persistent else ""
+        return "".join((self._head(), start, f"\n(assert {INVARIANT})\n", given, *others))
 
     def _head(self) -> str:
         net, under = self.voting.cut.net.name, ", under faults" if self.voting.faults else ""
@@ -139,8 +164,14 @@ class Obligations:
         )
         lines = [*(f"; {printable(comment)}" for comment in comments), "(set-logic QF_LIA)"]
         lines += [f"(declare-const {_symbol(place)} Bool)" for place in sorted(self.voting.places)]
-        defined = {INVARIANT: _conjunction(map(_text, self._invariant)), OPEN: self._open}
-        defined |= {symbol: _text(fact) for fact, symbol in self._facts.items()}
+        lines.append(f"(define-fun {INVARIANT} () Bool {_conjunction(map(_text, self._invariant))})")
+        if self._persistent:
+            what = (
+                "Given of the marking that the central net then has; the verdicts `persistent` of the same net show it."
+            )
+            votes = _conjunction(map(_text, self._persistent))
+            lines += [f"; {what}", f"(define-fun {STANDING} () Bool {votes})"]
+        defined = {OPEN: self._open} | {symbol: _text(fact) for fact, symbol in self._facts.items()}
         lines += [f"(define-fun {symbol} () Bool {text})" for symbol, text in defined.items()]
         return "".join(f"{line}\n" for line in lines)
 
@@ -173,20 +204,29 @@ class Obligations:
         for group in self.voting.groups:
             over = self.voting.decided(group[0])
             for t in group:
-                yield _any([(f"committed/{t}", False), (f"asked/{t}", True)])
+                if self.voting.asks(t):
+                    yield _any([(f"committed/{t}", False), (f"asked/{t}", True)])
                 yield _any([(f"committed/{t}", False), (over, True)])
                 yield from (_any([(f"committed/{t}", False), (f"committed/{u}", False)]) for u in group if u != t)
             if len(group) == 1:
-                yield _any([(over, False), (f"asked/{group[0]}", True)])
+                yield _any([(over, False), (self.voting.opened(group[0]), True)])
 
     def _of_parts(self) -> Iterator[Sentence]:
         for part in self.voting.all_parts:
-            for rule in _ALWAYS.split(";"):
+            for rule in (_ALWAYS_OF_FREE if part.free else _ALWAYS).split(";"):
                 given, then = (self._literals(part, words) for words in rule.split(">"))
                 yield _any([*((place, not full) for place, full in given), *then])
             promised, own = (part.at("promised"), False), part.own
             needs = [(p, True) for p in (*own.inputs, *own.permissive)]
-            for need in (*needs, *((p, False) for p in (*own.outputs, *own.inhibitive))):
+            needs += [(p, False) for p in (*own.outputs, *own.inhibitive)]
+            if part.free:
+                underway, no_vote = self._literals(part, "committed -obeyed"), (part.at("stands"), False)
+                for p, full in needs:
+                    yield _any([no_vote, (central(p), full)]) | {underway}
+                    if p in part.writes and full == (p in own.inputs):
+                        yield _any([no_vote, (p, full)])
+                continue
+            for need in needs:
                 yield _any([promised, (self.voting.decided(part.whole), True), need])
                 yield _any([promised, (f"committed/{part.whole}", False), need])
             yield from (_any([promised, (other, False)]) for other in self.voting.others(part))
@@ -206,17 +246,33 @@ class Obligations:
                 yield same | frozenset(movers.get((name, full), ()))
 
     @cached_property
+    def _persistent(self) -> tuple[Sentence, ...]:
+        """Of each part free of promise and whatever would take its yes back: they are never firable both."""
+        found = set()
+        for part in (part for part in self.voting.all_parts if part.free):
+            own = part.own
+            full, empty = {*own.inputs, *own.permissive}, {*own.outputs, *own.inhibitive}
+            for t in self.voting.transitions:
+                full_too, empty_too = full.union(t.inputs, t.permissive), empty.union(t.outputs, t.inhibitive)
+                falls = not full.isdisjoint(t.inputs) or not empty.isdisjoint(t.outputs)
+                if t.name != part.whole and falls and full_too.isdisjoint(empty_too):
+                    full_first = [(central(p), False) for p in full_too]
+                    found.add(_any([*full_first, *((central(p), True) for p in empty_too)]))
+        return tuple(found)
+
+    @cached_property
     def _facts(self) -> dict[Sentence, str]:
         return {fact: f"|to do {i}|" for i, fact in enumerate(sorted(set(self._to_do()), key=_text), 1)}
 
     def _to_do(self) -> Iterator[Sentence]:
         for group in self.voting.groups:
             over = self.voting.decided(group[0])
-            yield _any([(over, True), *((f"asked/{t}", True) for t in group)])
-            yield from (_any([(f"asked/{t}", True)]) for t in group)
-            yield from (frozenset([frozenset([(f"asked/{t}", True), (over, False)])]) for t in group)
+            yield _any([(over, True), *((self.voting.opened(t), True) for t in group)])
+            yield from (_any([(self.voting.opened(t), True)]) for t in group)
+            asks = [t for t in group if self.voting.asks(t)]
+            yield from (frozenset([frozenset([(f"asked/{t}", True), (over, False)])]) for t in asks)
         for part in self.voting.all_parts:
-            for fact in _TO_DO.split(";"):
+            for fact in (_TO_DO_OF_FREE if part.free else _TO_DO).split(";"):
                 yield frozenset(self._literals(part, words) for words in fact.split(","))
         if self.voting.faults:
             yield from (_any([(place, True)]) for place in self._faulty())
@@ -246,6 +302,10 @@ class Obligations:
             missing = [(place, False) for place in (*own.inputs, *own.permissive)]
             in_the_way = [(place, True) for place in (*own.outputs, *own.inhibitive)]
             there = _symbol(part.at("commit-order")), _symbol(part.at("promised"))
+            if part.free:  # only what it moves has to be as it was
+                missing = [(place, False) for place in (part.at("stands"), *own.inputs)]
+                in_the_way = [(place, True) for place in own.outputs]
+                there = there[0], _literal(part.at("obeyed"), full=False)
             cases.append(_conjunction([*there, _disjunction(_literal(*one) for one in (*missing, *in_the_way))]))
         if cases:
             yield "orders-fit", [_disjunction(cases)]
@@ -258,6 +318,7 @@ class Obligations:
     @cached_property
     def _open(self) -> str:
         net = {name for place in self.voting.cut.net.places for name in (place.name, central(place.name))}
+        net |= {part.at(kind) for part in self.voting.all_parts if part.free for kind in ("stands", "heard")}
         return _disjunction([*(_symbol(p) for p in self.voting.places if p not in net and p != GO_ON), self._differs])
 
     def _tokens(self) -> Iterator[tuple[str, list[str]]]:
@@ -270,6 +331,9 @@ class Obligations:
                 contact = [_literal(central(p), full) for p, full in around]
                 contact.append(_disjunction(_symbol(central(p)) for p in t.outputs))
                 texts.append(f"(not {_conjunction(contact)})")
+                for part in (part for part in self.voting.all_parts if part.free):
+                    if not step.puts.isdisjoint(part.own.inputs):
+                        texts.append(f"(not {_all(self._literals(part, 'committed -obeyed'))})")
             if step.puts:
                 yield f"one-token.{name}", [_conjunction(texts), _disjunction(map(_symbol, step.puts))]
 
@@ -300,14 +364,22 @@ class Obligations:
     def _ways(self) -> Iterator[tuple[str, list[str]]]:
         for t in sorted(self.voting.transitions, key=lambda t: t.name):
             text = "true"
-            for step in reversed(self.voting.way(t.name)):
-                text = _conjunction([*(_literal(*one) for one in _demanded(step)), _then(step, text)])
+            for step, must in reversed(self.voting.way(t.name)):
+                demanded = [_literal(*one) for one in _demanded(step)]
+                if must:
+                    text = _conjunction([*demanded, _then(step, text)])
+                else:
+                    text = _where_possible(step, _conjunction(demanded), text)
             can = [(central(p), True) for p in (*t.inputs, *t.permissive)]
             can += [(central(p), False) for p in (*t.outputs, *t.inhibitive)]
             yield f"way.{t.name}", [*self._ceased, _all(can), f"(not {OPEN})", f"(not {text})"]
 
     def _falling(self) -> Iterator[str]:
-        weights = {part.at(kind): weight for part in self.voting.all_parts for kind, weight in _WEIGHTS.items()}
+        weights = {
+            part.at(kind): weight
+            for part in self.voting.all_parts
+            for kind, weight in (_WEIGHTS_OF_FREE if part.free else _WEIGHTS).items()
+        }
         for t in self.voting.parts:
             weights |= {f"asked/{t}": -1, f"committed/{t}": 1, self.voting.decided(t): 1}
         for step in self.voting.steps.values():

@@ -216,7 +216,8 @@ def test_every_single_change_of_a_verdict_on_the_protocol_is_refused(
 @pytest.mark.parametrize("family", TITLES)
 def test_every_single_change_of_a_line_of_the_evidence_is_refused(family: str) -> None:
     bundle, file = bundled("shuttle"), f"{family}.smt2"
-    stated = StatedAnew(Voting(check_cut(bundle.decomposition), family == "faults"))
+    free = frozenset(bundle.decomposition.free)
+    stated = StatedAnew(Voting(check_cut(bundle.decomposition), family == "faults", free))
     explored.same_text(Examination(bundle), stated)
     for how, changed in line_mutants(bundle.evidence[file]):
         if changed != bundle.evidence[file]:
@@ -308,7 +309,7 @@ def test_a_family_that_was_left_out_with_its_evidence_claims_nothing() -> None:
     assert all(one.shown for one in check_bundle(replace(bundle, verdicts=verdicts, evidence=evidence)))
 
 
-@pytest.mark.parametrize("kind", ["keeps.ask/hand_over", "home", "way.fetch", "one-token.fire/unload", "divergence"])
+@pytest.mark.parametrize("kind", ["keeps.decide/hand_over", "home", "way.fetch", "one-token.fire/unload", "divergence"])
 def test_an_answer_that_refutes_is_refused_and_a_missing_one_only_claims(
     kind: str, remembered: Callable[[str, int], tuple[str, ...]]
 ) -> None:

@@ -13,6 +13,7 @@ from firable.decompose.bundling import make_bundle
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import persistence
 from firable.decompose.verification.checked import Examination
+from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.documents import check_verdicts_on_the_net
 from firable.decompose.verification.free_parts import check_free_parts
 from firable.decompose.verification.recut import check_cut
@@ -20,6 +21,7 @@ from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import SOLVERS
 from firable.nets.bundle import Bundle, read_bundle, write_bundle
 from firable.nets.catalogue import catalogue_net
+from firable.nets.diagnostics import InputError
 from firable.nets.net import Controller, Net, Place, Transition
 from firable.nets.right_to_run import unproved
 from firable.nets.verdict import Status, Verdict
@@ -54,14 +56,18 @@ def test_bundle_says_which_parts_are_free_and_shows_it(tmp_path: Path) -> None:
     judged(cell())
 
 
-def test_bundle_with_verdicts_on_the_protocol_of_its_net_has_no_free_parts() -> None:
-    bundle = make_bundle(check(load_net("no_trouble")), protocol=True)
-    assert bundle.decomposition.free == ()
+def test_verdicts_on_the_protocol_of_a_net_are_on_the_one_with_the_free_parts_of_its_bundle() -> None:
+    bundle = make_bundle(check(load_net("no_trouble")), protocol=True, faults=True)
     every = tuple((row.name, part.controller) for row in bundle.decomposition.coordinated for part in row.parts)
-    freed = replace(bundle, decomposition=replace(bundle.decomposition, free=every))
-    assert unproved(freed) == ()
-    with pytest.raises(NotShownError, match="every part promises"):
-        check_free_parts(Examination(freed), check_cut(freed.decomposition))
+    assert bundle.decomposition.free == every
+    assert "|stands/G/c1|" in bundle.evidence["explored.smt2"]
+    assert "|promised/" not in bundle.evidence["explored.smt2"]
+    checked = check_bundle(bundle, solver="z3")
+    assert all(one.shown for one in checked)
+    for free in ((), every[:2]):
+        other = replace(bundle, decomposition=replace(bundle.decomposition, free=free))
+        with pytest.raises(InputError, match="is not what must be proved of the protocol of this net"):
+            check_bundle(other, solver="z3")
 
 
 def others() -> list[tuple[str, str]]:

@@ -3,13 +3,14 @@
 Evidence shows it, and nothing else passes for it.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache, partial
 
 import pytest
 from support.bundle_mutants import evidence_mutants, verdict_mutants
 from support.explored_outages import explored_outages
+from support.free_parts import freed
 from support.layered_nets import cells_in_a_line
 from support.looping_nets import looping_net
 from support.owned_nets import owned_net
@@ -143,6 +144,32 @@ def test_what_the_dead_keep_back_is_what_exploring_the_protocol_finds(seed: int)
     assert is_as_explored(owned_net(seed))
 
 
+def kept_back_with_free_parts(net: Net) -> bool:
+    """Whether what is said to go on beside free parts is found to, where the protocol that has them is explored."""
+    decomposition = freed(split(net))
+    for one, other in zip(outages(decomposition), explored_outages(decomposition), strict=True):
+        if (one.who, set(one.at_once)) != (other.who, set(other.at_once)):
+            return False
+        if not set(one.goes_on) <= set(other.goes_on) or not set(one.running) <= set(other.running):
+            return False
+    return True
+
+
+@pytest.mark.parametrize(
+    ("make", "seed"), [*((owned_net, seed) for seed in range(5)), *((looping_net, seed) for seed in (1, 3, 5))]
+)
+def test_what_goes_on_beside_free_parts_goes_on_where_their_protocol_is_explored(
+    make: Callable[[int], Net], seed: int
+) -> None:
+    assert kept_back_with_free_parts(make(seed))
+
+
+@pytest.mark.parametrize("make", [cells_in_a_line, gated])
+def test_what_goes_on_beside_free_parts_in_layers_and_behind_gates_is_explored(make: Callable[[], Net]) -> None:
+    assert kept_back_with_free_parts(make())
+    assert kept_back_with_free_parts(overtaken())
+
+
 def test_a_part_whose_order_never_comes_keeps_back_what_needs_its_tokens_after_others_have_gone_on() -> None:
     assert is_as_explored(overtaken())
     dead = {outage.name: outage for outage in outages(split(overtaken()))}
@@ -182,9 +209,9 @@ def test_the_verdicts_on_who_is_dead_are_shown(make: Callable[[], Net]) -> None:
     assert {verdict.status for verdict in bundle.verdicts} == {Status.PROVED}
 
 
-def both(net: Net) -> Iterator[tuple[Bereft, Wake]]:
-    here = {one.who or one.coordinator: one for one in deaths(Parts(split(net), PROTOCOL))}
-    there = {one.told: one for one in wakes(Voting(Cut(net), faults=True))}
+def both(net: Net, free: Sequence[tuple[str, str]] = ()) -> Iterator[tuple[Bereft, Wake]]:
+    here = {one.who or one.coordinator: one for one in deaths(Parts(split(net), PROTOCOL), free)}
+    there = {one.told: one for one in wakes(Voting(Cut(net), faults=True), free)}
     assert set(here) == set(there)
     yield from ((here[name], there[name]) for name in here)
 
@@ -193,9 +220,10 @@ def both(net: Net) -> Iterator[tuple[Bereft, Wake]]:
 def test_both_texts_make_the_same_net_of_random_nets(make: Callable[[int], Net]) -> None:
     left = 0
     for net in (cells_in_a_line(), overtaken(), *map(make, range(40))):
-        for here, there in both(net):
-            left += len(here.left)
-            assert net_digest(here.net) == net_digest(there.net)
+        for free in ((), freed(split(net)).free):
+            for here, there in both(net, free):
+                left += len(here.left)
+                assert net_digest(here.net) == net_digest(there.net)
     assert left or make is owned_net
 
 

@@ -5,7 +5,8 @@ hold of it. And every firing of the protocol net must be some actions of the pro
 the proof speaks of: a message sent, lost, doubled, ignored, a crash, a restart.
 
 The net has one round for each group and forgets it at its close; so a round stands here for the present one of its
-group, and what a decided round leaves of votes, which nobody looks at any more, is not compared.
+group, and what a decided round leaves of votes, which nobody looks at any more, is not compared. Of a transition whose
+parts are all free of promise the net asks nobody: it is asked for when it is decided.
 """
 
 from __future__ import annotations
@@ -16,20 +17,23 @@ from functools import cache
 import pytest
 from support.abstraction import broken, differences, explain, net_structure, of_coordinators, with_relations
 from support.finite_structures import Structure, Thing
+from support.free_parts import GATE_CLOSED, OUTPUT_READ, freed, parts_of
 from support.reference import load_net
 
 from firable.decompose.protocol.building import ProtocolNet, protocol_net
 from firable.decompose.protocol.draft import ASTRAY, CHANNELS, Step, at, central
 from firable.decompose.protocol.parametric.system import PROTOCOL as PROVED
-from firable.decompose.protocol.rounds import asked, committed, decided
+from firable.decompose.protocol.parts import Part
+from firable.decompose.protocol.rounds import committed, decided, is_open
 from firable.decompose.protocol.variant import NO_FAULTS, ONE_OF_EACH, PROTOCOL, Faults, Lock, Variant
 from firable.decompose.splitting.cut import split
 from firable.executor.protocol.deciders import coordinator_at
+from firable.nets.decomposition import Decomposition
 from firable.semantics.player import Player
 
 Key = tuple[Thing, ...]
 
-SILENT = frozenset({"request", "order", "ignore", "lose", "double", "late", "crash", "restart"})
+SILENT = frozenset({"request", "repeat", "order", "ignore", "lose", "double", "late", "crash", "restart"})
 """The kinds of steps by which nothing changes that the proof speaks of."""
 
 
@@ -55,10 +59,12 @@ class Told:
         def of_parts(kind: str) -> set[Key]:
             return {(rounds[t], t, part.controller) for t, part in all_parts if at(kind, part) in relevant}
 
-        asked_for = {(rounds[t], t) for t in rounds if asked(t) in relevant}
+        asked_for = {(rounds[t], t) for t in rounds if is_open(self.parts, t) in relevant}
         over = {(rounds[t],) for t in rounds if decided(self.parts, t) in relevant}
         commits = {(rounds[t], t) for t in rounds if committed(t) in relevant}
-        request = {(rounds[t], t, part.controller) for t, part in all_parts if (rounds[t], t) in asked_for}
+        promising = [(t, part) for t, part in all_parts if not part.free]
+        request = {(rounds[t], t, part.controller) for t, part in promising if (rounds[t], t) in asked_for}
+        commit_order = {(rounds[t], t, part.controller) for t, part in all_parts if (rounds[t], t) in commits}
         promised, obeyed = of_parts("promised"), of_parts("obeyed")
         places = [place.name for place in self.parts.net.places]
         return with_relations(
@@ -72,12 +78,13 @@ class Told:
             request=request,
             promised=promised,
             vote=promised,
-            heard={key for key in of_parts("heard") if (key[0],) not in over},
+            heard={key for key in of_parts("heard") & request if (key[0],) not in over},
+            stands={(t, part.controller) for t, part in all_parts if part.free and at("stands", part) in relevant},
             obeyed=obeyed,
             noted=of_parts("noted"),
-            commit_order={key for key in request if key[:2] in commits},
+            commit_order=commit_order,
             abort_order={key for key in request if (key[0],) in over and key[:2] not in commits},
-            acknowledgement=request & obeyed,
+            acknowledgement=(request | commit_order) & obeyed,
         )
 
     def _broken(self, relevant: frozenset[str]) -> list[str]:
@@ -96,9 +103,23 @@ class Told:
             for part in its:
                 key = (self.parts.group_of[t], t, part.controller)
                 over = (key[0],) in configuration.relations["decided"]
+                if part.free:
+                    self._vote_is_standing(names, part, configuration)
+                    continue
                 for channel in CHANNELS:
                     if at(channel, part) in names and not (channel == "vote" and over):
                         assert key in configuration.relations[channel], f"{channel} of {key}"
+
+    def _vote_is_standing(self, names: frozenset[str], part: Part, configuration: Structure) -> None:
+        """A yes on its way, or heard, stands; on its way it may be one that an order has used up in this round."""
+        key = (self.parts.group_of[part.whole], part.whole, part.controller)
+        stands = key[1:] in configuration.relations["stands"]
+        assert stands or at("vote", part) not in names or key in configuration.relations["obeyed"], f"vote of {key}"
+        if at("heard", part) in names:
+            assert stands, f"a vote that does not stand is heard of {key}"
+            assert key[:2] not in configuration.relations["committed"], f"a vote that is used up is heard of {key}"
+        for channel in ("commit-order", "acknowledgement"):
+            assert at(channel, part) not in names or key in configuration.relations[channel], f"{channel} of {key}"
 
     def _step(self, name: str, before: frozenset[str], after: frozenset[str]) -> None:
         step: Step = self.built.steps[name]
@@ -114,7 +135,8 @@ class Told:
     def _close(self, name: str, old: Structure, new: Structure) -> None:
         """The parts of one transition are taken, all of them noted; or the round, of which none are left."""
         for g, t in old.relations["asked"] - new.relations["asked"]:
-            its = {(g, t, part.controller) for part in self.parts.coordinated[str(t)]}
+            ordered = self.parts.coordinated[str(t)] if (g, t) in old.relations["committed"] else ()
+            its = {(g, t, part.controller) for part in ordered or self.parts.promising(str(t))}
             assert its <= old.relations["noted"], name
             assert (g,) in old.relations["decided"], name
         for (g,) in old.relations["begun"] - new.relations["begun"]:
@@ -145,12 +167,12 @@ def _forgetful(structure: Structure) -> Structure:
     return with_relations(structure, heard=heard, vote=structure.relations["promised"])
 
 
-def tell(variant: Variant, faults: Faults, name: str, markings_max: int) -> tuple[Told, bool]:
+def tell(variant: Variant, faults: Faults, of: str | Decomposition, markings_max: int) -> tuple[Told, bool]:
     """Explore a protocol net, breadth first, and hold every marking and every firing to the proof.
 
     Says, too, whether that was all of them.
     """
-    told = Told(protocol_net(split(load_net(name)), variant, faults))
+    told = Told(protocol_net(split(load_net(of)) if isinstance(of, str) else of, variant, faults))
     net = told.built.net
     player = Player(net)
     found = {net.initial_marking}
@@ -211,3 +233,41 @@ def test_firings_with_faults_are_some_actions_of_the_proof(name: str) -> None:
 def test_wrong_variants_do_what_is_no_action_of_the_proof(variant: Variant, name: str) -> None:
     with pytest.raises(AssertionError):
         tell(variant, NO_FAULTS, name, 10_000)
+
+
+# --- Parts free of promise
+
+
+WITH_FREE = ["ring", "local_gate"]
+WITH_FREE_BEGUN = ["no_trouble", "local_conflict", "read_before_order"]
+
+
+@pytest.mark.parametrize("name", WITH_FREE)
+def test_each_firing_of_the_protocol_net_with_free_parts_is_some_actions_of_the_proof(name: str) -> None:
+    told, whole = tell(PROTOCOL, NO_FAULTS, freed(split(load_net(name))), 100_000)
+    assert whole
+    assert {"stand", "apply-free", "decide", "note", "close"} <= set(told.actions)
+
+
+@pytest.mark.parametrize("faults", [NO_FAULTS, ONE_OF_EACH], ids=["no fault", "one of each"])
+@pytest.mark.parametrize("name", [*WITH_FREE, *WITH_FREE_BEGUN])
+def test_first_firings_with_free_parts_and_faults_are_some_actions_of_the_proof(name: str, faults: Faults) -> None:
+    told, _ = tell(PROTOCOL, faults, freed(split(load_net(name))), BEGUN_MAX)
+    assert told.actions["stand"] > 0
+
+
+@pytest.mark.parametrize(
+    ("variant", "of"),
+    [
+        (PROTOCOL, parts_of(split(GATE_CLOSED), "t1-11")),
+        (PROTOCOL, parts_of(split(OUTPUT_READ), "t1-11")),
+        (Variant(vote_rounds=False), freed(split(load_net("ring")))),
+        (Variant(order_rounds=False), freed(split(load_net("ring")))),
+        (Variant(unanimous=False), freed(split(load_net("ring")))),
+        (Variant(lock=Lock.NOTHING), freed(split(load_net("local_gate")))),
+    ],
+    ids=["taken back", "read before the order", "used votes", "old orders", "not unanimous", "promises nothing"],
+)
+def test_what_is_wrong_with_free_parts_is_no_action_of_the_proof(variant: Variant, of: Decomposition) -> None:
+    with pytest.raises(AssertionError):
+        tell(variant, NO_FAULTS, of, 10_000)

@@ -8,6 +8,20 @@ from typing import Any
 import pytest
 from support import planted
 from support.examples import FIRST_SEED, seeds
+from support.free_parts import (
+    GATE_CLOSED,
+    GATE_PROMISED,
+    OUTPUT_READ,
+    AcknowledgesBeforeItObeys,
+    AppliesFreePartsTwice,
+    CountsEarlierEpochs,
+    CountsOlderReports,
+    CountsUsedVotes,
+    VotesInSpiteOfPromises,
+    VotesOnWhatIsNotKept,
+    freed,
+    parts_of,
+)
 from support.gated_nets import GATE_READ_AGAIN
 from support.layered_nets import cells_in_a_line, shared_robot
 from support.net_tie import NetTie
@@ -20,7 +34,7 @@ from firable.decompose.splitting.cut import split
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.messages import ProtocolError
 from firable.executor.simulation.drawn import DRAWN
-from firable.executor.simulation.exploring import Budget, Explorer, Space, explore, wander
+from firable.executor.simulation.exploring import Budget, Explorer, NotATraceError, Space, explore, wander
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Net, Transition
@@ -76,6 +90,88 @@ def test_with_a_fault_every_act_is_firings_of_the_protocol_net_as_far_as_it_is_e
 
 
 CELLS = ("one_robot", "one_robot_mc_late", "one_robot_timed", "two_robots_shared", "two_cells", "line", "two_times")
+
+
+# --- With parts that are free of promise
+
+
+WITH_FREE = ("local_conflict", "local_gate", "local_output_conflict", "read_before_order", "ring", "no_trouble")
+KINDS_OF_FREE = KINDS | {"stand", "repeat"}
+
+
+@cache
+def built_free(name: str) -> tuple[Decomposition, ProtocolNet]:
+    decomposition = freed(split(load_net(name) if name == "no_trouble" else net_of(name)))
+    return decomposition, protocol_net(decomposition)
+
+
+@pytest.mark.parametrize("budget", [Budget(), LOSS, COPY, GIVE_UP, CRASH], ids=["none", "loss", "copy", "up", "crash"])
+@pytest.mark.parametrize("name", [*WITH_FREE, "gate_read_again", "shared_robot"])
+def test_every_act_with_free_parts_is_firings_of_the_protocol_net_that_has_them(name: str, budget: Budget) -> None:
+    decomposition, protocol = built_free(name)
+    assert decomposition.free
+    tie = NetTie(protocol)
+    space = explore(Explorer(decomposition), budget, max_configurations=900, watch=tie)
+    assert tie.kinds["decide"] > 0
+    assert tie.kinds["hear"] > 0
+    assert tie.untold == 0 or budget.crashes
+    assert tie.untold < space.steps / 10
+
+
+@pytest.mark.seeds
+def test_on_ways_through_the_cells_with_free_parts_every_act_is_firings_of_the_protocol_net() -> None:
+    kinds: Counter[str] = Counter()
+    for name in CELLS:
+        decomposition, protocol = built_free(name)
+        tie = NetTie(protocol)
+        wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 60, tie)
+        kinds += tie.kinds
+    assert set(kinds) >= KINDS
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("family", DRAWN)
+def test_on_ways_through_drawn_nets_with_free_parts_every_act_is_firings_of_the_protocol_net(family: str) -> None:
+    for seed in seeds(5):
+        decomposition, protocol = built_free(f"{family} {seed}")
+        wander(Explorer(decomposition), Budget(2, 2, 2, 2), seed, 60, NetTie(protocol))
+
+
+OF_FREE: list[tuple[type[Any], str, Budget]] = [
+    (CountsEarlierEpochs, "no_trouble", CRASH),
+    (CountsUsedVotes, "ring", Budget()),
+    (CountsOlderReports, "no_trouble", COPY),
+    (VotesOnWhatIsNotKept, "local_gate", CRASH),
+    (AppliesFreePartsTwice, "ring", COPY),
+    (AcknowledgesBeforeItObeys, "ring", Budget()),
+]
+
+
+@pytest.mark.parametrize(("fault", "name", "budget"), OF_FREE, ids=[fault.__name__ for fault, _, _ in OF_FREE])
+def test_a_drift_of_the_code_of_free_parts_is_no_firing_of_the_protocol_net(
+    fault: type[Any], name: str, budget: Budget
+) -> None:
+    decomposition, protocol = built_free(name)
+    explorer = (
+        Explorer(decomposition, controller=fault)
+        if issubclass(fault, LocalController)
+        else Explorer(decomposition, coordinator=fault)
+    )
+    with pytest.raises((AssertionError, ProtocolError)):
+        explore(explorer, budget, max_configurations=6000, watch=NetTie(protocol))
+
+
+@pytest.mark.parametrize("net", [GATE_CLOSED, OUTPUT_READ, GATE_PROMISED], ids=["closed", "read", "promised"])
+def test_a_part_that_is_free_and_may_not_be_breaks_the_invariant_of_the_net(net: Net) -> None:
+    decomposition = parts_of(split(net), "t1-11")
+    explorer = Explorer(decomposition, controller=VotesInSpiteOfPromises if net is GATE_PROMISED else LocalController)
+    with pytest.raises(AssertionError) as failed:
+        explore(explorer, watch=NetTie(protocol_net(decomposition)))
+    assert (
+        isinstance(failed.value, NotATraceError)
+        or "what holds of every" in str(failed.value)
+        or "firable" in str(failed.value)
+    )
 
 
 @pytest.mark.seeds

@@ -11,9 +11,25 @@ from typing import Any
 
 import pytest
 from support import planted
-from support.abstraction import Instance, broken, explain, net_structure, of_coordinators, play, with_relations
+from support.abstraction import (
+    Instance,
+    broken,
+    cleared_late,
+    explain,
+    net_structure,
+    of_coordinators,
+    play,
+    with_relations,
+)
 from support.examples import seeds
 from support.finite_structures import Structure, Thing
+from support.free_parts import (
+    AcknowledgesBeforeItObeys,
+    AppliesFreePartsTwice,
+    CountsUsedVotes,
+    VotesOnWhatIsNotKept,
+    freed,
+)
 from support.gated_nets import SENSOR
 from support.layered_nets import cells_in_a_line
 from support.reference import load_net
@@ -30,6 +46,7 @@ from firable.executor.protocol.messages import (
     Effect,
     Firing,
     ProtocolError,
+    Report,
     Sending,
     Vote,
     VoteRequest,
@@ -56,6 +73,9 @@ class Watched(World):
         super().__init__(subject_of(decomposition), seed, Faults.drawn(seed, kinds), machines)
         self.structure = net_structure(decomposition, (), signals=True)
         self.takes_part = self.structure.relations["takes-part"]
+        self.free = self.structure.relations["free"]
+        self.stands: set[Key] = set()
+        """The parts free of promise of which the controller has voted yes, and obeyed no order since."""
         self.names = coordinators(decomposition)
         self.central = TokenPlayer.of(self.net)
         self.shadow = self.net.initial_marking
@@ -108,11 +128,14 @@ class Watched(World):
         before_image, self.image = self.image, self._image()
         changed = before_image ^ self.image
         sensed = sorted(name for name in changed if name not in cleared or name in self.image)
-        for name in sensed:
-            self.shadow ^= self.central.signal_bit(name)
         steps: list[Instance] = []
         before = self.now
         assert before is not None
+        used = self._obeyed_by_free_parts(before)
+        for name in sensed:
+            if not cleared_late(before, used, name):  # else the central net has cleared it already
+                self.shadow ^= self.central.signal_bit(name)
+        self._note_votes(effects, used)
         if restarted is not None:
             lost = {n for n, (_, _, commit, _) in self.rounds.items() if commit is None and self._whose(n) == restarted}
             self.given_up |= {n for n in lost if n not in self.open_rounds and (n,) not in before.relations["closed"]}
@@ -138,6 +161,23 @@ class Watched(World):
         if steps:
             assert broken(self.now) == [], steps
 
+    def _obeyed_by_free_parts(self, before: Structure) -> set[Key]:
+        """The parts free of promise that have just been fired by an order."""
+        commits = {(r, t, c) for r, t in before.relations["committed"] for c in self.controllers if (t, c) in self.free}
+        rest = commits - before.relations["obeyed"]
+        return {(t, c) for r, t, c in rest if isinstance(r, int) and self.last[str(c)]._is_closed(r)}
+
+    def _note_votes(self, effects: Sequence[Effect], used: set[Key]) -> None:
+        """Take what is told last in an act for votes that stand after it."""
+        self.stands -= used
+        told = {e.coordinator: e for e in effects if isinstance(e, Report | Vote | Acknowledgement)}
+        for e in effects:
+            if isinstance(e, Report | Vote | Acknowledgement):
+                voted = {(t, e.controller) for t in e.readiness.transitions} & self.free
+                is_last = e.readiness.sequence == told[e.coordinator].readiness.sequence
+                assert is_last or voted <= self.stands | used, f"a vote that does not stand: {e}"
+                self.stands |= voted if is_last else set()
+
     def _image(self) -> frozenset[str]:
         every = self.last.values()
         return frozenset(s.name for c in every for s in c.subnet.signals if c.word & c.player.signal_bit(s.name))
@@ -146,8 +186,9 @@ class Watched(World):
         return self.names[number % len(self.names)]
 
     def _asked_of(self, number: int, controller: str) -> Iterator[Key]:
-        for t in self.rounds[number][0]:
-            if (t, controller) in self.takes_part:
+        transitions, _, committed, _ = self.rounds[number]
+        for t in transitions:
+            if (t, controller) in self.takes_part and ((t, controller) not in self.free or t == committed):
                 yield (number, t, controller)
 
     @property
@@ -168,7 +209,9 @@ class Watched(World):
     def system(self) -> Structure:
         """The whole system in the relations of the proof."""
         keys = [(r, t, c) for r, (names, *_) in self.rounds.items() for t in names for c in self.controllers]
+        commits = {(r, t) for r, (_, _, t, _) in self.rounds.items()}
         asked = [(r, t, c) for r, t, c in keys if (t, c) in self.takes_part]
+        asked = [key for key in asked if key[1:] not in self.free or key[:2] in commits]
         is_open = self.open_rounds
         obeyed: set[Key] = {key for key in asked if self.last[key[2]]._is_closed(key[0])}
         for name, controller in self.last.items():
@@ -197,6 +240,7 @@ class Watched(World):
                 for t in promise.promised
             ],
             obeyed=obeyed,
+            stands=self.stands,
             **{**self.sent, "acknowledgement": self.sent["acknowledgement"] | (given_up & obeyed)},
         )
 
@@ -229,7 +273,7 @@ def test_each_step_of_the_machines_is_some_actions_of_the_proof_on_random_nets()
         watched = Watched(split(net), seed, CRASHING)
         watched.run(150)
         happened += watched.actions
-    of_free_parts = {"stand", "apply-free", "sense-late"}  # which the machines do not run yet
+    of_free_parts = {"stand", "apply-free", "sense-late"}
     assert set(happened) == {action.name for action in PROTOCOL.actions} - of_free_parts
 
 
@@ -240,6 +284,30 @@ def test_each_step_of_the_machines_is_some_actions_of_the_proof_on_the_cells(net
         watched = Watched(split(net), seed, LOSING)
         watched.run(300)
         assert watched.actions["decide"] > 0
+
+
+@pytest.mark.seeds
+@pytest.mark.parametrize("kinds", KINDS, ids=["orderly", "bad", "crashing"])
+def test_each_step_of_machines_with_free_parts_is_some_actions_of_the_proof(kinds: tuple[str, ...]) -> None:
+    happened: Counter[str] = Counter()
+    for name in ("local_conflict", "local_gate", "read_before_order", "ring", "no_trouble"):
+        for seed in seeds(2):
+            watched = Watched(freed(split(load_net(name))), seed, kinds)
+            watched.run(150)
+            happened += watched.actions
+    assert happened["stand"] > 0
+    assert happened["apply-free"] > 0
+
+
+@pytest.mark.seeds
+def test_each_step_of_machines_with_free_parts_is_some_actions_of_the_proof_on_random_nets_and_cells() -> None:
+    happened: Counter[str] = Counter()
+    nets = [*(DRAWN[family](s) for s in seeds(5) for family in DRAWN), catalogue_net("one_robot"), cells_in_a_line()]
+    for seed, net in enumerate(nets):
+        watched = Watched(freed(split(net)), seed, CRASHING)
+        watched.run(150)
+        happened += watched.actions
+    assert set(happened) >= {action.name for action in PROTOCOL.actions} - {"sense-late"}
 
 
 def test_rounds_of_one_group_side_by_side_are_some_actions_of_the_proof() -> None:
@@ -307,3 +375,21 @@ def test_planted_fault_is_no_action_of_the_proof(machines: Machines, says: str) 
             if said and says in said[-1]:
                 return
     pytest.fail(f"not found: {set(said)}")
+
+
+OF_FREE: list[tuple[Machines, str]] = [
+    (Machines(coordinator=CountsUsedVotes), "ring"),
+    (Machines(controller=AppliesFreePartsTwice), "ring"),
+    (Machines(controller=AcknowledgesBeforeItObeys), "ring"),
+    (Machines(controller=VotesOnWhatIsNotKept), "local_gate"),
+]
+
+
+@pytest.mark.parametrize(("machines", "name"), OF_FREE, ids=[str(i) for i in range(len(OF_FREE))])
+def test_planted_fault_in_free_parts_is_no_action_of_the_proof(machines: Machines, name: str) -> None:
+    for seed in range(120):
+        try:
+            Watched(freed(split(load_net(name))), seed, (*CRASHING, "slow"), machines).run(200)
+        except (AssertionError, ProtocolError, InputError):
+            return
+    pytest.fail("not found")

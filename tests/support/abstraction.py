@@ -156,7 +156,7 @@ def _steps(before: Structure, after: Structure, fired: Sequence[str], sensed: Se
         else:
             yield "apply", key
     for name in sensed:
-        late = _cleared_late(before, used, name)
+        late = cleared_late(before, used, name)
         yield ("sense-late", (*late, name)) if late else ("sense", (name,))
     stood = before.relations["stands"] - used
     yield from (("stand", key) for key in sorted(after.relations["stands"] - stood, key=str))
@@ -177,7 +177,7 @@ def _decisions(decided: Iterable[Thing], committed: Sequence[tuple[Thing, ...]])
         yield ("decide", commits[0]) if commits else ("give-up", (r,))
 
 
-def _cleared_late(before: Structure, used: set[tuple[Thing, ...]], name: str) -> tuple[Thing, ...]:
+def cleared_late(before: Structure, used: set[tuple[Thing, ...]], name: str) -> tuple[Thing, ...]:
     """The round and the transition, at a free part, that has cleared a signal whose owner has still to obey."""
     owner = before.functions["owner"][name]
     for r, t in sorted(before.relations["committed"], key=str):

@@ -15,6 +15,11 @@ The net has one round of a group at a time. So three things of the code are told
 - A coordinator that has crashed has forgotten acknowledgements, and an old no may take the place of a yes: the net,
   where these stay, may do less often what nobody needs twice.
 
+The vote on a part that is free of promise stands from a report to the order, and neither machine knows that it does. It
+is told of where the coordinator counts it, and while its order is to come; who says yes must be able to vote then, or
+have a vote that stands. Where it is not told of it may stand all the same, and what the net can do without that vote it
+can do with it. Of every marking the invariant of the net must hold, so what is counted does stand.
+
 Where a group has two rounds, one of them opened beside or before the end of the other, there is no such marking, nor
 where a late request asks for more in a round that a crash has given up. There nothing is compared (`untold`); the
 parametric proof, which has any number of rounds, speaks of these.
@@ -23,16 +28,25 @@ parametric proof, which has any number of rounds, speaks of these.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 
 from firable.decompose.protocol.building import ProtocolNet
 from firable.decompose.protocol.draft import CHANNELS, at, central
+from firable.decompose.protocol.inductive import invariant
 from firable.decompose.protocol.rounds import asked, committed, decided
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator, Round
 from firable.executor.protocol.deciders import closed_key, coordinator_at
-from firable.executor.protocol.messages import Acknowledgement, Decision, Firing, Message, Vote, VoteRequest
+from firable.executor.protocol.messages import (
+    Acknowledgement,
+    Decision,
+    Firing,
+    Message,
+    ToCoordinator,
+    Vote,
+    VoteRequest,
+)
 from firable.executor.simulation.exploring import Configuration, Explorer, Step
 from firable.executor.simulation.numbering import Kept
 from firable.nets.net import Marking
@@ -66,8 +80,18 @@ class NetTie:
         self.acts: set[object] = set()
         self.told = cache(self._told)
         self.changes = [(masks.inputs | masks.outputs) & ~self.channels for masks in self.net.masks]
-        self.promises = self.net.marking(at("promised", part) for part in self.part.values())
-        self.passing = self.net.marking(at(kind, part) for part in self.part.values() for kind in ("heard", "noted"))
+        self.promises = self._all("promised", free=False)
+        self.passing = self._all("heard", free=False) | self._all("noted", free=False) | self._all("noted", free=True)
+        self.stands, self.counted = self._all("stands", free=True), self._all("heard", free=True)
+        """Votes that promise nothing: that they stand, and that the coordinator counts them."""
+        self.free = [part for part in self.part.values() if part.free]
+        self.sentences = [
+            [
+                tuple(self.net.marking([place for place, full in term if full is wanted]) for wanted in (True, False))
+                for term in one
+            ]
+            for one in invariant(built)
+        ]
         self.memory = [self.net.marking(self._memory(group)) for group in self.parts.groups]
         self.moves: dict[tuple[int, str], list[int]] = {}
         """The transitions of each kind, of each group; of local firings the group is -1."""
@@ -100,9 +124,14 @@ class NetTie:
             self._act(explorer.names[step.machine], was, now, step, rounds, later)
             if not step.kind.endswith("crash"):
                 rounds = {**rounds, **later}
+                told_last = {e.coordinator: e for e in step.effects if isinstance(e, ToCoordinator)}
                 for effect in step.effects:
                     if isinstance(effect, Message):
                         self._check_sent(was, now, effect, rounds)
+                    if isinstance(effect, ToCoordinator):
+                        # What is told once more before the act was true before it; what is told last, after it.
+                        newest = told_last[effect.coordinator].readiness.sequence
+                        self._check_told(was, now if effect.readiness.sequence == newest else was, effect)
 
     def _asks_for_more(self, was: Marking, now: Marking, step: Step, rounds: Rounds) -> bool:
         """Whether a late request lets more be promised in a round that a crash has given up."""
@@ -110,6 +139,9 @@ class NetTie:
             return False
         new = (t for t in step.about.transitions if self.net.marking([asked(t)]) & now & ~was)
         return any(self.net.marking([decided(self.parts, t)]) & was for t in new)
+
+    def _all(self, kind: str, *, free: bool) -> Marking:
+        return self.net.marking(at(kind, part) for part in self.part.values() if part.free is free)
 
     # --- A configuration as a marking
 
@@ -142,22 +174,40 @@ class NetTie:
             decider = explorer.coordinators[n % len(explorer.coordinators)]
             for t in {t for number, t, _ in promised if number == n}:
                 tokens |= {asked(t), decided(self.parts, t)}
-                obeyed = (part for part in self.parts.coordinated[t] if _has_obeyed(kept[part.controller], n, decider))
+                obeyed = (part for part in self.parts.promising(t) if _has_obeyed(kept[part.controller], n, decider))
                 tokens |= {at("obeyed", part) for part in obeyed}
         tokens |= {at("promised", self.part[t, name]) for _, t, name in promised}
-        return self.net.marking(tokens)
+        tokens |= set(self._voted(tokens, [each.machine for each in of if isinstance(each.machine, Coordinator)]))
+        told = self.net.marking(tokens)
+        assert all(map(self._is_so(told), self.sentences)), f"what holds of every configuration: {sorted(tokens)}"
+        return told
+
+    def _is_so(self, marking: Marking) -> Callable[[Sequence[tuple[Marking, ...]]], bool]:
+        """Whether a sentence of the invariant holds of a marking."""
+        return lambda one: any(marking & full == full and not marking & empty for full, empty in one)
+
+    def _voted(self, tokens: set[str], deciding: Sequence[Coordinator]) -> Iterator[str]:
+        """The votes of free parts that count, or whose order is to come."""
+        for part in self.free:
+            decider = next(each for each in deciding if each.name == self.decider[part.whole])
+            if committed(part.whole) in tokens:
+                if at("obeyed", part) not in tokens:
+                    yield at("stands", part)
+            elif part.whole in decider.ready[part.controller] and decider.lately[part.controller]:
+                yield from (at("stands", part), at("heard", part))
 
     def _open(self, n: int, opened: Round, controllers: Mapping[str, LocalController]) -> Iterator[str]:
         if opened.decided:
             yield decided(self.parts, opened.transitions[0])
         for t in opened.transitions:
-            yield asked(t)
+            if self.parts.promising(t):
+                yield asked(t)
             if opened.committed == t:
                 yield committed(t)
-            for part in self.parts.coordinated[t]:
+            for part in self.parts.coordinated[t] if opened.committed == t else self.parts.promising(t):
                 if controllers[part.controller]._is_closed(n):
                     yield at("obeyed", part)
-                if not opened.decided and t in opened.votes.get(part.controller, ()):
+                if not part.free and not opened.decided and t in opened.votes.get(part.controller, ()):
                     yield at("heard", part)
                 if part.controller in opened.acknowledged:
                     yield at("noted", part)
@@ -168,15 +218,23 @@ class NetTie:
         fired = [effect.transition for effect in step.effects if isinstance(effect, Firing)]
         is_crash = step.kind.endswith("crash")
         forgotten = was & ~now & (self.passing if is_crash else self.net.marking(self._undecided(now)))
+        forgotten |= was & ~now & self.counted  # what is told anew, or was told to who has crashed
         met = rounds.get(getattr(step.about, "round", -1))
         mine = -1 if met is None else self.parts.group_of[met.transitions[0]]
         alive = {self.parts.group_of[opened.transitions[0]] for opened in (*rounds.values(), *later.values())}
         lost = {self.parts.group_of[o.transitions[0]] for n, o in rounds.items() if is_crash and n not in later}
+        lost -= {self.parts.group_of[opened.transitions[0]] for opened in later.values()}
         marking = was | self.net.marking(self._arriving(step.about, rounds, was))
+        marking = self._hear(marking | now & self.stands, now, fired)
         touched = [g for g, memory in enumerate(self.memory) if (was ^ now) & memory or g == mine]
         # What is dropped or closed makes room for what is promised or asked for.
         for g in sorted(touched, key=lambda g: (g in alive - lost, g != mine)):
             is_over = (was & ~now) & self.net.marking([decided(self.parts, self.parts.groups[g][0])])
+            if mine == g and self._is_decided_anew(rounds, later, g):
+                closing = [t for kind in _CLOSING for t in self.moves.get((g, kind), ()) if self._acts(t, actor)]
+                memory = self.memory[g]
+                marking = self._went(marking, now & ~memory, forgotten, [], closing, memory, memory)
+                marking = self._hear(marking, now, fired)
             kinds: tuple[str, ...] = _DROPPED if g not in alive - lost else _CLOSING if is_over else _IN_TURN
             allowed = [t for kind in kinds for t in self.moves.get((g, kind), ())]
             allowed = [t for t in allowed if kinds is _DROPPED or self._acts(t, actor)]
@@ -190,9 +248,29 @@ class NetTie:
             assert self._is_firable(marking, t), f"'{name}' fires, and is not firable in the net"
             marking = self.player.fire(marking, (t,))
             self.kinds["fire"] += 1
-        reached = marking & ~self.channels
-        differ = (reached ^ now) & ~(reached & forgotten)
+        reached = self._hear(marking, now, []) & ~self.channels
+        # A vote that is not told of may stand all the same.
+        differ = (reached ^ now) & ~(reached & (forgotten | self.stands))
         assert not differ, f"{step.kind} at '{actor}' of {step.about}: {self.net.names(differ)} differ"
+
+    def _is_decided_anew(self, rounds: Rounds, later: Rounds, g: int) -> bool:
+        """Whether a round was closed and another one, in which nobody has to promise, decided in the same act."""
+        closed = any(self.parts.group_of[rounds[n].transitions[0]] == g for n in rounds.keys() - later.keys())
+        opened = (later[n] for n in later.keys() - rounds.keys())
+        return closed and any(each.decided and self.parts.group_of[each.transitions[0]] == g for each in opened)
+
+    def _hear(self, marking: Marking, now: Marking, fired: Sequence[str]) -> Marking:
+        """The marking when the votes of free parts are heard that count now, or are used in this act."""
+        for part in self.free:
+            heard, stands = (self.net.marking([at(kind, part)]) for kind in ("heard", "stands"))
+            used = marking & self.net.marking([committed(part.whole)])
+            if marking & stands and not marking & heard and not used and (now & heard or part.whole in fired):
+                for step in ("stand/{}/again", "hear/{}"):
+                    t = self.net.transition_index[step.format(f"{part.whole}/{part.controller}")]
+                    if self._is_firable(marking, t):
+                        marking = self.player.fire(marking, (t,))
+                        self.kinds[self.built.steps[self.net.transitions[t].name].kind] += 1
+        return marking
 
     def _acts(self, t: int, actor: str) -> bool:
         """Whether a step of the net is one of this machine."""
@@ -205,14 +283,19 @@ class NetTie:
     def _undecided(self, now: Marking) -> Iterator[str]:
         """The votes that may have been heard in rounds that are not decided."""
         for (t, _), part in self.part.items():
+            if part.free:
+                continue
             if self.net.marking([asked(t)]) & now and not self.net.marking([decided(self.parts, t)]) & now:
                 yield at("heard", part)
 
     def _memory(self, group: Sequence[str]) -> Iterator[str]:
         for t in group:
-            yield from (asked(t), committed(t), decided(self.parts, t))
+            if self.parts.promising(t):
+                yield asked(t)
+            yield from (committed(t), decided(self.parts, t))
             for part in self.parts.coordinated[t]:
-                yield from (at(kind, part) for kind in ("promised", "obeyed", "heard", "noted"))
+                kinds = ("obeyed", "noted") if part.free else ("promised", "obeyed", "heard", "noted")
+                yield from (at(kind, part) for kind in kinds)
 
     def _arriving(self, message: object, rounds: Rounds, was: Marking) -> Iterator[str]:
         """The messages of the net that a message of the code is: one for each part, in a round that is open."""
@@ -223,7 +306,7 @@ class NetTie:
                 yield from (at("request", self.part[t, message.controller]) for t in asks)
             return
         c = str(getattr(message, "controller", ""))
-        its = [t for t in opened.transitions if (t, c) in self.part]
+        its = self._concerned(opened, c)
         match message:
             case VoteRequest(transitions=transitions):
                 yield from (at("request", self.part[t, c]) for t in its if t in transitions)
@@ -234,6 +317,11 @@ class NetTie:
                 yield from (at(kind, self.part[t, c]) for kind, t in kinds)
             case Acknowledgement():
                 yield from (at("acknowledgement", self.part[t, c]) for t in its)
+
+    def _concerned(self, opened: Round, c: str) -> list[str]:
+        """The transitions of a round of which a controller is told: a free part gets an order to fire alone."""
+        its = (t for t in opened.transitions if (t, c) in self.part)
+        return [t for t in its if t == opened.committed or not self.part[t, c].free]
 
     def _went(
         self,
@@ -246,7 +334,7 @@ class NetTie:
         through: Marking,
     ) -> Marking:
         """A marking to which firings lead, and which holds of a group what it holds now; takes from `fired`."""
-        free = (first ^ now) | through & ~self.promises
+        free = (first ^ now) | through & ~self.promises | self.stands | self.counted
         allowed = [t for t in allowed if not self.changes[t] & ~free and self._fires(t) in ("", *fired)]
         allowed = [t for t in allowed if self._is_wanted(t, now, now & ~first)]
         seen, ways = {first}, [(first, list[int]())]
@@ -292,7 +380,7 @@ class NetTie:
         """Check that the net may send what was sent, where the act has led; a vote is repeated before it is obeyed."""
         opened = rounds.get(getattr(message, "round", -1))
         c = message.controller
-        its = [t for t in opened.transitions if (t, c) in self.part] if opened is not None else []
+        its = self._concerned(opened, c) if opened is not None else []
         match message:
             case VoteRequest(transitions=transitions):
                 assert set(transitions) <= set(its), message
@@ -309,6 +397,14 @@ class NetTie:
             case Acknowledgement() if opened is not None:
                 names = {at("obeyed", self.part[t, c]) for t in its}
                 assert names <= set(self.net.names(now)), f"{message} before it has obeyed"
+
+    def _check_told(self, was: Marking, then: Marking, message: ToCoordinator) -> None:
+        """Check that a report says yes of free parts that may vote then, or of which the vote stands."""
+        for t in message.readiness.transitions:
+            if (part := self.part.get((t, message.controller))) is None or not part.free:
+                continue
+            if self.decider[t] == message.coordinator and not was & then & self.net.marking([at("stands", part)]):
+                self._may_send(then & ~self.stands, [f"stand/{t}/{message.controller}"], message)
 
     def _may_send(self, marking: Marking, names: list[str], message: Message) -> None:
         for name in names:
