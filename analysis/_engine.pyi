@@ -493,12 +493,15 @@ class Stubborn:
         *,
         all: bool = True,  # noqa: A002 - the engine's name
         thorough: bool = False,
+        keep_sets: bool = False,
         max_markings: int,
         max_memory_bytes: int,
         max_seconds: float | None,
         cancelled: Callable[[], bool] | None = None,
     ) -> Search:
         """Search for all deadlocks, or for the first one; `thorough` thinks longer about each marking.
+
+        `keep_sets` keeps the stubborn set of each marking, for `Search.sets`.
 
         Running out of a budget, and Ctrl-C, give an incomplete search with its `reason`. Raises `BudgetExceeded` where
         not even the net fits, `ValueError` for a negative time; so do the other searches.
@@ -508,6 +511,7 @@ class Stubborn:
         nodes: list[tuple[int, list[int]]],
         *,
         thorough: bool = False,
+        keep_sets: bool = False,
         max_markings: int,
         max_memory_bytes: int,
         max_seconds: float | None,
@@ -596,6 +600,8 @@ class Search:
         """The deadlocks found, ascending; for `deadlocks` all there are, where the search is complete."""
     def firable(self) -> list[int | None]:
         """For each transition the first marking found at which it is firable and openable."""
+    def sets(self) -> tuple[list[list[int]], list[int]]:
+        """The stubborn sets, each once, and the number of the one of each marking; none where they were not kept."""
     def marking(self, index: int) -> int:
         """The marking of an index, as a mask; `IndexError` where there is none."""
     def path_to(self, index: int) -> list[int]:

@@ -12,6 +12,8 @@ technique that found it, can check:
 - a *labelling* is that, with the invariant as a set of markings, listed or as a decision diagram: M0 is in it and every
   firing stays in it. With labels it shows any formula of CTL: each subformula "until" comes with a rank for each
   marking, which falls along some firing (or along every one), and each "always" with a set that is not left;
+- *stubborn sets* are markings too, in each of which a set of transitions says which firings count: no goal is reached
+  by them, nor then by those that are left out;
 - a *continuation* is a firing sequence and a certificate for the net that starts where it ends: from there the goal is
   never reached again;
 - *progress* shows a response under fairness: ranks that no firing without the answer raises, and for each rank a
@@ -153,11 +155,29 @@ class Labelling:
 
 
 @dataclass(frozen=True, slots=True)
+class StubbornSets:
+    """The goal holds in none of the markings, M0 is one of them, and whatever counts leads from them to them.
+
+    What counts in a marking are the firable members of a set that is stubborn there for the goal
+    (`firable.analysis.evidence.checking.stubborn`). `sets` are sets of transitions, bit t being transition t of the
+    net; `chosen` gives for each marking the number of its set.
+    """
+
+    space: Markings
+    sets: tuple[int, ...]
+    chosen: tuple[int, ...]
+
+
+NeverCertificate = InductiveInvariant | Labelling | StubbornSets
+"""What shows that a goal is never met."""
+
+
+@dataclass(frozen=True, slots=True)
 class Continuation:
     """After these firings the goal is never reached: the certificate shows it of the net in the marking after them."""
 
     firings: tuple[tuple[str, ...], ...]
-    then: InductiveInvariant | Labelling
+    then: NeverCertificate
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +209,7 @@ class Theorem:
     """
 
     name: TheoremName
-    contact: InductiveInvariant | Labelling
+    contact: NeverCertificate
     traps: tuple[tuple[str, ...], ...] = ()
 
 
@@ -200,4 +220,4 @@ class Unfolded:
     space: Markings
 
 
-Certificate = FiringSequence | InductiveInvariant | Labelling | Continuation | Progress | Theorem | Unfolded
+Certificate = FiringSequence | NeverCertificate | Continuation | Progress | Theorem | Unfolded

@@ -29,6 +29,7 @@ from firable.analysis.evidence.certificate import (
     Ranks,
     Root,
     Rounds,
+    StubbornSets,
     Theorem,
     TheoremName,
     Unfolded,
@@ -45,6 +46,7 @@ ROUNDS_MAX: Final = 1_000_000
 
 Natural = Annotated[int, Field(ge=0)]
 Firings = list[list[str]]
+Hexadecimal = Annotated[str, Field(pattern=r"^(0|[1-9a-f][0-9a-f]*)$")]
 
 
 class _Record(BaseModel):
@@ -98,7 +100,7 @@ def claim_to_json(claim: Claim) -> dict[str, Any]:
 
 class _MarkingsRecord(_Record):
     kind: Literal["markings"]
-    markings: list[Annotated[str, Field(pattern=r"^(0|[1-9a-f][0-9a-f]*)$")]]
+    markings: list[Hexadecimal]
 
     def space(self, net: Net) -> Markings:
         """The set."""
@@ -241,7 +243,20 @@ class _LabellingRecord(_Record):
         return Labelling(_set(sets, self.set), tuple(label.of(net) for label in self.labels))
 
 
-_NeverRecord = Annotated[_InvariantRecord | _LabellingRecord, Field(discriminator="kind")]
+class _StubbornRecord(_Record):
+    kind: Literal["stubborn-sets"]
+    set: Natural
+    stubborn: list[Hexadecimal]
+    chosen: list[Natural]
+
+    def of(self, net: Net, sets: Sequence[Markings | Diagram]) -> StubbornSets:
+        stubborn = tuple(int(one, 16) for one in self.stubborn)
+        if any(one >> len(net.transitions) for one in stubborn):
+            raise ValueError("a stubborn set holds a transition that the net does not have")
+        return StubbornSets(_listed(sets, self.set), stubborn, tuple(self.chosen))
+
+
+_NeverRecord = Annotated[_InvariantRecord | _LabellingRecord | _StubbornRecord, Field(discriminator="kind")]
 
 
 class _ContinuationRecord(_Record):
@@ -293,6 +308,7 @@ class _ShownRecord(_Record):
         _FiringSequenceRecord
         | _InvariantRecord
         | _LabellingRecord
+        | _StubbornRecord
         | _ContinuationRecord
         | _ProgressRecord
         | _TheoremRecord
@@ -343,6 +359,13 @@ def certificate_to_json(certificate: Certificate, sets: Sets) -> dict[str, Any]:
             }
         case Labelling(space, labels):
             return {"kind": "labelling", "set": sets.number(space), "labels": list(map(_label_to_json, labels))}
+        case StubbornSets(space, stubborn, chosen):
+            return {
+                "kind": "stubborn-sets",
+                "set": sets.number(space),
+                "stubborn": [f"{one:x}" for one in stubborn],
+                "chosen": list(chosen),
+            }
         case Continuation(firings, then):
             return {"kind": "continuation", "firings": lists(firings), "then": certificate_to_json(then, sets)}
         case Progress(space, ranks, helpful):

@@ -41,7 +41,8 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.claims import Claim
 from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.meaning import property_claim, temporal_claim
-from firable.analysis.evidence.producing.claims import Certifier, LackingError
+from firable.analysis.evidence.producing.claims import Certifier
+from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.spaces.space import StateSpace

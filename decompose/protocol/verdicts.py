@@ -17,7 +17,8 @@ from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.meaning import tidy
-from firable.analysis.evidence.producing.claims import Certifier, LackingError
+from firable.analysis.evidence.producing.claims import Certifier
+from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.goal import Limits
 from firable.decompose.protocol.building import ProtocolNet
 from firable.decompose.protocol.exploring import Exploration, explore_protocol

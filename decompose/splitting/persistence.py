@@ -57,7 +57,8 @@ from firable.analysis.evidence.certificate import Certificate, FiringSequence, I
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.meaning import tidy
-from firable.analysis.evidence.producing.claims import Certifier, LackingError
+from firable.analysis.evidence.producing.claims import Certifier
+from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.methods import GOAL_LANES
 from firable.analysis.question import Answer, Question, listed, no, unknown, yes

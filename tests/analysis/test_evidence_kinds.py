@@ -27,7 +27,8 @@ from firable.analysis.evidence.checking.obligations import Evidence, obligations
 from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking, marking_of, without_start
 from firable.analysis.evidence.document import Document, document_from_text, seal
 from firable.analysis.evidence.meaning import commands_clash, completions_clash, contact, tidy
-from firable.analysis.evidence.producing.claims import Certifier, LackingError
+from firable.analysis.evidence.producing.claims import Certifier
+from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.spaces.reachability import explore

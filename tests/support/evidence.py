@@ -4,7 +4,8 @@ from firable.analysis.evidence.certificate import FiringSequence
 from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record
-from firable.analysis.evidence.producing.claims import Certifier, LackingError
+from firable.analysis.evidence.producing.claims import Certifier
+from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.goal import Finding, Limits
 from firable.nets.formula import Formula
 from firable.nets.net import Net

@@ -11,6 +11,7 @@ from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.labels import drawn, labelling
+from firable.analysis.evidence.producing.stubborn import stubborn_sets
 from firable.analysis.goal import Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.spaces.symbolic import explore_symbolically
@@ -115,6 +116,11 @@ def _theorem(net: Net, claim: Claim) -> Evidence:
     return _of(net, claim, Certifier(net, Discipline.INTERLEAVING, Limits()).theorem(claim))
 
 
+def _stubborn(net: Net, goal: Formula) -> Evidence | None:
+    found = stubborn_sets(net, goal, Limits())
+    return None if found is None else _of(net, Claim(ClaimKind.NEVER, goal), found)
+
+
 def _invented(net: Net, claim: Claim, firings: str, cycle: str = "") -> Evidence:
     prefix, around = (tuple((name,) for name in names.split()) for names in (firings, cycle))
     return _of(net, claim, FiringSequence(prefix, around))
@@ -141,6 +147,7 @@ EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
     "back": lambda: on_diagram(family_net("token_ring-3"), Claim(ClaimKind.ALWAYS_POSSIBLE, Start())),
     "rounds": lambda: on_diagram(ENDING, _ctl("AF b")),
     "root": lambda: on_diagram(CHOICE, _ctl("EG not c")),
+    "stubborn sets": lambda: _stubborn(family_net("manufacturing_cells-3"), Deadlock()),
     "continuation": lambda: certified(family_net("philosophers-3"), Claim(ClaimKind.LOST, Start())),
     "fires": lambda: _invented(
         TURNS, Claim(ClaimKind.FIRES, Holds("b"), fires=("go", "tock")), "tick tock tick go tock"

@@ -30,6 +30,7 @@ from firable.analysis.evidence.certificate import (
     Labelling,
     Markings,
     Progress,
+    StubbornSets,
     Theorem,
     Unfolded,
 )
@@ -49,6 +50,7 @@ from firable.analysis.evidence.checking.obligations import (
 )
 from firable.analysis.evidence.checking.progress import check_progress
 from firable.analysis.evidence.checking.runs import check_refuting_run, check_unanswered_run, holds
+from firable.analysis.evidence.checking.stubborn import Stubborn
 from firable.analysis.evidence.checking.theorems import check_premises
 from firable.analysis.evidence.checking.unfolding import Unfolding
 from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
@@ -63,6 +65,7 @@ from firable.nets.queries import parse_query
 from firable.nets.temporal import format_temporal
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import Player
+from firable.semantics.trace import Discipline
 
 TIMEOUT_MS: Final = 60_000
 
@@ -76,6 +79,7 @@ _SHOWS: Final = {
         *(ClaimKind.NEVER, ClaimKind.REACHABLE, ClaimKind.ALWAYS_POSSIBLE, ClaimKind.LOST, ClaimKind.CTL),
         ClaimKind.ORDERED,
     },
+    StubbornSets: {ClaimKind.NEVER},
     Continuation: {ClaimKind.LOST},
     Progress: {ClaimKind.LEADS_TO},
     Theorem: {ClaimKind.LIVE, ClaimKind.HOME, ClaimKind.ALWAYS_POSSIBLE},
@@ -182,6 +186,13 @@ class _Checker:
                 return self._discharged(evidence)
             case Labelling(space, labels):
                 return self._labelled(evidence, space, labels)
+            case StubbornSets():
+                if discipline is not Discipline.INTERLEAVING:
+                    refuse("stubborn sets are checked under interleaving only")
+                stubborn = Stubborn(net, certificate, self.deadline)
+                stubborn.check(claim.state_goal)
+                words = f"{len(stubborn.markings):,} markings with stubborn sets, and {stubborn.n_firings:,} firings"
+                return Checked(shown=True, method=f"{words}, looked through")
             case Continuation(firings):
                 rest = self.check(continued(evidence))
                 return replace(rest, method=f"{len(firings):,} firings played, and from there: {rest.method}")

@@ -20,39 +20,12 @@ from functools import cached_property
 
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import Back, Diagram, Label, Root, Rounds, Whole
+from firable.analysis.evidence.checking.cubes import Cube, firable_cube, firings
 from firable.analysis.evidence.checking.nodes import EMPTY, UNIT, Key, Made, Nodes
 from firable.analysis.evidence.refusal import refuse
 from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Or, Start
 from firable.nets.net import Net
-from firable.semantics.algebra import BOOL
-from firable.semantics.firing import firable, next_token
 from firable.semantics.formulas import evaluate
-
-Cube = dict[int, bool]
-"""Literals by place; the conjunction of them."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Cubes:
-    """The algebra in which Eq. (1) is a conjunction of literals; None is false."""
-
-    def conjunction(self, operands: Iterable[Cube | None], /) -> Cube | None:
-        found: Cube = {}
-        for operand in operands:
-            if operand is None:
-                return None
-            for place, value in operand.items():
-                if found.setdefault(place, value) is not value:
-                    return None
-        return found
-
-    def disjunction(self, operands: Iterable[Cube | None], /) -> Cube | None:
-        raise TypeError(f"Eq. (1) is a conjunction, and no disjunction of {len(list(operands))}")
-
-    def negation(self, operand: Cube | None, /) -> Cube | None:
-        if operand is None or len(operand) != 1:
-            raise TypeError("only a literal is negated")
-        return {place: not value for place, value in operand.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,14 +71,9 @@ class Diagrams(Nodes):
     def _events(self) -> dict[int, _Event]:
         """The transitions that can fire, by index."""
         found = {}
-        for t, transition in enumerate(self.net.transitions):
-            cube = self._cube(t)
-            if cube is not None and transition.openable:
-                literals = []
-                for place in cube:  # the inputs and outputs among them
-                    after = next_token(BOOL, self.net, place, cube.__getitem__, t.__eq__)
-                    literals.append((self.level_of[place], cube[place], after))
-                found[t] = _Event(tuple(sorted(literals, reverse=True)))
+        for t, (cube, flips) in firings(self.net).items():
+            literals = [(self.level_of[p], value, value ^ (p in flips)) for p, value in cube.items()]
+            found[t] = _Event(tuple(sorted(literals, reverse=True)))
         return found
 
     def _with(self, node: int, cube: Cube) -> int:
@@ -116,7 +84,7 @@ class Diagrams(Nodes):
         return self.contains(node, {self.level_of[p] for p, place in enumerate(self.net.places) if place.marked})
 
     def _cube(self, t: int) -> Cube | None:
-        return firable(_Cubes(), self.net, t, lambda place: {place: True})
+        return firable_cube(self.net, t)
 
     def _require_closed(self) -> None:
         if not self.holds_initially(self.whole):

@@ -11,6 +11,7 @@ from functools import cached_property
 
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import Label, Ranks, Whole
+from firable.analysis.evidence.checking.columns import columns
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse, shown
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
@@ -73,18 +74,15 @@ class Listed:
     @cached_property
     def _columns(self) -> tuple[Bitwise[int], list[int]]:
         """For each place the markings in which it holds a token, as one number, and the algebra of these."""
-        columns = []
-        for p in range(len(self.net.places)):
-            digits = "".join("1" if marking >> p & 1 else "0" for marking in reversed(self.markings))
-            columns.append(int(digits or "0", 2))
-        return Bitwise(true=(1 << len(self.markings)) - 1, false=0), columns
+        of_places = columns(self.markings, len(self.net.places))
+        return Bitwise(true=(1 << len(self.markings)) - 1, false=0), of_places
 
     @cached_property
     def _firable(self) -> list[tuple[int, Column]]:
         """Each transition that may fire in some of the markings, and in which."""
-        algebra, columns = self._columns
+        algebra, of_places = self._columns
         openable = (t for t, transition in enumerate(self.net.transitions) if transition.openable)
-        found = ((t, firable(algebra, self.net, t, columns.__getitem__)) for t in openable)
+        found = ((t, firable(algebra, self.net, t, of_places.__getitem__)) for t in openable)
         return [(t, self._column(where)) for t, where in found if where]
 
     def _column(self, number: int) -> Column:
@@ -97,8 +95,8 @@ class Listed:
 
     def where(self, formula: Formula) -> Column:
         """The markings in which a state formula holds."""
-        algebra, columns = self._columns
-        return self._column(evaluate(algebra, self.net, formula, columns.__getitem__))
+        algebra, of_places = self._columns
+        return self._column(evaluate(algebra, self.net, formula, of_places.__getitem__))
 
     def all_of(self, sets: Iterable[Column]) -> Column:
         """The markings in all of the subsets."""

@@ -24,14 +24,16 @@ from firable.analysis.evidence.certificate import (
     InductiveInvariant,
     Labelling,
     Markings,
+    NeverCertificate,
+    StubbornSets,
     Theorem,
-    TheoremName,
     Unfolded,
 )
 from firable.analysis.evidence.checking.theorems import check_premises
 from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl, is_marking, without_start
 from firable.analysis.evidence.meaning import contact, tidy
 from firable.analysis.evidence.producing.labels import TooLargeError, drawn, labelling, listed
+from firable.analysis.evidence.producing.lacking import NO_TIME, LackingError
 from firable.analysis.evidence.producing.ranks import progress
 from firable.analysis.evidence.producing.runs import (
     InOrder,
@@ -42,16 +44,15 @@ from firable.analysis.evidence.producing.runs import (
     runs_by_search,
     runs_on_graph,
 )
+from firable.analysis.evidence.producing.stubborn import stubborn_sets
+from firable.analysis.evidence.producing.theorems import theorem_on
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.induction.pdr import decide_by_pdr
 from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import SymbolicSpace, explore_symbolically
-from firable.analysis.structure.commoner import commoner
 from firable.analysis.structure.contact import decide_contact_by_invariants
-from firable.analysis.structure.net_class import asymmetric_choice, extended_free_choice
-from firable.analysis.structure.ordinary import ordinary
 from firable.analysis.structure.state_equation import decide_by_state_equation
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula
@@ -65,12 +66,6 @@ MARKINGS_MAX: Final = 20_000
 WIDE_MAX: Final = 100_000
 """How many markings are listed where none would: for responses, LTL and synchronous steps."""
 _SECONDS: Final = 30.0
-
-Never = InductiveInvariant | Labelling
-
-
-class LackingError(Exception):
-    """No certificate was found, and why."""
 
 
 class Certifier:
@@ -86,7 +81,7 @@ class Certifier:
     ) -> None:
         self.net, self.discipline, self.limits, self._given = net, discipline, limits, space
         self._findings: Mapping[Formula, Finding] = {tidy(goal): found for goal, found in findings}
-        self._contact: Never | None = None
+        self._contact: NeverCertificate | None = None
         self._ends: list[tuple[Continuation, Callable[[Formula], bool]]] = []
         self.deadlock: Witness | None = None
 
@@ -153,7 +148,7 @@ class Certifier:
         try:
             found = self._certificate(claim, witness)
         except (BudgetExceeded, IncompleteGraph):
-            raise LackingError("the time for evidence was over") from None
+            raise LackingError(NO_TIME) from None
         except TooLargeError as error:
             raise LackingError(str(error)) from None
         if found is None:
@@ -208,19 +203,37 @@ class Certifier:
             return labelling(self.symbolic, self.diagram, formula)
         raise LackingError(f"there are more than {MARKINGS_MAX:,} markings, and no decision diagram of them at hand")
 
-    def _never(self, goal: Formula) -> Never | None:
+    def _never(self, goal: Formula) -> NeverCertificate | None:
         finding = self._findings.get(goal)
-        if finding is not None and isinstance(finding.certificate, Never):
+        if finding is not None and isinstance(finding.certificate, NeverCertificate):
             return finding.certificate
         if self.graph is not None and self.markings is not None:
             return None if self.graph.satisfying(goal).any() else Labelling(self.markings)
-        if goal == contact(self.net) and (found := self.contact_free()) is not None:
+        if goal == self._contact_goal and (found := self.contact_free()) is not None:
             return found
+        if not isinstance(self._given, SymbolicSpace) and (sets := self._stubborn(self.net, goal)) is not None:
+            return sets
         if self.symbolic is not None and self.diagram is not None:
             return None if self.symbolic.satisfying(goal) else Labelling(self.diagram)
         return self._induced(self.net, goal)
 
-    def contact_free(self) -> Never | None:
+    def _stubborn(self, net: Net, goal: Formula) -> StubbornSets | None:
+        """Few markings with stubborn sets, where they are few."""
+        if self.discipline is Discipline.STEP:
+            return None
+        try:
+            return stubborn_sets(net, goal, Limits(self._part(0.2), self.limits.memory_bytes))
+        except BudgetExceeded:
+            return None
+
+    @cached_property
+    def _contact_goal(self) -> Formula:
+        return contact(self.net)
+
+    def _contact_excluded(self) -> NeverCertificate | None:
+        return self._never(self._contact_goal)
+
+    def contact_free(self) -> NeverCertificate | None:
         """The invariants that exclude contact, of a net of any size; None where they do not."""
         if self._contact is None:
             found = decide_contact_by_invariants(self.net, Limits(self._part(0.3), self.limits.memory_bytes))
@@ -241,6 +254,8 @@ class Certifier:
                 lambda: decide_by_pdr(net, goal, replace(limits, deadline=self._part(0.8))),
             )
         for attempt in tries:
+            if limits.deadline.over:  # to begin with any of them takes a while on a large net
+                raise BudgetExceeded(NO_TIME)
             found = attempt()
             if isinstance(found.certificate, InductiveInvariant):
                 return found.certificate
@@ -294,12 +309,14 @@ class Certifier:
             found = Continuation(way.firings, Labelling(listed(graph)))
             self._ends.append((found, lambda other: not graph.satisfying(other).any()))
             return found
-        invariant = self._induced(net, spelled)
-        return None if invariant is None else Continuation(way.firings, invariant)
+        shown = self._stubborn(net, spelled) or self._induced(net, spelled)
+        return None if shown is None else Continuation(way.firings, shown)
 
     def theorem(self, claim: Claim) -> Theorem:
         """A theorem that says the claim; raises `LackingError` where none does."""
         found = self._theorem
+        if isinstance(found, str):
+            raise LackingError(found)
         try:
             check_premises(self.net, self.discipline, claim, found)
         except InputError as error:
@@ -307,26 +324,16 @@ class Certifier:
         return found
 
     @cached_property
-    def _theorem(self) -> Theorem:
-        """The theorem that is about the net."""
-        net, of = self.net, ordinary(self.net)
-        bare = any(t.inhibitive for t in net.transitions) or len(of.transitions) < len(net.transitions)
-        if self.discipline is Discipline.STEP or bare or not net.transitions:
-            raise LackingError("no theorem on a class of nets applies")
-        contact_excluded = self._never(contact(net))
-        if contact_excluded is None:
-            raise LackingError("the net was not proved contact-free")
-        joined = [p for p in range(of.n_places) if of.consumers[p] or of.producers[p]]
-        if all(len(of.consumers[p]) == 1 == len(of.producers[p]) for p in joined):
-            return Theorem(TheoremName.MARKED_GRAPH, contact_excluded)
-        free = extended_free_choice(of.inputs, of.consumers)
-        if not free and not asymmetric_choice(of.inputs, of.consumers):
-            raise LackingError("no theorem on a class of nets applies")
-        found = commoner(of, deadline=self._part(0.5))
-        if not found.holds or not found.traps:
-            raise LackingError("no list of marked traps, one in each siphon, was found")
-        names = tuple(tuple(net.places[p].name for p in trap) for trap in found.traps)
-        return Theorem(TheoremName.FREE_CHOICE if free else TheoremName.ASYMMETRIC_CHOICE, contact_excluded, names)
+    def _theorem(self) -> Theorem | str:
+        """The theorem that is about the net, or why there is none: looked for once, whatever comes of it."""
+        try:
+            if self.discipline is Discipline.STEP:
+                raise LackingError("no theorem on a class of nets applies")
+            return theorem_on(self.net, self._contact_excluded, self._part(0.5))
+        except LackingError as error:
+            return str(error)
+        except (BudgetExceeded, IncompleteGraph):
+            return NO_TIME
 
     def runs_firing(self, names: Iterable[str], home: Marking | None = None) -> list[FiringSequence]:
         """Runs that fire all these transitions, each as many as it can; after they met a home marking, if it is given.
@@ -352,7 +359,7 @@ class Certifier:
         except NotFoundError as error:
             raise LackingError(str(error)) from None
         except (BudgetExceeded, IncompleteGraph):
-            raise LackingError("the time for evidence was over") from None
+            raise LackingError(NO_TIME) from None
 
     def run_in_order(self, one: tuple[str, ...], others: tuple[str, ...]) -> InOrder | None:
         """A run that fires one of these, and one of those at a moment before or after it, and which two."""

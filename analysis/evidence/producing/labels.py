@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.evidence.certificate import Back, Diagram, Label, Labelling, Markings, Ranks, Root, Rounds, Whole
 from firable.analysis.evidence.checking.labelling import (
     All,
@@ -146,6 +147,8 @@ class _Labels:
         while more and found != space.reach:
             more = False
             for t in order:
+                if space.deadline.over:
+                    raise BudgetExceeded("the time was over")
                 larger = found | (space.engine.before(found, [t]) & through)
                 if larger != found:
                     found, more = larger, True

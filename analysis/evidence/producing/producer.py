@@ -31,7 +31,8 @@ from firable.analysis.evidence.meaning import (
     tidy,
     tokens_at_least,
 )
-from firable.analysis.evidence.producing.claims import Certifier, LackingError
+from firable.analysis.evidence.producing.claims import Certifier
+from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.evidence.read_off import eager_cycle, read_off
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport

@@ -60,11 +60,11 @@ impl Stubborn {
         &self,
         py: Python<'_>,
         goal: Goal,
-        limits: (bool, usize, usize),
+        limits: (bool, bool, usize, usize),
         patience: &Patience,
     ) -> PyResult<Search> {
-        let (thorough, markings, memory_bytes) = limits;
-        let limits = Limits { thorough, markings, memory_bytes, time: patience.time };
+        let (thorough, keep_sets, markings, memory_bytes) = limits;
+        let limits = Limits { thorough, markings, memory_bytes, time: patience.time, keep_sets };
         let mut raised = None;
         let found = detached(py, patience, &mut raised, |poll| {
             search::Search::run(Arc::clone(&self.prepared), goal, limits, poll)
@@ -86,28 +86,30 @@ impl Stubborn {
     }
 
     #[allow(clippy::too_many_arguments)]
-    #[pyo3(signature = (*, all=true, thorough=false, max_markings, max_memory_bytes, max_seconds, cancelled=None))]
+    #[pyo3(signature = (*, all=true, thorough=false, keep_sets=false, max_markings, max_memory_bytes, max_seconds, cancelled=None))]
     fn deadlocks(
         &self,
         py: Python<'_>,
         all: bool,
         thorough: bool,
+        keep_sets: bool,
         max_markings: usize,
         max_memory_bytes: usize,
         max_seconds: Option<f64>,
         cancelled: Option<Py<PyAny>>,
     ) -> PyResult<Search> {
         let patience = Patience::new(max_seconds, cancelled)?;
-        self.search(py, Goal::Deadlock { all }, (thorough, max_markings, max_memory_bytes), &patience)
+        self.search(py, Goal::Deadlock { all }, (thorough, keep_sets, max_markings, max_memory_bytes), &patience)
     }
 
     #[allow(clippy::too_many_arguments)]
-    #[pyo3(signature = (nodes, *, thorough=false, max_markings, max_memory_bytes, max_seconds, cancelled=None))]
+    #[pyo3(signature = (nodes, *, thorough=false, keep_sets=false, max_markings, max_memory_bytes, max_seconds, cancelled=None))]
     fn reach(
         &self,
         py: Python<'_>,
         nodes: Nodes,
         thorough: bool,
+        keep_sets: bool,
         max_markings: usize,
         max_memory_bytes: usize,
         max_seconds: Option<f64>,
@@ -115,7 +117,7 @@ impl Stubborn {
     ) -> PyResult<Search> {
         let formula = formula(nodes, self.prepared.net.places)?;
         let patience = Patience::new(max_seconds, cancelled)?;
-        self.search(py, Goal::Formula(formula), (thorough, max_markings, max_memory_bytes), &patience)
+        self.search(py, Goal::Formula(formula), (thorough, keep_sets, max_markings, max_memory_bytes), &patience)
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -132,7 +134,7 @@ impl Stubborn {
     ) -> PyResult<Search> {
         self.existing(&transitions)?;
         let patience = Patience::new(max_seconds, cancelled)?;
-        self.search(py, Goal::Firing(transitions), (thorough, max_markings, max_memory_bytes), &patience)
+        self.search(py, Goal::Firing(transitions), (thorough, false, max_markings, max_memory_bytes), &patience)
     }
 
     #[pyo3(signature = (nodes, *, seed, max_steps, max_seconds, cancelled=None))]
@@ -227,6 +229,13 @@ impl Search {
 
     fn firable(&self) -> Vec<Option<u32>> {
         self.search.firable.iter().map(|&index| Some(index).filter(|&index| index != NONE)).collect()
+    }
+
+    fn sets(&self) -> (Vec<Vec<u32>>, Vec<u32>) {
+        match &self.search.sets {
+            Some(kept) => (kept.sets.iter().map(|set| set.to_vec()).collect(), kept.chosen.clone()),
+            None => (Vec::new(), Vec::new()),
+        }
     }
 
     fn marking<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyAny>> {

@@ -130,6 +130,17 @@ impl<'a> Closure<'a> {
         self.is_firable.has(t)
     }
 
+    /// The members of the best set, ascending: all transitions where no closure was better than to fire all.
+    pub fn chosen(&self) -> Vec<u32> {
+        let best = &self.best;
+        if best.members.is_empty() && best.firable.len() == self.firable.len() {
+            return (0..self.is_firable.len() as u32).collect();
+        }
+        let mut members: Vec<u32> = best.members.iter().copied().filter(|&t| best.member.has(t)).collect();
+        members.sort_unstable();
+        members
+    }
+
     /// What it costs to take in the makers of a literal: the firable ones count first.
     #[inline(always)]
     pub fn price(&self, of: Literal) -> u64 {

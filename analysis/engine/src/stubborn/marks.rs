@@ -13,6 +13,16 @@ impl Marks {
         Marks { stamps: vec![0; count], now: 1 }
     }
 
+    /// The bound: how many numbers there are.
+    pub fn len(&self) -> usize {
+        self.stamps.len()
+    }
+
+    /// Whether there are no numbers at all.
+    pub fn is_empty(&self) -> bool {
+        self.stamps.is_empty()
+    }
+
     /// Empties the set.
     pub fn clear(&mut self) {
         if self.now == u32::MAX {

@@ -5,8 +5,10 @@
 //! the theorem in `mod.rs`): the first goal found is a nearest one. Depth first was rejected: it finds deep goals
 //! sooner by luck, which a random walk does better, and proves nothing sooner.
 //!
-//! What is firable at a marking on the way is known for each transition, whatever the goal.
+//! What is firable at a marking on the way is known for each transition, whatever the goal. On request the stubborn set
+//! of each marking is kept, so that somebody else can look through what was left out, and why.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -50,6 +52,37 @@ pub struct Limits {
     pub memory_bytes: usize,
     /// Longest time.
     pub time: Option<Duration>,
+    /// Whether the stubborn set of each marking is kept.
+    pub keep_sets: bool,
+}
+
+/// The stubborn sets of a search, each once.
+#[derive(Debug, Default)]
+pub struct Sets {
+    numbers: HashMap<Arc<[u32]>, u32>,
+    /// The members of each, ascending.
+    pub sets: Vec<Arc<[u32]>>,
+    /// For each marking that was left behind the number of its set.
+    pub chosen: Vec<u32>,
+}
+
+impl Sets {
+    /// What a set takes besides its members, in both places where it is named.
+    const OVERHEAD: usize = 64;
+
+    fn keep(&mut self, members: Vec<u32>, memory: &Memory) -> Result<(), Stop> {
+        let number = match self.numbers.get(members.as_slice()) {
+            Some(&number) => number,
+            None => {
+                memory.claim(4 * members.len() + Sets::OVERHEAD)?;
+                let (set, number) = (Arc::<[u32]>::from(members), self.sets.len() as u32);
+                self.sets.push(Arc::clone(&set));
+                self.numbers.insert(set, number);
+                number
+            }
+        };
+        memory.push(&mut self.chosen, number)
+    }
 }
 
 /// A net with its dependencies, ready for any number of searches.
@@ -85,6 +118,8 @@ pub struct Search {
     pub found: Option<u32>,
     /// For each transition the first marking found at which it is firable and openable, or `NONE`.
     pub firable: Vec<u32>,
+    /// The stubborn sets, where they are kept.
+    pub sets: Option<Sets>,
     /// Why the search ended before the answer was known.
     pub stop: Option<Stop>,
     /// What is held, and the most that may be held.
@@ -114,6 +149,7 @@ impl Search {
             deadlocks: Vec::new(),
             found: None,
             firable: vec![NONE; count],
+            sets: limits.keep_sets.then(Sets::default),
             stop: None,
             memory,
             seconds: 0.0,
@@ -181,6 +217,9 @@ impl Search {
             }
             if !chooser.choose(&mut goal, &marking, &self.firable) {
                 return Ok(());
+            }
+            if let Some(sets) = &mut self.sets {
+                sets.keep(chooser.closure.chosen(), &self.memory)?;
             }
             let hash = linear_hash(width, &marking);
             for &t in &chooser.closure.best.firable {
