@@ -364,6 +364,56 @@ class Lasso:
     def seconds(self) -> float:
         """How long it took."""
 
+def evaluate_locally(
+    n_places: int,
+    transitions: _Transitions,
+    initial: list[int],
+    labels: list[list[tuple[int, list[int]]]],
+    nodes: list[tuple[str, list[int]]],
+    *,
+    first: int,
+    max_markings: int,
+    max_memory_bytes: int,
+    max_seconds: float | None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Local:
+    """Evaluate a formula of CTL in M0, under interleaving, at the markings that its operators look at.
+
+    The first arguments are those of `explore`; labels are formulas as `Stubborn.reach` takes them. A node is ("label",
+    [number]), ("not" | "EX", [node]), ("EU" | "AU", [left, right]), or ("and" | "or", nodes), operands before what they
+    are operands of; the last is the formula. In a deadlock `EX` is false and an until is its right side. A search
+    inside another one may meet `first` markings in the first round, and more in those that follow. Running out of a
+    budget leaves it undecided.
+
+    Raises `ValueError` for a place, label, or operand out of range, too deep a formula, a negative time.
+
+    >>> ring = [([0], [1], [], [], []), ([1], [0], [], [], [])]
+    >>> full = [[(1, [0])], [(1, [1])]]
+    >>> evaluate_locally(2, ring, [0], full, [("label", [0]), ("label", [1]), ("AU", [0, 1])], first=10,
+    ...                  max_markings=100, max_memory_bytes=1_000_000, max_seconds=None).holds
+    True
+    """
+
+@final
+class Local:
+    """What a local evaluation found."""
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether M0 satisfies the formula; None where that is not decided."""
+    @property
+    def reason(self) -> str | None:
+        """Why not: "markings" for the markings allowed, "memory", "time", "interrupted" or "cancelled"."""
+    @property
+    def n_markings(self) -> int:
+        """How many markings were met."""
+    @property
+    def n_edges(self) -> int:
+        """How many firings were followed."""
+    @property
+    def seconds(self) -> float:
+        """How long it took."""
+
 def explore_symbolically(
     n_places: int,
     transitions: _Transitions,

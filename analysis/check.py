@@ -19,7 +19,7 @@ The report's `course` tells what was tried. A technique that is asked for by nam
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -52,6 +52,7 @@ from firable.analysis.verdicts.behaviour import DEADLOCK_FREE, QUESTIONS
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Net, TemporalProperty
 from firable.nets.queries import Query
+from firable.nets.temporal import Logic
 from firable.nets.verdict import Cost, Status, Verdict, spelled
 from firable.semantics.trace import Discipline
 
@@ -133,10 +134,11 @@ class _Check:
         ends: list[str | None] = []
         space = self._whole(settling, course, ends)
         if space is not None:  # sets may take far longer than one run that is nearby
-            self._ask_formulas(settling, _share(self.deadline, _FORMULAS_SHARE), _FORMULA_SLICES_SECONDS[:1])
+            share = _share(self.deadline, _FORMULAS_SHARE)
+            self._ask_formulas(settling, share, _FORMULA_SLICES_SECONDS[:1], {Logic.LTL})
         # What had no room with indexes may have it without.
         late = {Method.COMPACT: _COUNTING_SHARE} if {"memory", "markings"} & set(ends) else {}
-        report = self._report(space or first, settling.found)
+        report = self._report(space or first, settling.found if space is None else settling.shown())
         return self._settled(report, settling, FIRST_KNOWERS | late, (*GOAL_LANES, *FORMULA_LANES), course)
 
     def _begin(self, settling: Settling, deadline: Deadline) -> None:
@@ -146,12 +148,20 @@ class _Check:
         self._ask_formulas(settling, deadline, _FORMULA_SLICES_SECONDS)
         settling.ask(_asked_of(DEADLOCK_FREE), (), _FIRST_LANES, deadline, _FIRST_SLICES_SECONDS)
 
-    def _ask_formulas(self, settling: Settling, deadline: Deadline, slices_seconds: Sequence[float]) -> None:
+    def _ask_formulas(
+        self,
+        settling: Settling,
+        deadline: Deadline,
+        slices_seconds: Sequence[float],
+        logics: Collection[Logic] = frozenset(Logic),
+    ) -> None:
         """Settle the formulas that do not come down to goals, one after the other, as far as that is quick."""
-        questions = [question_of(query) for query in self.queries if query.formula and not as_goal(query.formula)]
+        queries = [query for query in self.queries if query.formula and not as_goal(query.formula)]
         temporal = [of for of in self.net.properties if isinstance(of, TemporalProperty) and not as_goal(of.formula)]
-        for question in (*map(temporal_question, temporal), *questions):
-            if not deadline.over:
+        asked = [(temporal_question(of), of.logic) for of in temporal]
+        asked += [(question_of(query), Logic(query.kind)) for query in queries]
+        for question, logic in asked:
+            if logic in logics and not deadline.over:
                 settling.ask(_asked_of(question), (), FORMULA_LANES, deadline, slices_seconds)
 
     def by(self, method: Method) -> CheckReport:

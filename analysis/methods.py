@@ -110,7 +110,7 @@ FORMULAS: Final[dict[Logic, dict[Method, Technique[FormulaDecider]]]] = {
     Logic.LTL: {
         Method.ON_THE_FLY: Technique("on the fly", "firable.analysis.temporal.on_the_fly:decide_ltl_on_the_fly")
     },
-    Logic.CTL: {},
+    Logic.CTL: {Method.ON_THE_FLY: Technique("on the fly", "firable.analysis.temporal.by_parts:decide_ctl_by_parts")},
 }
 
 GOAL_LANES: Final[tuple[tuple[Method, ...], ...]] = (

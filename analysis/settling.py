@@ -71,6 +71,14 @@ class Settling:
     course: list[str] = field(default_factory=list)
     findings: dict[str, list[tuple[Formula, Finding]]] = field(default_factory=dict)
 
+    def shown(self) -> dict[str, Verdict]:
+        """What was found but formulas of CTL that nothing shows: sets of markings give a run for most of these."""
+        return {name: verdict for name, verdict in self.found.items() if verdict.witness or not self._branches(name)}
+
+    def _branches(self, name: str) -> bool:
+        found = self._formula_of(name)
+        return found is not None and found[1] is Logic.CTL
+
     def learn(self, of: Method, among: Collection[str], deadline: Deadline) -> None:
         """Take from a technique what it knows at once of these verdicts, by name."""
         missing = {name for name in among if name not in self.found}

@@ -9,8 +9,8 @@ The evidence is what the outermost operators give: a firing sequence to a markin
 cycle, that stays where it should. A negation turns it into that of the dual. What stands below the outermost operator
 is not unfolded: the reader is led to a marking where it does (or does not) hold.
 
-Rejected: local, on-the-fly evaluation of the fixpoints, which looks at less of the space where it is lucky; with the
-whole space at hand sets are faster, and goals that need luck go to the techniques for `EF` and `AG`.
+Where no technique holds all markings, formulas are evaluated locally (`by_parts`, `local`), which looks at less of the
+space where it is lucky; with the whole space at hand sets are faster.
 """
 
 from __future__ import annotations

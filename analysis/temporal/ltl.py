@@ -15,9 +15,8 @@ from typing import TypeVar
 
 from firable.analysis.temporal.automaton import automaton_of
 from firable.analysis.temporal.product import Pairs, Product
-from firable.analysis.temporal.rewriting import FALSE, TRUE, positive, replaced
+from firable.analysis.temporal.rewriting import positive, replaced
 from firable.analysis.temporal.sets import Sets
-from firable.nets.formula import Formula
 from firable.nets.temporal import Temporal, negated
 
 S = TypeVar("S")
@@ -31,14 +30,8 @@ def refuting(sets: Sets[S], formula: Temporal) -> tuple[Product[S], Pairs[S], Pa
     Raises `IncompleteGraph` where the space is not whole, `TooLargeError` and `TimeEndedError` where a limit is met.
     """
     sets.space.require_complete()
-
-    def known(state: Formula) -> Formula:
-        markings = sets.of(state)
-        if sets.empty(markings):
-            return FALSE
-        return TRUE if sets.empty(sets.outside(markings)) else state
-
-    automaton = automaton_of(replaced(positive(negated(formula)), known), deadline=sets.space.deadline)
+    refuting_one = replaced(positive(negated(formula)), sets.constant)
+    automaton = automaton_of(refuting_one, deadline=sets.space.deadline)
     product = Product.of(sets, automaton)
     fair = product.fair()
     if not fair:

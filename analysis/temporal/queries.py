@@ -22,6 +22,7 @@ from firable.analysis.temporal.evidence import refuted, shown
 from firable.analysis.temporal.lasso import TooLongError, accepted_run, satisfies, witness_of
 from firable.analysis.temporal.ltl import refuting
 from firable.analysis.temporal.sets import Sets
+from firable.analysis.temporal.simplifying import simplified
 from firable.nets.formula import Compare, Count, Formula, Not, Sign, format_count
 from firable.nets.net import TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
@@ -158,7 +159,9 @@ def _goal(space: StateSpace[S], goal: Formula, *, holds: bool) -> Answer:
 
 def _ctl(space: StateSpace[S], formula: Temporal) -> Answer:
     ctl = Ctl(Sets(space))
-    holds = space.contains(ctl.of(formula), space.net.initial_marking)
+    space.require_complete()
+    simpler = simplified(formula, ctl.sets.constant)
+    holds = space.contains(ctl.of(simpler), space.net.initial_marking)
 
     def show(hurried: StateSpace[S]) -> Witness | None:
         ctl.sets.space = hurried

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from firable.analysis.spaces.space import StateSpace
-from firable.nets.formula import Formula
+from firable.nets.formula import Constant, Formula
 
 S = TypeVar("S")
 
@@ -55,6 +55,13 @@ class Sets(Generic[S]):
         if formula not in self._known:
             self._known[formula] = self.space.satisfying(formula)
         return self._known[formula]
+
+    def constant(self, formula: Formula) -> Formula:
+        """The constant that a state formula is in all reachable markings, or itself."""
+        markings = self.of(formula)
+        if self.empty(markings):
+            return Constant(value=False)
+        return Constant(value=True) if self.empty(self.outside(markings)) else formula
 
     def before(self, markings: S, by: Iterable[int] | None = None) -> S:
         """EX: a next marking, reached by firing one of `by` if it is given, is in the set."""

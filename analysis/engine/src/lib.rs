@@ -36,6 +36,8 @@ pub mod known;
 #[forbid(unsafe_code)]
 pub mod lasso;
 #[forbid(unsafe_code)]
+pub mod local;
+#[forbid(unsafe_code)]
 pub mod marking;
 #[forbid(unsafe_code)]
 pub mod net;
@@ -93,6 +95,8 @@ mod extension {
     use crate::python::graph::Graph;
     #[pymodule_export]
     use crate::python::lasso::{Lasso, find_lasso};
+    #[pymodule_export]
+    use crate::python::local::{Local, evaluate_locally};
     #[pymodule_export]
     use crate::python::stubborn::{Search, Stubborn};
     use crate::python::{BudgetExceeded, IncompleteGraph};

@@ -11,6 +11,7 @@ pub(crate) mod diagram;
 pub(crate) mod explore;
 pub(crate) mod graph;
 pub(crate) mod lasso;
+pub(crate) mod local;
 pub(crate) mod rows;
 pub(crate) mod stubborn;
 

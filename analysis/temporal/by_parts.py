@@ -1,0 +1,236 @@
+"""CTL without all markings: what can be said of a formula by goals is said by goals, the rest is evaluated locally.
+
+A formula is made simpler (`simplifying`), and each state formula in it that holds always, or never, is found by the
+techniques for goals and replaced. What is left in M0 is a Boolean combination, whose parts are asked one by one, with
+three values. A part that comes down to a goal is asked as one; for `EX` and `AX` the next markings are asked in turn;
+`EF p` and `E[q U p]` fail where a state formula that p implies cannot be reached; and all else is evaluated where it is
+asked (`local`), first of all for a moment, since that often is enough.
+
+Rejected: to reduce the net for the formula, as for a goal. Of the rules of `analysis/reduction` few keep what a formula
+with nested operators says, and its state formulas name most places; the goals, each reduced for by itself, name few.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import Final
+
+from firable.analysis._engine import BudgetExceeded, IncompleteGraph
+from firable.analysis.goal import Finding, Limits
+from firable.analysis.question import Answer, Known
+from firable.analysis.reduction.deciding import decide_by_reduction
+from firable.analysis.temporal.local import METHOD, decide_ctl_on_the_fly
+from firable.analysis.temporal.queries import as_goal
+from firable.analysis.temporal.simplifying import FALSE, TRUE, implied, simplified
+from firable.analysis.walk import decide_by_walk
+from firable.nets.formula import And, Constant, Formula, Not, Or, Start
+from firable.nets.net import Net
+from firable.nets.temporal import (
+    Eventually,
+    Exists,
+    ForAll,
+    Globally,
+    Next,
+    Temporal,
+    TemporalAnd,
+    TemporalNot,
+    TemporalOr,
+    Until,
+)
+from firable.nets.temporal_parts import with_states
+from firable.nets.verdict import Cost, Witness
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import Player, holds_in
+
+_GLANCE: Final = 0.05  # of the time that is left, for a first local evaluation
+_CONSTANTS: Final = 0.5  # for state formulas that hold always or never
+_EACH: Final = 0.1  # for one of these
+_PART: Final = 0.4  # for each part by goals
+_WALK_SECONDS: Final = 0.02
+_NEXT_MAX: Final = 16
+"""Next markings that are asked one by one."""
+
+
+def decide_ctl_by_parts(net: Net, formula: Temporal, limits: Limits) -> Known:
+    """Decide whether M0 satisfies a formula of CTL, under interleaving, gates free.
+
+    Raises `IncompleteGraph` where it is not decided.
+
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> from firable.nets.temporal import parse_temporal
+    >>> net = catalogue_net("one_robot")
+    >>> texts = ("AG EF start", "EF EG not firable(G3)", "AX EF (robot.put_mc and mc.machining)")
+    >>> [decide_ctl_by_parts(net, parse_temporal(text), Limits()).answer.holds for text in texts]
+    [True, False, False]
+    """
+    began = perf_counter()
+    parts = _Parts(net, limits)
+    holds, witness = parts.decided(formula)
+    if holds is None:
+        raise IncompleteGraph("not decided by goals and local evaluation")
+    method = "; ".join(dict.fromkeys(parts.methods)) or "the initial marking"
+    hint = "" if holds or witness else "it was evaluated marking by marking: no run is kept that shows it"
+    return Known(Answer(holds, witness=witness, hint=hint), method, Cost(seconds=perf_counter() - began))
+
+
+@dataclass
+class _Parts:
+    """A net with the state formulas of which it is known whether they are constant, and the methods that said so."""
+
+    net: Net
+    limits: Limits
+    constants: dict[Formula, Formula] = field(default_factory=dict)
+    methods: list[str] = field(default_factory=list)
+
+    def decided(self, formula: Temporal) -> tuple[bool | None, Witness | None]:
+        """The value of a formula in M0, and what shows it where one firing sequence does."""
+        formula = simplified(formula)
+        if (holds := self._locally(formula, _GLANCE)) is not None:
+            return holds, None
+        until = self._part(_CONSTANTS)
+        formula = simplified(formula, lambda state: self._constant(state, until))
+        return self._value(formula)
+
+    def _part(self, share: float) -> Limits:
+        deadline = self.limits.deadline
+        left = deadline.left_seconds
+        return self.limits if left is None else replace(self.limits, deadline=deadline.within(left * share))
+
+    def _holds(self, state: Formula) -> bool:
+        return bool(evaluate(BOOL, self.net, state, holds_in(self.net.initial_marking)))
+
+    def _constant(self, state: Formula, until: Limits) -> Formula:
+        """A constant for a state formula that holds in all reachable markings, or in none."""
+        if isinstance(state, Constant) or until.deadline.over:
+            return state
+        if state not in self.constants:
+            left = until.deadline.left_seconds
+            each = until if left is None else replace(until, deadline=until.deadline.within(left * _EACH))
+            holds = self._holds(state)
+            finding = self._asked(Not(state) if holds else state, each)
+            self.constants[state] = Constant(holds) if finding is not None and not finding.reachable else state
+        return self.constants[state]
+
+    def _asked(self, goal: Formula, limits: Limits) -> Finding | None:
+        """What is found of a goal; None where it is not decided."""
+        quick = replace(limits, deadline=limits.deadline.within(_WALK_SECONDS))
+        for decide, share in ((decide_by_walk, quick), (decide_by_reduction, limits)):
+            try:
+                finding = decide(self.net, goal, share)
+            except (BudgetExceeded, IncompleteGraph):
+                continue
+            if finding.reachable is not None:
+                self.methods.append(finding.method)
+                return finding
+        return None
+
+    def _locally(self, formula: Temporal, share: float) -> bool | None:
+        try:
+            known = decide_ctl_on_the_fly(self.net, formula, self._part(share))
+        except IncompleteGraph:
+            return None
+        self.methods.append(METHOD)
+        return known.answer.holds
+
+    def _value(self, formula: Temporal) -> tuple[bool | None, Witness | None]:
+        match formula:
+            case _ if isinstance(formula, Formula):
+                return self._holds(formula), None
+            case TemporalAnd(operands):
+                return self._first(operands, self._value, decisive=False)
+            case TemporalOr(operands):
+                return self._first(operands, self._value, decisive=True)
+            case TemporalNot(operand):
+                holds, witness = self._value(operand)
+                return None if holds is None else not holds, witness
+        if (goal := as_goal(formula)) is not None:
+            finding = self._asked(goal[0], self._part(_PART))
+            if finding is not None:
+                return finding.reachable is goal[1], finding.witness
+        if (holds := self._bounded(formula)) is None:
+            holds = self._locally(formula, _PART)
+        if holds is None and isinstance(formula, Exists | ForAll) and isinstance(formula.path, Next):
+            holds = self._after(formula.path.operand, every=isinstance(formula, ForAll))
+        return (self._locally(formula, 1.0) if holds is None else holds), None
+
+    def _first(
+        self,
+        operands: Sequence[Temporal],
+        value: Callable[[Temporal], tuple[bool | None, Witness | None]],
+        *,
+        decisive: bool,
+    ) -> tuple[bool | None, Witness | None]:
+        """The first operand with the decisive value decides, else all must be decided; what costs nothing is first."""
+        undecided = False
+        for operand in sorted(operands, key=lambda operand: not isinstance(operand, Formula)):
+            holds, witness = value(operand)
+            if holds is decisive:
+                return holds, witness
+            undecided = undecided or holds is None
+        return None if undecided else not decisive, None
+
+    def _bounded(self, formula: Temporal) -> bool | None:
+        """False where a formula needs a marking that cannot be reached, true where its negation does; else None."""
+        match formula:
+            case Exists(Eventually(operand)) | ForAll(Eventually(operand)):
+                needed, verdict = implied(operand), False
+            case Exists(Until(_, right)) | ForAll(Until(_, right)):
+                needed, verdict = implied(right), False
+            case Exists(Globally(operand)) | ForAll(Globally(operand)):
+                needed, verdict = implied(simplified(TemporalNot(operand))), True
+            case _:
+                return None
+        if needed == TRUE:
+            return None
+        if needed == FALSE:
+            return verdict
+        finding = self._asked(needed, self._part(_PART))
+        return verdict if finding is not None and not finding.reachable else None
+
+    def _after(self, operand: Temporal, *, every: bool) -> bool | None:
+        """Whether every, or some, next marking satisfies a formula that does not speak of M0."""
+        player = Player(self.net)
+        firable = player.may_fire(self.net.initial_marking)
+        if len(firable) > _NEXT_MAX or _speaks_of_start(operand):
+            return None
+        values = []
+        for number, t in enumerate(firable):
+            marking = player.fire(self.net.initial_marking, (t,))
+            places = tuple(replace(place, marked=bool(marking >> i & 1)) for i, place in enumerate(self.net.places))
+            left = self.limits.deadline.left_seconds
+            share = 1 / (len(firable) - number)
+            within = self.limits.deadline if left is None else self.limits.deadline.within(left * share)
+            there = _Parts(
+                replace(self.net, places=places), replace(self.limits, deadline=within), methods=self.methods
+            )
+            holds, _ = there._value(operand)
+            if holds is not every and holds is not None:
+                return holds
+            values.append(holds)
+        return None if None in values else every
+
+
+def _speaks_of_start(formula: Temporal) -> bool:
+    """Whether some state formula in it names M0: a net with another first marking would take that for its own."""
+    found: list[bool] = []
+
+    def look(state: Formula) -> Formula:
+        found.append(_names_start(state))
+        return state
+
+    with_states(formula, look)
+    return any(found)
+
+
+def _names_start(state: Formula) -> bool:
+    match state:
+        case Start():
+            return True
+        case Not(operand):
+            return _names_start(operand)
+        case And(operands) | Or(operands):
+            return any(map(_names_start, operands))
+    return False
