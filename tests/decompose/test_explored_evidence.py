@@ -6,6 +6,7 @@ from functools import cache
 
 import pytest
 from support.bundle_mutants import evidence_mutants, line_mutants, net_mutants, verdict_mutants
+from support.free_parts import freed
 from support.layered_nets import cells_in_a_line
 from support.owned_nets import owned_net
 
@@ -95,6 +96,34 @@ def test_random_protocols_are_proved_and_stated_anew(seed: int, faults: Faults) 
     proof = prove_inductively(built(net, faults), TIMEOUT_MS)
     assert not proof.open_
     assert proof.text == stated_anew(net, faults)
+
+
+@FAULTS
+@pytest.mark.parametrize("net", [catalogue_net("one_robot"), cells_in_a_line(), *map(owned_net, range(8))])
+def test_protocols_with_free_parts_are_proved_and_stated_anew(net: Net, faults: Faults) -> None:
+    decomposition = freed(split(net))
+    proof = prove_inductively(protocol_net(decomposition, PROTOCOL, faults), TIMEOUT_MS)
+    assert not proof.open_
+    assert proof.text == StatedAnew(Voting(Cut(net), bool(faults), frozenset(decomposition.free))).text
+
+
+def test_that_votes_stand_is_given_and_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`l` closes the gate of the free part of `G` when the token is on `a.x`, which no local invariant tells."""
+    marked = {"a.i", "a.g", "b.p"}
+    names = ("a.i", "a.j", "a.x", "a.g", "a.h", "b.p", "b.q")
+    transitions = (
+        Transition("G", ("a.i", "b.p"), ("a.j", "b.q"), ("a.g",)),
+        Transition("m", ("a.j",), ("a.x",)),
+        Transition("l", ("a.x", "a.g"), ("a.h",)),
+    )
+    places = tuple(Place(name, name[0], name in marked) for name in names)
+    decomposition = freed(split(Net("given", places, transitions, (), (Controller("a"), Controller("b")))))
+    assert decomposition.free == (("G", "a"), ("G", "b"))
+    protocol = protocol_net(decomposition)
+    assert "(assert |votes stand|)" in prove_inductively(protocol, TIMEOUT_MS).text
+    assert not prove_inductively(protocol, TIMEOUT_MS).open_
+    monkeypatch.setattr("firable.decompose.protocol.inductive_script.persistent", lambda _: iter(()))
+    assert prove_inductively(protocol, TIMEOUT_MS).open_ >= {"keeps"}
 
 
 @pytest.mark.parametrize("name", ["philosophers-2", "workshop-1"])

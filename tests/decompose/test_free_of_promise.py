@@ -8,15 +8,19 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from support.examples import examples
+from support.free_parts import parts_of
 from support.owned_nets import owned_nets
 from support.promising import Promising
 from support.reference import load_net
 
+from firable.decompose.protocol.exploring import explore_protocol
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import persistence
+from firable.decompose.verification.free_parts import _against
 from firable.nets.diagnostics import InputError
 from firable.nets.knowledge import undisturbing
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.nets.verdict import Status
 
 SMALL = ["local_conflict", "local_gate", "local_output_conflict", "no_trouble", "read_before_order", "remote_gate"]
 
@@ -112,3 +116,35 @@ def test_a_part_that_clears_a_completion_which_another_reads_must_promise() -> N
         assert ("t1-11" in free) == bool(reads)
         assert goes_wrong(net, ("t1-11",)) == (not reads)
         assert not goes_wrong(net, free)
+
+
+def kept_open() -> Net:
+    """`l` would close the gate that `G` reads, and is kept from it by the completion that `G` waits for, alone."""
+    places = (
+        Place("a.i", "a", marked=True),
+        Place("a.p", "a", command=Command("m", "GO"), completion="a.done"),
+        *(Place("a.r", "a"), Place("a.g", "a", marked=True), Place("a.h", "a")),
+        *(Place("b.p", "b", marked=True), Place("b.q", "b")),
+    )
+    done, undone = ExternalGate("a.done"), ExternalGate("a.done", wanted=False)
+    transitions = (
+        Transition("start", ("a.i",), ("a.p",)),
+        Transition("G", ("a.p", "b.p"), ("a.r", "b.q"), ("a.g",), external=(done,)),
+        Transition("l", ("a.g",), ("a.h",), external=(undone,)),
+    )
+    signals = (Signal("a.done", "a", kind=SignalKind.COMPLETION),)
+    return Net("kept open", places, transitions, signals, (A, B))
+
+
+def test_a_part_whose_gate_is_kept_open_by_a_completion_alone_promises() -> None:
+    """Its yes is persistent; but the net of the protocol has no signals, and there it would be taken back."""
+    decomposition = split(kept_open())
+    found = persistence(decomposition)
+    assert found.of("t1-11").holds
+    assert found.free_of_promise == ("t2-12",)
+    subnet = decomposition.subnet("a")
+    assert list(_against(subnet, subnet.transition("t1-11"))) == [
+        "'a.done' alone keeps 'l' from closing its gate 'a.g'"
+    ]
+    assert explore_protocol(parts_of(decomposition, "t2-12")).refines is Status.PROVED
+    assert explore_protocol(parts_of(decomposition, "t1-11")).refines is Status.VIOLATED

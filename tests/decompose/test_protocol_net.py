@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
+from support.free_parts import GATE_CLOSED, OUTPUT_READ, freed, parts_of
 from support.owned_nets import owned_nets
 from support.reference import load_net
 from support.timed_nets import timed_nets
@@ -63,6 +64,47 @@ def test_partition_refinement_finds_the_same_bisimulation(name: str) -> None:
     central = explore(net)
     assert branching_bisimilar(found.space, central, visible(found.protocol), labels, divergence=False)
     assert not branching_bisimilar(found.space, central, visible(found.protocol), labels, divergence=True)
+
+
+@pytest.mark.parametrize("faults", [NO_FAULTS, ONE_OF_EACH, ANY_FAULTS], ids=["none", "one of each", "any"])
+@pytest.mark.parametrize("name", [*SMALL, "no_trouble"])
+def test_protocol_with_free_parts_refines_and_loses_nothing(name: str, faults: Faults) -> None:
+    found = explore_protocol(freed(split(load_net(name))), PROTOCOL, faults)
+    assert {*(v.status for v in found.safety), found.complete.status, found.one_token.status} == {Status.PROVED}
+
+
+@pytest.mark.parametrize("name", ["ring", "local_gate"])
+def test_partition_refinement_finds_the_same_bisimulation_with_free_parts(name: str) -> None:
+    decomposition = freed(split(load_net(name)))
+    found = explore_protocol(decomposition)
+    assert isinstance(found.space, ReachabilityGraph)
+    labels = {t.name: t.name for t in decomposition.net.transitions}
+    central = explore(decomposition.net)
+    assert branching_bisimilar(found.space, central, visible(found.protocol), labels, divergence=False)
+
+
+@pytest.mark.parametrize("net", [GATE_CLOSED, OUTPUT_READ], ids=["closed", "read"])
+def test_part_that_is_free_and_may_not_be_is_refuted(net: Net) -> None:
+    found = explore_protocol(parts_of(split(net), "t1-11"))
+    assert found.refines is Status.VIOLATED
+    assert found.counterexample is not None
+    assert any("votes yes on G, and promises nothing" in event for event in found.events(found.counterexample))
+
+
+def test_transition_of_free_parts_is_asked_of_nobody() -> None:
+    protocol = protocol_net(freed(split(load_net("ring"))))
+    kinds = {step.kind for step in protocol.steps.values()}
+    assert kinds.isdisjoint({"ask", "request", "promise", "give-up", "release"})
+    assert {"stand", "hear", "decide", "order", "apply", "note", "close"} <= kinds
+    assert not any(name.startswith(("asked/", "promised/")) for name in protocol.net.place_index)
+
+
+@examples(6)
+@given(st.one_of(owned_nets(), timed_nets()))
+def test_protocol_of_random_nets_with_free_parts_refines_and_loses_nothing(net: Net) -> None:
+    found = explore_protocol(freed(split(net)), limits=Limits(Deadline.after(2)))
+    assert Status.VIOLATED not in statuses(found)
+    assert found.space.bound or statuses(found) == {Status.PROVED}
 
 
 def test_partition_refinement_and_closures_both_see_what_a_dead_controller_loses() -> None:
