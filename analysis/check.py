@@ -5,7 +5,8 @@
 1. *Explore.* Most cells have few markings: the explicit engine looks at up to 200,000 of them first, alone, which takes
    a moment and gives the shortest witnesses. What it finds whole is reported the same way every time.
 2. *Hold all markings* by whichever of the explicit engine and the decision diagram is first, side by side. Beside
-   both, quick techniques begin with the third stage, because how large the space is cannot be seen beforehand.
+   both, after a moment, quick techniques begin with the third stage, because how large the space is cannot be seen
+   beforehand. The moment is for nets that are done within it: solvers take longer to load.
 3. *Settle the verdicts one by one* (`firable.analysis.settling`), where no technique could hold all markings: by
    techniques that know some at once, by a race of techniques for those that come down to goals, and by what follows.
    Where it was room that the explicit engine wanted for, a compact search tries to see all markings without a graph.
@@ -58,6 +59,8 @@ from firable.semantics.trace import Discipline
 
 FIRST_MARKINGS: Final = 200_000
 """How many markings `auto` explores before it lets techniques race."""
+_ALONE_SECONDS: Final = 0.1
+"""How long techniques that hold all markings are alone, before others begin beside them."""
 _SPACES_SHARE: Final = 0.6  # of the time, for techniques that hold all markings
 _KNOWING_SECONDS_MAX: Final = 30.0  # for what is known at once
 _COUNTING_SHARE: Final = 0.5  # of the time that is left, for all markings without a graph
@@ -143,6 +146,8 @@ class _Check:
 
     def _begin(self, settling: Settling, deadline: Deadline) -> None:
         """Settle, beside the search for all markings, what others follow from, by quick techniques."""
+        if deadline.cancelled is not None and deadline.cancelled.wait(_ALONE_SECONDS):
+            return
         for of, share in FIRST_KNOWERS.items():
             settling.learn(of, _LEARNT_FIRST, _moment(deadline, share))
         self._ask_formulas(settling, deadline, _FORMULA_SLICES_SECONDS)

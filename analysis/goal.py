@@ -13,10 +13,13 @@ found it (where the technique has one). Not decided is an answer too, with how f
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from firable.analysis.deadline import Deadline
-from firable.analysis.evidence.certificate import Certificate
 from firable.nets.verdict import Cost, Witness
+
+if TYPE_CHECKING:
+    from firable.analysis.evidence.certificate import Certificate
 
 
 @dataclass(frozen=True, slots=True)

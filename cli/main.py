@@ -4,7 +4,8 @@ Exit codes: 0 all hold, 1 a property is violated, 2 usage or input error, 3 unkn
 Unknown never passes. Whatever an input does, the answer is one clear error; a traceback is our own fault and shown only
 to who asks for it (`--traceback`).
 
-Every command imports what it needs when it runs: `firable --help` loads neither pydantic nor a solver.
+A command is loaded when it is named, and imports what it needs when it runs: `firable --help` loads neither pydantic
+nor a solver.
 """
 
 from __future__ import annotations
@@ -13,32 +14,11 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
 import click
 
 from firable import __version__
-from firable.cli import (
-    bundle,
-    check,
-    ci,
-    convert,
-    draw,
-    explain,
-    live_io,
-    operate,
-    prove,
-    refine,
-    rehearse,
-    replay,
-    run,
-    schema,
-    sign,
-    sim,
-    split,
-    takeover,
-    verify,
-)
-from firable.cli.lsp import command as lsp
 from firable.cli.report import ExitCode, exit_code_of, worst
 from firable.cli.text import show_errors
 
@@ -59,7 +39,48 @@ EXTRAS = {
 }
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+COMMANDS = {
+    "bundle": "bundle.bundle",
+    "check": "check.check",
+    "ci": "ci.ci",
+    "convert": "convert.convert",
+    "draw": "draw.draw",
+    "explain": "explain.explain",
+    "io": "live_io.live_io",
+    "lsp": "lsp.command.lsp",
+    "operate": "operate.operate",
+    "prove": "prove.prove",
+    "refine": "refine.refine",
+    "rehearse": "rehearse.rehearse",
+    "replay": "replay.replay",
+    "run": "run.run",
+    "schema": "schema.schema",
+    "sign": "sign.sign",
+    "sim": "sim.sim",
+    "split": "split.split",
+    "takeover": "takeover.takeover",
+    "verify": "verify.verify",
+}
+"""The commands, each with its function in `firable.cli`."""
+
+
+class _Commands(click.Group):
+    """Commands that are loaded when they are named: all of them take longer to load than a small net to check."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - as click calls it
+        """The names of all commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - as click calls it
+        """The command of a name, if there is one."""
+        if cmd_name not in COMMANDS:
+            return None
+        module, _, function = COMMANDS[cmd_name].rpartition(".")
+        command: click.Command = getattr(import_module(f"firable.cli.{module}"), function)
+        return command
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, message="%(prog)s %(version)s")
 @click.option("--traceback", is_flag=True, help="Show the traceback of an internal error.")
 @click.pass_context
@@ -74,31 +95,6 @@ def firable(context: click.Context, traceback: bool) -> None:  # noqa: ARG001 - 
     """
     if os.environ.get("NO_COLOR"):
         context.color = False
-
-
-for _command in (
-    check.check,
-    refine.refine,
-    split.split,
-    prove.prove,
-    bundle.bundle,
-    sign.sign,
-    run.run,
-    operate.operate,
-    takeover.takeover,
-    replay.replay,
-    rehearse.rehearse,
-    sim.sim,
-    live_io.live_io,
-    verify.verify,
-    draw.draw,
-    convert.convert,
-    explain.explain,
-    ci.ci,
-    lsp.lsp,
-    schema.schema,
-):
-    firable.add_command(_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

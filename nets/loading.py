@@ -2,7 +2,8 @@
 
 A bundle is known by its first bytes, which no text begins with. Of the text formats the extension tells which it is;
 where it does not, the first character does, because XML begins with `<` and a net file does not. Guessing from the
-content alone would let a broken PNML file be reported as broken YAML.
+content alone would let a broken PNML file be reported as broken YAML. A reader is loaded for who has such a file: the
+document that net files are checked by takes as long to load as a small net to check.
 """
 
 from __future__ import annotations
@@ -11,15 +12,14 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from firable.nets import pnml, text
-from firable.nets.archive import SIGNATURE
-from firable.nets.bundle import read_bundle
-from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.net import Net
-from firable.nets.text_positions import Positions
+
+if TYPE_CHECKING:
+    from firable.nets.decomposition import Decomposition
+    from firable.nets.net import Net
+    from firable.nets.text_positions import Positions
 
 PNML_SUFFIXES: Final = frozenset({".pnml", ".xml", ".tapn"})
 TEXT_SUFFIXES: Final = frozenset({".yaml", ".yml"})
@@ -55,15 +55,23 @@ def load(path: str | Path) -> Loaded:
 
     Raises `InputError` as `read_net`, `read_pnml` and `read_bundle` do.
     """
+    from firable.nets.archive import SIGNATURE
+
     head = _head(path)
     if head.startswith(SIGNATURE):
+        from firable.nets.bundle import read_bundle
+
         bundle = read_bundle(path)
         return Loaded(bundle.net, decomposition=bundle.decomposition)
     suffix = Path(path).suffix.lower()
     if suffix in PNML_SUFFIXES or (suffix not in TEXT_SUFFIXES and _looks_like_xml(head)):
-        imported = pnml.read_pnml(path)
+        from firable.nets.pnml import read_pnml
+
+        imported = read_pnml(path)
         return Loaded(imported.net, imported.notes, renamed=imported.renamed)
-    net, positions = text.read_positioned(path)
+    from firable.nets.text import read_positioned
+
+    net, positions = read_positioned(path)
     return Loaded(net, positions=positions)
 
 

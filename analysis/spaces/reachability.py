@@ -1,25 +1,22 @@
 """The reachability graph of a net, explored by the engine and spoken of in the net's own names.
 
 Everything that the explicit method decides is a question to this graph. The Rust engine finds the markings, breadth
-first, and answers questions of graph theory; here markings get their names, state formulas become columns (one Boolean
-for each marking, evaluated by the one text of the firing rule in `semantics`), and a marking becomes a witness.
+first, and answers questions of graph theory; here markings get their names, state formulas become columns
+(`columns.py`, loaded with numpy where the first is asked for), and a marking becomes a witness.
 
 Every witness is replayed by the reference player before anyone sees it. The engine is fast and therefore not trusted:
 a wrong path must become an internal error, never a counterexample that misleads an engineer.
 
 Columns are computed in chunks, because a column for each place of ten million markings takes more memory than the
-graph. The rejected alternative, evaluating formulas in Rust, would be a second text of the firing rule to keep equal.
+graph.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Final
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any, Final
 
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
@@ -34,38 +31,20 @@ from firable.semantics.firing import Valuation
 from firable.semantics.player import FiringSet
 from firable.semantics.trace import Discipline
 
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from firable.analysis.spaces.columns import Column, Components
+
 __all__ = [
-    "COLUMNS",
     "Budget",
     "BudgetExceeded",
-    "Column",
-    "Components",
     "IncompleteGraph",
     "ReachabilityGraph",
     "explore",
-    "first",
-    "indexes",
 ]
 
-Column = npt.NDArray[np.bool_]
-"""A set of markings of a graph: one Boolean for each index."""
-
-
-class _Columns(Bitwise[Any]):
-    """Columns count tokens by adding, which is faster than by Boolean terms."""
-
-    def at_most(self, terms: Sequence[tuple[Any, int]], bound: int, /) -> Any:
-        """Where the weights of the terms that are true sum up to at most the bound."""
-        total = np.int64(0)
-        for term, weight in terms:
-            total = total + np.multiply(term, np.int64(weight))
-        return total <= bound
-
-
-COLUMNS: Final[Bitwise[Any]] = _Columns(true=np.True_, false=np.False_)
-"""The algebra of columns: numpy arrays of Booleans, with numpy's own scalars for true and false."""
-
-NO_COMPONENT: Final = 2**32 - 1
 _CHUNK: Final = 1 << 16
 _METHODS: Final = {
     Discipline.INTERLEAVING: "reachability graph, interleaving",
@@ -90,7 +69,7 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class ReachabilityGraph(Derived[Column]):
+class ReachabilityGraph(Derived["Column"]):
     """The markings reachable from M0 under one discipline, numbered breadth first; M0 is 0.
 
     A marking with a lower number is never farther from M0, so the lowest number of a set is its shortest witness. What
@@ -107,7 +86,9 @@ class ReachabilityGraph(Derived[Column]):
     @cached_property
     def algebra(self) -> Bitwise[Column]:
         """The sets of markings as a Boolean algebra; true is all of them."""
-        return Bitwise(true=np.ones(self.n_markings, dtype=np.bool_), false=self.none())
+        from firable.analysis.spaces.columns import constant
+
+        return Bitwise(true=constant(self.n_markings, holds=True), false=self.none())
 
     @property
     def method(self) -> str:
@@ -175,19 +156,25 @@ class ReachabilityGraph(Derived[Column]):
 
     @cached_property
     def _words(self) -> npt.NDArray[np.uint64]:
-        return np.frombuffer(self.engine.markings_bytes(), "<u8").reshape(self.n_markings, self.engine.words)
+        from firable.analysis.spaces.columns import words_of
+
+        return words_of(self.engine.markings_bytes(), self.engine.words)
 
     def where(self, term: Callable[[BooleanAlgebra[Any], Valuation[Any]], Any]) -> Column:
         """The value of a Boolean term at every marking; `term` gets the algebra and the reader of places."""
-        result = np.empty(self.n_markings, dtype=np.bool_)
+        from firable.analysis.spaces.columns import COLUMNS, reader
+
+        result = self.none()
         for start in range(0, self.n_markings, _CHUNK):
             rows = self._words[start : start + _CHUNK]
-            result[start : start + _CHUNK] = term(COLUMNS, _reader(rows))
+            result[start : start + _CHUNK] = term(COLUMNS, reader(rows))
         return result
 
     def none(self) -> Column:
         """The empty set of markings."""
-        return np.zeros(self.n_markings, dtype=np.bool_)
+        from firable.analysis.spaces.columns import constant
+
+        return constant(self.n_markings, holds=False)
 
     @property
     def initial(self) -> Column:
@@ -210,7 +197,9 @@ class ReachabilityGraph(Derived[Column]):
 
     def count(self, markings: Column) -> int:
         """How many markings a set holds."""
-        return int(np.count_nonzero(markings))
+        from firable.analysis.spaces.columns import size
+
+        return size(markings)
 
     def successors(self, index: int) -> list[tuple[FiringSet, int]]:
         """What may fire in a marking, and the number of the marking after it."""
@@ -265,21 +254,22 @@ class ReachabilityGraph(Derived[Column]):
 
     def components(self, within: Column | None = None) -> Components:
         """The strongly connected components of the graph, or of its part within a set of markings."""
+        from firable.analysis.spaces.columns import Components, column, numbers
+
         found = self.engine.components(None if within is None else within.tobytes(), **self._limits)
-        return Components(
-            np.frombuffer(found.of(), "<u4"),
-            np.frombuffer(found.sizes(), "<u4"),
-            _column(found.bottom()),
-            _column(found.trivial()),
-        )
+        return Components(numbers(found.of()), numbers(found.sizes()), column(found.bottom()), column(found.trivial()))
 
     def edges(self) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint32]]:
         """The edges as compressed rows: the offset of each marking's row, and the targets."""
+        from firable.analysis.spaces.columns import numbers, words_of
+
         offsets, targets = self.engine.edges(**self._limits)
-        return np.frombuffer(offsets, "<u8"), np.frombuffer(targets, "<u4")
+        return words_of(offsets, 1)[:, 0], numbers(targets)
 
     def witness(self, targets: Column, note: str = "") -> Witness | None:
         """A shortest firing sequence from M0 into a set, replayed; None where no marking found is in it."""
+        from firable.analysis.spaces.columns import first
+
         index = first(targets)
         return None if index is None else self.witness_at(index, note)
 
@@ -290,28 +280,6 @@ class ReachabilityGraph(Derived[Column]):
         """
         firings = [tuple(fired) for fired in self.engine.path_to(index)]  # what was found is shown, however late it is
         return self.witnesses.replayed(firings, self.marking(index), note)
-
-
-@dataclass(frozen=True, slots=True)
-class Components:
-    """Strongly connected components: the component of each marking, and for each its size and kind.
-
-    `of` is `NO_COMPONENT` outside the set that was asked for. No edge leaves a `bottom` component; no run can stay in
-    a `trivial` one.
-    """
-
-    of: npt.NDArray[np.uint32]
-    sizes: npt.NDArray[np.uint32]
-    bottom: Column
-    trivial: Column
-
-    @property
-    def nontrivial(self) -> Column:
-        """The markings on some cycle within the set."""
-        inside = self.of != NO_COMPONENT
-        found = np.zeros(len(self.of), dtype=np.bool_)
-        found[inside] = ~self.trivial[self.of[inside]]
-        return found
 
 
 def explore(
@@ -371,24 +339,7 @@ def _explored(
     )
 
 
-def _reader(rows: npt.NDArray[np.uint64]) -> Callable[[int], Column]:
-    def holds(place: int) -> Column:
-        bit: Column = (rows[:, place // 64] >> np.uint64(place % 64) & np.uint64(1)).astype(np.bool_)
-        return bit
-
-    return holds
-
-
 def _column(bitmap: bytes) -> Column:
-    return np.frombuffer(bitmap, np.uint8).astype(np.bool_)
+    from firable.analysis.spaces.columns import column
 
-
-def first(column: Column) -> int | None:
-    """The lowest marking of a set, which is one nearest to M0; None where the set is empty."""
-    index = int(np.argmax(column)) if len(column) else 0
-    return index if len(column) and column[index] else None
-
-
-def indexes(column: Column) -> Iterator[int]:
-    """The numbers of the markings of a set, ascending."""
-    return (int(i) for i in np.flatnonzero(column))
+    return column(bitmap)

@@ -31,14 +31,8 @@ import numpy.typing as npt
 
 from firable.analysis.compiled import engine_limits
 from firable.analysis.question import Answer, no, yes
-from firable.analysis.spaces.reachability import (
-    NO_COMPONENT,
-    Column,
-    Components,
-    ReachabilityGraph,
-    first,
-    indexes,
-)
+from firable.analysis.spaces.columns import NO_COMPONENT, Column, Components, first, indexes
+from firable.analysis.spaces.reachability import ReachabilityGraph
 from firable.analysis.spaces.space import S, StateSpace, WitnessError
 from firable.analysis.verdicts.fair_runs import fair_runs
 from firable.nets.formula import Formula, format_formula

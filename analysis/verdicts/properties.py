@@ -16,7 +16,6 @@ from typing import Any
 from firable.analysis.question import Answer, Question, no, yes
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.temporal.queries import decide_temporal
-from firable.analysis.verdicts.leads_to import leads_to
 from firable.nets.formula import Not, format_formula
 from firable.nets.net import Fairness, Property, PropertyKind, TemporalProperty
 from firable.nets.verdict import Verdict
@@ -64,6 +63,8 @@ def decide_property(space: StateSpace[Any], of: Property) -> Verdict:
             case PropertyKind.ALWAYS_POSSIBLE:
                 return _always_possible(space, of)
             case PropertyKind.LEADS_TO:
+                from firable.analysis.verdicts.leads_to import leads_to
+
                 return leads_to(space, of)
 
     return Question(f"property.{of.name}", statement(of)).ask(space, find)

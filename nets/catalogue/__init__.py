@@ -16,12 +16,10 @@ from typing import TYPE_CHECKING
 
 from firable.nets.catalogue.families import FAMILIES, family_net
 from firable.nets.net import Net
-from firable.nets.tasks.model import Task
-from firable.nets.tasks.text import read_tasks
-from firable.nets.text import read_net
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # what reads files is loaded for who reads one: a net of a family is in none
     from firable.nets.machines.plant_file import PlantModel
+    from firable.nets.tasks.model import Task
 
 __all__ = [
     "FAMILIES",
@@ -80,10 +78,14 @@ def catalogue_tasks() -> Mapping[str, Task]:
     >>> sorted(catalogue_tasks())
     ['carry_in', 'carry_out', 'load', 'process', 'unload']
     """
+    from firable.nets.tasks.text import read_tasks
+
     files = sorted(Path(__file__).parent.glob("*.tasks.yaml"))
     return {name: task for file in files for name, task in read_tasks(file).items()}
 
 
 @cache
 def _cell(name: str) -> Net:
+    from firable.nets.text import read_net
+
     return read_net(catalogue_path(name))

@@ -12,7 +12,8 @@ from support.ring_nets import ring_nets
 
 from firable.analysis.check import check
 from firable.analysis.spaces import reachability
-from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore, first
+from firable.analysis.spaces.columns import first
+from firable.analysis.spaces.reachability import Budget, IncompleteGraph, explore
 from firable.analysis.spaces.space import WitnessError
 from firable.nets.formula import parse_formula
 from firable.nets.net import Net, Place, Transition

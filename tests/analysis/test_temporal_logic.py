@@ -10,7 +10,8 @@ from support.naive_space import Markings, NaiveSpace
 from support.ring_nets import ring_nets
 from support.temporal_formulas import ctl_formulas, ltl_formulas
 
-from firable.analysis.spaces.reachability import Column, ReachabilityGraph, explore, indexes
+from firable.analysis.spaces.columns import Column, indexes
+from firable.analysis.spaces.reachability import ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.temporal.ctl import Ctl

@@ -13,7 +13,7 @@ import jsonschema
 import pytest
 from support.published import COORDINATOR_TABLE
 
-from firable.cli.main import main
+from firable.cli.main import COMMANDS, main
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
@@ -288,3 +288,37 @@ def test_prove_tells_the_side_conditions_of_the_protocol_theorem_in_one_line(
     assert [(v["name"].rpartition(".")[2], v["status"]) for v in side] == [
         (name, "proved") for name in ("owner", "parts", "locals", "strangers", "gates", "start", "free")
     ]
+
+
+@pytest.mark.parametrize(
+    ("done", "left_out"),
+    [
+        ("main(['--help'])", {"pydantic", "numpy", "networkx", "z3"}),
+        (
+            "main(['check', 'catalogue:philosophers-8', '--no-cache'])",
+            {"pydantic", "networkx", "z3", "firable.cli.run"},
+        ),
+        (
+            "explore(family_net('philosophers-8')).n_markings",
+            {"pydantic", "numpy", "networkx", "z3", "firable.nets.text"},
+        ),
+    ],
+)
+def test_what_is_not_needed_is_not_loaded(done: str, left_out: set[str]) -> None:
+    code = (
+        "import sys, firable.analysis.check\n"
+        "from firable.analysis.spaces.reachability import explore\n"
+        "from firable.cli.main import main\n"
+        "from firable.nets.catalogue import family_net\n"
+        f"{done}\n"
+        "sys.stderr.write(' '.join(sys.modules))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert left_out & set(run.stderr.split()) == set()
+
+
+def test_every_command_is_loaded_by_its_name(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in COMMANDS:
+        assert main([name, "--help"]) == 0
+        assert capsys.readouterr().out.startswith(f"Usage: firable {name}")
+    assert sorted(COMMANDS) == list(COMMANDS)

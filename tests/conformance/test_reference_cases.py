@@ -13,8 +13,9 @@ import pytest
 from support.reference import Case, cases, local
 
 from firable.analysis.report import self_loops
+from firable.analysis.spaces.columns import Column
 from firable.analysis.spaces.equivalence import isomorphic
-from firable.analysis.spaces.reachability import Column, ReachabilityGraph, explore
+from firable.analysis.spaces.reachability import ReachabilityGraph, explore
 from firable.analysis.verdicts.behaviour import Behaviour
 from firable.analysis.verdicts.commands import entries
 from firable.analysis.verdicts.conflicts import ConflictAnalysis, Pair, Steps

@@ -12,7 +12,8 @@ from support.lively_nets import lively_net
 from firable.analysis import _engine
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.compiled import nodes_of, rows
-from firable.analysis.spaces.reachability import ReachabilityGraph, explore, first
+from firable.analysis.spaces.columns import first
+from firable.analysis.spaces.reachability import ReachabilityGraph, explore
 from firable.analysis.spaces.space import Witnesses
 from firable.nets.catalogue import family_net
 from firable.nets.formula import And, Formula, Holds

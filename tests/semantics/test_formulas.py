@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from firable.analysis.spaces.reachability import COLUMNS
+from firable.analysis.spaces.columns import COLUMNS
 from firable.nets.formula import (
     And,
     Compare,

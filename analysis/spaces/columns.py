@@ -1,0 +1,106 @@
+"""Columns: sets of markings of an explored graph, one Boolean for each index, as arrays of numpy.
+
+State formulas become columns, evaluated by the one text of the firing rule in `semantics`. They stand apart from the
+graph (`reachability.py`), because numpy takes longer to load than most nets to explore, and a graph that is only
+counted, or that turns out to be too large, needs none. The rejected alternative, to evaluate formulas in Rust, would be
+a second text of the firing rule to keep equal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from firable.semantics.algebra import Bitwise
+
+Column = npt.NDArray[np.bool_]
+"""A set of markings of a graph: one Boolean for each index."""
+
+
+class _Columns(Bitwise[Any]):
+    """Columns count tokens by adding, which is faster than by Boolean terms."""
+
+    def at_most(self, terms: Sequence[tuple[Any, int]], bound: int, /) -> Any:
+        """Where the weights of the terms that are true sum up to at most the bound."""
+        total = np.int64(0)
+        for term, weight in terms:
+            total = total + np.multiply(term, np.int64(weight))
+        return total <= bound
+
+
+COLUMNS: Final[Bitwise[Any]] = _Columns(true=np.True_, false=np.False_)
+"""The algebra of columns: numpy arrays of Booleans, with numpy's own scalars for true and false."""
+
+NO_COMPONENT: Final = 2**32 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Components:
+    """Strongly connected components: the component of each marking, and for each its size and kind.
+
+    `of` is `NO_COMPONENT` outside the set that was asked for. No edge leaves a `bottom` component; no run can stay in
+    a `trivial` one.
+    """
+
+    of: npt.NDArray[np.uint32]
+    sizes: npt.NDArray[np.uint32]
+    bottom: Column
+    trivial: Column
+
+    @property
+    def nontrivial(self) -> Column:
+        """The markings on some cycle within the set."""
+        inside = self.of != NO_COMPONENT
+        found = np.zeros(len(self.of), dtype=np.bool_)
+        found[inside] = ~self.trivial[self.of[inside]]
+        return found
+
+
+def words_of(markings: bytes, words: int) -> npt.NDArray[np.uint64]:
+    """Markings of so many words each, end to end, as rows."""
+    return np.frombuffer(markings, "<u8").reshape(-1, words)
+
+
+def reader(rows: npt.NDArray[np.uint64]) -> Callable[[int], Column]:
+    """What reads a place in each of some markings."""
+
+    def holds(place: int) -> Column:
+        bit: Column = (rows[:, place // 64] >> np.uint64(place % 64) & np.uint64(1)).astype(np.bool_)
+        return bit
+
+    return holds
+
+
+def column(bitmap: bytes) -> Column:
+    """The column of a byte for each marking."""
+    return np.frombuffer(bitmap, np.uint8).astype(np.bool_)
+
+
+def constant(n_markings: int, *, holds: bool) -> Column:
+    """All markings or none."""
+    return np.full(n_markings, holds, dtype=np.bool_)
+
+
+def numbers(found: bytes) -> npt.NDArray[np.uint32]:
+    """Numbers of 32 bits, end to end."""
+    return np.frombuffer(found, "<u4")
+
+
+def size(markings: Column) -> int:
+    """How many markings a set holds."""
+    return int(np.count_nonzero(markings))
+
+
+def first(markings: Column) -> int | None:
+    """The lowest marking of a set, which is one nearest to M0; None where the set is empty."""
+    index = int(np.argmax(markings)) if len(markings) else 0
+    return index if len(markings) and markings[index] else None
+
+
+def indexes(markings: Column) -> Iterator[int]:
+    """The numbers of the markings of a set, ascending."""
+    return (int(i) for i in np.flatnonzero(markings))
