@@ -9,9 +9,10 @@ use crate::edges::Edges;
 use crate::exact::ROOM;
 use crate::explore::Space;
 use crate::fan::Fan;
+use crate::indexes::Asking;
 use crate::marking::{Width, transpose};
+use crate::region::Region;
 use crate::span::Span;
-use crate::table::NONE;
 use crate::with_width;
 
 /// Successors as compressed rows.
@@ -19,8 +20,8 @@ use crate::with_width;
 pub struct Csr {
     /// Where the row of each marking begins; one more than there are markings.
     pub offsets: Vec<u64>,
-    /// Targets, row by row, in the order of the edges.
-    pub targets: Vec<u32>,
+    /// Targets, row by row, in the order of the edges; of a whole graph in huge pages.
+    pub targets: Region<u32>,
 }
 
 impl Csr {
@@ -29,6 +30,17 @@ impl Csr {
         let count = space.len();
         let inside = |index: u32| within.is_none_or(|within| within[index as usize] != 0);
         let mut offsets = memory.filled(0u64, count + 1)?;
+        let keyed = space.set.span().filter(|_| !space.step && within.is_none() && space.stop.is_none());
+        if let Some(span) = keyed {
+            space.index(watch)?;
+            let edges = usize::try_from(space.edges).map_err(|_| Stop::Memory)?;
+            memory.claim(edges.checked_mul(4).ok_or(Stop::Memory)?)?;
+            let mut targets = Region::zeroed(edges).ok_or(Stop::Memory)?;
+            with_width!(space.net.words, width => {
+                fill_by_key(width, space, span, &mut offsets, targets.all_mut(), watch)
+            })?;
+            return Ok(Csr { offsets, targets });
+        }
         // Of the whole graph the number of edges is known, so nothing is claimed twice.
         let mut targets: Vec<u32> = Vec::new();
         if within.is_none() {
@@ -54,30 +66,25 @@ impl Csr {
             for index in 0..count {
                 offsets[index + 1] += offsets[index];
             }
-        } else if let (Some(span), None, None) = (space.set.span(), within, space.stop) {
-            space.index(watch)?;
-            with_width!(space.net.words, width => {
-                fill_by_key(width, space, span, &mut offsets, &mut targets, watch)
-            })?;
         } else {
             with_width!(space.net.words, width => {
                 fill(width, space, within, &mut offsets, &mut targets, memory, watch)
             })?;
         }
-        Ok(Csr { offsets, targets })
+        Ok(Csr { offsets, targets: Region::Heap(targets) })
     }
 
     /// The successors of a marking.
     pub fn targets(&self, index: u32) -> &[u32] {
-        &self.targets[self.offsets[index as usize] as usize..self.offsets[index as usize + 1] as usize]
+        &self.targets.all()[self.offsets[index as usize] as usize..self.offsets[index as usize + 1] as usize]
     }
 
     /// The same edges by their target.
     pub fn reversed(self, memory: &Memory, watch: &mut Watch<'_>) -> Result<Csr, Stop> {
         let count = self.offsets.len() - 1;
         let mut offsets = memory.filled(0u64, count + 2)?;
-        let mut sources = memory.filled(0u32, self.targets.len())?;
-        for &target in &self.targets {
+        let mut sources = memory.filled(0u32, self.targets.all().len())?;
+        for &target in self.targets.all() {
             offsets[target as usize + 2] += 1;
         }
         for index in 0..=count {
@@ -93,7 +100,7 @@ impl Csr {
             watch.tick(1 + row.len())?;
         }
         offsets.pop();
-        Ok(Csr { offsets, targets: sources })
+        Ok(Csr { offsets, targets: Region::Heap(sources) })
     }
 }
 
@@ -104,14 +111,19 @@ fn fill_by_key<W: Width>(
     space: &Space,
     span: &Span,
     offsets: &mut [u64],
-    targets: &mut Vec<u32>,
+    targets: &mut [u32],
     watch: &mut Watch<'_>,
 ) -> Result<(), Stop> {
     let (count, net) = (space.len(), &space.net);
     let mut batch = Batch::new(width.words());
     let mut fires = vec![[0_u64; 64]; net.transitions.len().div_ceil(64)];
-    let (mut keys, mut waiting, mut found) = ([0; ROOM], 0, [NONE; ROOM]);
-    let mut look = |keys: &[u64]| targets.extend_from_slice(space.set.find(keys, &mut found).unwrap_or_default());
+    let (mut keys, mut waiting, mut asking) = ([0; ROOM], 0, Asking::new());
+    let mut parts = targets.chunks_mut(ROOM);
+    let mut look = |keys: &[u64]| {
+        if let (Some(part), Some(found)) = (parts.next(), space.set.find(keys, &mut asking)) {
+            part.copy_from_slice(found);
+        }
+    };
     let mut edges = 0;
     for first in (0..count).step_by(64) {
         let end = count.min(first + 64);

@@ -26,7 +26,7 @@ mod in_place;
 
 use std::hint::black_box;
 
-use crate::budget::{Memory, Stop};
+use crate::budget::{Memory, Stop, Watch};
 use crate::region::Region;
 use crate::seat::{LANES, MOVED_BITS, REACH, Shape, Slot};
 
@@ -214,7 +214,7 @@ impl<S: Slot> Exact<S> {
         &mut self,
         asked: &mut Asked<S>,
         c: usize,
-        memory: &Memory,
+        (memory, watch): (&Memory, &mut Watch<'_>),
         append: impl FnOnce() -> Result<(), Stop>,
     ) -> Result<(), Stop> {
         loop {
@@ -229,7 +229,7 @@ impl<S: Slot> Exact<S> {
                 }
                 Place::Full => {
                     let before = self.shape;
-                    self.grow(memory)?;
+                    self.grow(memory, watch)?;
                     self.ask_again(asked, before);
                 }
             }
@@ -239,34 +239,37 @@ impl<S: Slot> Exact<S> {
     /// Empties what was asked, and takes more buckets if as many new keys again would make the table more than four
     /// fifths full.
     #[inline(always)]
-    pub fn answered(&mut self, asked: &mut Asked<S>, memory: &Memory) -> Result<(), Stop> {
+    pub fn answered(&mut self, asked: &mut Asked<S>, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
         asked.count = 0;
         while 5 * (self.len + ROOM) > 4 * LANES * self.shape.buckets as usize {
-            self.grow(memory)?;
+            self.grow(memory, watch)?;
         }
         Ok(())
     }
 
-    /// Takes more buckets.
+    /// Takes more buckets. Where that ends early, for want of memory or of time, all keys are where they were.
     #[cold]
-    pub fn grow(&mut self, memory: &Memory) -> Result<(), Stop> {
+    pub fn grow(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
         let mut shape = self.shape;
         loop {
             shape = shape.larger()?;
             let mut room = Self::room(shape, memory)?;
-            if self.refill(shape, room.all_mut().as_chunks_mut().0) {
+            let filled = self.refill(shape, room.all_mut().as_chunks_mut().0, watch);
+            if filled == Ok(true) {
                 memory.release(Self::bytes(self.shape));
                 (self.slots, self.shape) = (room, shape);
                 return Ok(());
             }
             memory.release(Self::bytes(shape));
+            filled?;
         }
     }
 
     /// Puts all keys into other buckets; false where some of them are full. That ends with as many buckets as keep any
     /// eight keys apart, if not with memory.
-    fn refill(&self, shape: Shape, buckets: &mut [[S; LANES]]) -> bool {
+    fn refill(&self, shape: Shape, buckets: &mut [[S; LANES]], watch: &mut Watch<'_>) -> Result<bool, Stop> {
         for (at, bucket) in self.buckets().iter().enumerate() {
+            watch.tick(LANES)?;
             for slot in bucket.iter().map(|slot| slot.get()).take_while(|&slot| slot != 0) {
                 let home = at + 1 - (slot & REACH as u64) as usize;
                 let (home, wanted) = shape.seat::<S>(self.shape.mixed(home, slot));
@@ -278,32 +281,34 @@ impl<S: Slot> Exact<S> {
                     }
                     moved += 1;
                     if moved == REACH {
-                        return false;
+                        return Ok(false);
                     }
                 };
                 buckets[home + moved][free] = S::new(wanted.get() + moved as u64);
             }
         }
-        true
+        Ok(true)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::unwatched;
 
     fn insert<S: Slot>(table: &mut Exact<S>, key: u64, memory: &Memory) -> Result<bool, Stop> {
-        let mut asked = Asked::new();
+        let (mut asked, mut poll) = (Asked::new(), unwatched);
+        let mut watch = Watch::new(None, &mut poll);
         table.ask(&mut asked, 1, |_| key, |_, _| ());
         let open = table.first_look(&mut asked);
         let mut new = false;
         if open > 0 {
-            table.insert(&mut asked, 0, memory, || {
+            table.insert(&mut asked, 0, (memory, &mut watch), || {
                 new = true;
                 Ok(())
             })?;
         }
-        table.answered(&mut asked, memory)?;
+        table.answered(&mut asked, memory, &mut watch)?;
         Ok(new)
     }
 
@@ -369,6 +374,23 @@ mod tests {
         assert_eq!(Exact::<u32>::new(60, &memory).err(), Some(Stop::Memory));
         assert_eq!(Exact::<u32>::reserving(60, &memory).err(), Some(Stop::Memory));
         assert_eq!(memory.used(), 0);
+    }
+
+    #[test]
+    fn the_end_of_time_ends_growth_and_loses_nothing() {
+        let memory = Memory::new(1 << 28);
+        let mut table = Exact::<u32>::new(24, &memory).expect("fits");
+        for key in 0..200_000 {
+            assert_eq!(insert(&mut table, key, &memory), Ok(true));
+        }
+        let (shape, used) = (table.shape, memory.used());
+        let mut poll = |_| Err(Stop::Cancelled);
+        for (deadline, expected) in [(Some(std::time::Instant::now()), Stop::Time), (None, Stop::Cancelled)] {
+            assert_eq!(table.grow(&memory, &mut Watch::new(deadline, &mut poll)), Err(expected));
+            assert_eq!(table.grow_by_two(&memory, &mut Watch::new(deadline, &mut poll)), Err(expected));
+            assert_eq!((table.shape.buckets, memory.used()), (shape.buckets, used));
+            assert!((0..200_000).all(|key| table.has(key)) && !table.has(200_000));
+        }
     }
 
     #[test]

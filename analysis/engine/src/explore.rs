@@ -193,7 +193,7 @@ impl Space {
     ) -> Result<(), Stop> {
         let mut batch = Batch::new(width.words());
         batch.markings.extend_from_slice(&net.initial);
-        arrivals.first(width, &mut batch, (&mut self.table, max, &self.memory))?;
+        arrivals.first(width, &mut batch, (&mut self.table, max, &self.memory, watch))?;
         let (mut next, mut end) = (0, 1);
         while self.level_end(next, &mut end)? {
             let open = match pair.as_mut().filter(|pair| pair.takes(end - next)) {
@@ -242,10 +242,10 @@ impl Space {
                 let edges = u64::from(fire.count_ones());
                 self.fired[t] += edges;
                 self.edges += edges;
-                arrivals.push(width, net, batch, t, fire, (&mut self.table, max, &self.memory))?;
+                arrivals.push(width, net, batch, t, fire, (&mut self.table, max, &self.memory, watch))?;
             }
             self.note_deadlocks(next, batch.valid & !alive)?;
-            arrivals.end(width, net, batch, stop == end, (&mut self.table, max, &self.memory))?;
+            arrivals.end(width, net, batch, stop == end, (&mut self.table, max, &self.memory, watch))?;
             watch.found = Found { markings: self.table.store.len() as u64, edges: self.edges };
             watch.tick((stop - next) + (self.edges - before) as usize + net.transitions.len())?;
             next = stop;

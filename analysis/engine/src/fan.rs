@@ -8,8 +8,8 @@
 
 use crate::batch::Batch;
 use crate::budget::{Stop, Watch};
-use crate::exact::ROOM;
 use crate::explore::Space;
+use crate::indexes::Asking;
 use crate::marking::Width;
 use crate::net::Rules;
 use crate::table::{Candidates, NONE};
@@ -27,7 +27,7 @@ pub struct Fan<'a> {
     edges: Vec<(u8, u32)>,
     found: Vec<u32>,
     /// The same, where they have keys.
-    by_key: Box<[u32; ROOM]>,
+    asking: Box<Asking>,
 }
 
 impl<'a> Fan<'a> {
@@ -52,7 +52,7 @@ impl<'a> Fan<'a> {
             keys: Vec::new(),
             edges: Vec::new(),
             found: Vec::new(),
-            by_key: Box::new([NONE; ROOM]),
+            asking: Box::new(Asking::new()),
         })
     }
 
@@ -126,7 +126,7 @@ impl<'a> Fan<'a> {
     /// Looks the candidates up and visits those that are markings; returns what is done with.
     #[inline(always)]
     fn ask<W: Width>(&mut self, width: W, visit: &mut impl FnMut(usize, u32, u32) -> bool) -> u64 {
-        let found = match self.space.set.find(&self.keys, &mut self.by_key) {
+        let found = match self.space.set.find(&self.keys, &mut self.asking) {
             Some(found) => found,
             None => {
                 self.space.table.find_batch(width, &mut self.candidates, &mut self.found);

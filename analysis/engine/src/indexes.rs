@@ -26,6 +26,30 @@ use crate::with_width;
 /// A bucket of slots and the indexes of their keys.
 const LINE: usize = 2 * LANES;
 
+/// What is asked for together, and found: kept by whoever asks, because to empty such arrays takes longer than to ask.
+#[derive(Debug)]
+pub struct Asking {
+    /// The line where each key belongs, or stands, and what stands there.
+    lines: [u32; ROOM],
+    wanted: [u64; ROOM],
+    /// Those that are not where they belong.
+    open: [u8; ROOM],
+    found: [u32; ROOM],
+}
+
+impl Asking {
+    /// Nothing yet.
+    pub fn new() -> Self {
+        Asking { lines: [0; ROOM], wanted: [0; ROOM], open: [0; ROOM], found: [NONE; ROOM] }
+    }
+}
+
+impl Default for Asking {
+    fn default() -> Self {
+        Asking::new()
+    }
+}
+
 /// Keys and indexes.
 #[derive(Debug)]
 pub struct Indexes<S> {
@@ -74,48 +98,63 @@ impl<S: Slot> Indexes<S> {
             line[..LANES].copy_from_slice(bucket);
         }
         let mut batch = Batch::new(width.words());
-        let mut places = [(0, 0); ROOM];
-        for first in (0..store.len()).step_by(64) {
-            batch.markings.clear();
-            store.copy_range(first, store.len().min(first + 64), &mut batch.markings);
-            batch.cut_by(width, &keyed.span);
-            self.places(&batch.hashes[..batch.count], &mut places);
+        let (mut keys, mut asking) = ([0; ROOM], Asking::new());
+        for first in (0..store.len()).step_by(ROOM) {
+            let end = store.len().min(first + ROOM);
+            for (part, keys) in (first..end).step_by(64).zip(keys.chunks_mut(64)) {
+                batch.markings.clear();
+                store.copy_range(part, end.min(part + 64), &mut batch.markings);
+                batch.cut_by(width, &keyed.span);
+                keys.copy_from_slice(&batch.hashes);
+            }
+            self.seek(&keys[..end - first], &mut asking, |_, lane| lane as u32);
             let lines = self.lines.all_mut().as_chunks_mut::<LINE>().0;
-            for (index, &(line, lane)) in (first as u64..).zip(&places[..batch.count]) {
+            for (c, index) in (first..end).enumerate() {
                 // No key is ever lost. Were one, its marking would be unknown, and take no other index than its own.
-                if lane < LANES {
-                    lines[line][LANES + lane] = S::new(index);
+                if asking.found[c] != NONE {
+                    lines[asking.lines[c] as usize][LANES + asking.found[c] as usize % LANES] = S::new(index as u64);
                 }
             }
-            watch.tick(64)?;
+            watch.tick(end - first)?;
         }
         Ok(())
     }
 
-    /// Line and lane of each key; the lane is `LANES` where it is not in the set.
+    /// What `value` makes of the line and the lane of each key; `NONE` where it is not in the set. Loops over numbers, as in
+    /// `exact.rs`.
     #[inline(always)]
-    fn places(&self, keys: &[u64], places: &mut [(usize, usize); ROOM]) {
+    fn seek(&self, keys: &[u64], asking: &mut Asking, value: impl Fn(&[S; LINE], usize) -> u32) {
         let (shape, lines) = (self.shape, self.lines.all().as_chunks::<LINE>().0);
-        let mut wanted = [S::new(0); ROOM];
-        for ((place, wanted), &key) in places.iter_mut().zip(&mut wanted).zip(keys) {
-            (place.0, *wanted) = shape.seat(shape.mix(key));
+        let count = keys.len().min(ROOM);
+        for (c, &key) in keys.iter().enumerate().take(ROOM) {
+            let (line, wanted) = shape.seat::<S>(shape.mix(key));
+            asking.lines[c] = line as u32;
+            asking.wanted[c] = wanted.get();
         }
         // As in `Exact::touch`.
         let mut read = 0;
-        for place in places.iter().take(keys.len()) {
-            read ^= lines[place.0][0].get();
+        for c in 0..count {
+            read ^= lines[asking.lines[c] as usize][0].get();
         }
         black_box(read);
-        for c in 0..keys.len().min(ROOM) {
-            let found = S::matches(slots(&lines[places[c].0]), wanted[c]);
-            places[c].1 = found.trailing_zeros() as usize;
-            if found == 0 {
-                places[c] = self.search(places[c].0, wanted[c]);
-            }
+        let mut open = 0;
+        for c in 0..count {
+            let line = &lines[asking.lines[c] as usize];
+            let found = S::matches(slots(line), S::new(asking.wanted[c]));
+            // Where it is not there, whatever is said is said again below.
+            asking.found[c] = value(line, found.trailing_zeros() as usize % LANES);
+            asking.open[open % ROOM] = c as u8;
+            open += usize::from(found == 0);
+        }
+        for k in 0..open {
+            let c = usize::from(asking.open[k % ROOM]);
+            let (line, lane) = self.search(asking.lines[c] as usize, S::new(asking.wanted[c]));
+            asking.lines[c] = line as u32;
+            asking.found[c] = if lane < LANES { value(&lines[line], lane) } else { NONE };
         }
     }
 
-    /// The same for one key, in all buckets where it may be.
+    /// Line and lane of one key, in all buckets where it may be; the lane is `LANES` where it is not in the set.
     fn search(&self, home: usize, wanted: S) -> (usize, usize) {
         for (moved, line) in self.lines.all().as_chunks::<LINE>().0[home..home + REACH].iter().enumerate() {
             let found = S::matches(slots(line), S::new(wanted.get() + moved as u64));
@@ -138,14 +177,8 @@ impl<S: Slot> Indexes<S> {
 
     /// The index of the marking with each of up to `ROOM` keys, `NONE` where there is none.
     #[inline(always)]
-    fn find(&self, keys: &[u64], found: &mut [u32; ROOM]) {
-        let mut places = [(0, 0); ROOM];
-        self.places(keys, &mut places);
-        let lines = self.lines.all().as_chunks::<LINE>().0;
-        for (found, &(line, lane)) in found.iter_mut().zip(&places[..keys.len()]) {
-            let index = lines[line][LANES + lane % LANES].get() as u32;
-            *found = if lane < LANES { index } else { NONE };
-        }
+    fn find(&self, keys: &[u64], asking: &mut Asking) {
+        self.seek(keys, asking, |line, lane| line[LANES + lane].get() as u32);
     }
 }
 
@@ -171,10 +204,10 @@ impl<S: Slot> Keyed<S> {
     }
 
     #[inline(always)]
-    fn find(&self, keys: &[u64], found: &mut [u32; ROOM]) {
+    fn find(&self, keys: &[u64], asking: &mut Asking) {
         match self.indexes.get() {
-            Some(indexes) => indexes.find(keys, found),
-            None => found.fill(NONE),
+            Some(indexes) => indexes.find(keys, asking),
+            None => asking.found.fill(NONE),
         }
     }
 }
@@ -182,13 +215,13 @@ impl<S: Slot> Keyed<S> {
 impl Set {
     /// The indexes of up to `ROOM` markings by their keys, after `Space::index`; none where markings are hashed.
     #[inline(always)]
-    pub fn find<'a>(&self, keys: &[u64], found: &'a mut [u32; ROOM]) -> Option<&'a [u32]> {
+    pub fn find<'a>(&self, keys: &[u64], asking: &'a mut Asking) -> Option<&'a [u32]> {
         match self {
             Set::Hashed => return None,
-            Set::Narrow(keyed) => keyed.find(keys, found),
-            Set::Wide(keyed) => keyed.find(keys, found),
+            Set::Narrow(keyed) => keyed.find(keys, asking),
+            Set::Wide(keyed) => keyed.find(keys, asking),
         }
-        Some(&found[..keys.len()])
+        Some(&asking.found[..keys.len()])
     }
 }
 

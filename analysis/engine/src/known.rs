@@ -14,7 +14,7 @@
 use std::sync::OnceLock;
 
 use crate::batch::Batch;
-use crate::budget::{Memory, Stop};
+use crate::budget::{Memory, Stop, Watch};
 use crate::exact::{Asked, Exact, ROOM};
 use crate::indexes::Indexes;
 use crate::marking::{Width, linear_hash};
@@ -88,20 +88,21 @@ impl<S: Slot> Keyed<S> {
 /// Candidates on their way from firing transitions into the set.
 pub trait Arrivals<W: Width> {
     /// Puts M0, all that is in the batch, into the empty set.
-    fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_>) -> Result<(), Stop>;
+    fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_, '_>) -> Result<(), Stop>;
 
     /// Slices a batch, with what the candidates are told by.
     fn cut(&self, width: W, batch: &mut Batch);
 
     /// Takes the marking that a transition makes of each of `fire`.
-    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, into: Into<'_>) -> Result<(), Stop>;
+    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, into: Into<'_, '_>)
+    -> Result<(), Stop>;
 
     /// Ends a batch, and with it a level or not.
-    fn end(&mut self, width: W, net: &Net, batch: &Batch, level: bool, into: Into<'_>) -> Result<(), Stop>;
+    fn end(&mut self, width: W, net: &Net, batch: &Batch, level: bool, into: Into<'_, '_>) -> Result<(), Stop>;
 }
 
-/// Where new markings go, how many there may be, and of what memory.
-pub type Into<'a> = (&'a mut Table, usize, &'a Memory);
+/// Where new markings go, how many there may be, of what memory, and until when.
+pub type Into<'a, 'b> = (&'a mut Table, usize, &'a Memory, &'a mut Watch<'b>);
 
 /// Arrivals told by their hash.
 pub struct Hashed(Candidates);
@@ -111,11 +112,18 @@ impl Hashed {
     pub fn new(words: usize) -> Self {
         Hashed(Candidates::new(words))
     }
+
+    #[inline(always)]
+    fn settle<W: Width>(&mut self, width: W, into: Into<'_, '_>) -> Result<(), Stop> {
+        let (table, max, memory, watch) = into;
+        table.make_room(width, self.0.len(), memory, watch)?;
+        table.insert_batch(width, &mut self.0, max, memory)
+    }
 }
 
 impl<W: Width> Arrivals<W> for Hashed {
-    fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_>) -> Result<(), Stop> {
-        let (table, max, memory) = into;
+    fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_, '_>) -> Result<(), Stop> {
+        let (table, max, memory, _) = into;
         table.insert(width, &batch.markings, linear_hash(width, &batch.markings), max, memory)?;
         Ok(())
     }
@@ -126,19 +134,25 @@ impl<W: Width> Arrivals<W> for Hashed {
     }
 
     #[inline(always)]
-    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, into: Into<'_>) -> Result<(), Stop> {
-        let (table, max, memory) = into;
+    fn push(
+        &mut self,
+        width: W,
+        net: &Net,
+        batch: &Batch,
+        t: usize,
+        fire: u64,
+        into: Into<'_, '_>,
+    ) -> Result<(), Stop> {
         if self.0.push(width, batch, fire, net.flip(t, width.words()), net.flip_hashes[t]) {
-            table.insert_batch(width, &mut self.0, max, memory)?;
+            self.settle(width, into)?;
         }
         Ok(())
     }
 
     /// What is left waits for the next batch; only a level must be whole before it is taken up.
     #[inline(always)]
-    fn end(&mut self, width: W, _: &Net, _: &Batch, level: bool, into: Into<'_>) -> Result<(), Stop> {
-        let (table, max, memory) = into;
-        if level { table.insert_batch(width, &mut self.0, max, memory) } else { Ok(()) }
+    fn end(&mut self, width: W, _: &Net, _: &Batch, level: bool, into: Into<'_, '_>) -> Result<(), Stop> {
+        if level { self.settle(width, into) } else { Ok(()) }
     }
 }
 
@@ -158,14 +172,14 @@ impl<'a, S: Slot> ByKey<'a, S> {
 
     /// Looks up what came, and appends what is new.
     #[inline(always)]
-    fn settle<W: Width>(&mut self, width: W, net: &Net, batch: &Batch, into: Into<'_>) -> Result<(), Stop> {
-        let (table, max, memory) = into;
+    fn settle<W: Width>(&mut self, width: W, net: &Net, batch: &Batch, into: Into<'_, '_>) -> Result<(), Stop> {
+        let (table, max, memory, watch) = into;
         let words = width.words();
         let exact = &mut self.keyed.exact;
         for k in 0..exact.first_look(&mut self.asked) {
             let c = usize::from(self.asked.open[k % ROOM]);
             let (j, t) = (self.made[c] as usize % 64, self.made[c] as usize / 64);
-            exact.insert(&mut self.asked, c, memory, || {
+            exact.insert(&mut self.asked, c, (memory, watch), || {
                 if table.store.len() >= max {
                     return Err(Stop::Markings);
                 }
@@ -173,18 +187,18 @@ impl<'a, S: Slot> ByKey<'a, S> {
                 table.store.push_flipped(width, from, net.flip(t, words), max, memory)
             })?;
         }
-        exact.answered(&mut self.asked, memory)
+        exact.answered(&mut self.asked, memory, watch)
     }
 }
 
 impl<W: Width, S: Slot> Arrivals<W> for ByKey<'_, S> {
-    fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_>) -> Result<(), Stop> {
-        let (table, max, memory) = into;
+    fn first(&mut self, width: W, batch: &mut Batch, into: Into<'_, '_>) -> Result<(), Stop> {
+        let (table, max, memory, watch) = into;
         let key = self.keyed.span.key(&batch.markings);
         self.keyed.exact.ask(&mut self.asked, 1, |_| key, |_, _| ());
         let append = || table.store.push(width, &batch.markings, max, memory);
-        self.keyed.exact.insert(&mut self.asked, 0, memory, append)?;
-        self.keyed.exact.answered(&mut self.asked, memory)
+        self.keyed.exact.insert(&mut self.asked, 0, (memory, watch), append)?;
+        self.keyed.exact.answered(&mut self.asked, memory, watch)
     }
 
     #[inline(always)]
@@ -193,7 +207,15 @@ impl<W: Width, S: Slot> Arrivals<W> for ByKey<'_, S> {
     }
 
     #[inline(always)]
-    fn push(&mut self, width: W, net: &Net, batch: &Batch, t: usize, fire: u64, into: Into<'_>) -> Result<(), Stop> {
+    fn push(
+        &mut self,
+        width: W,
+        net: &Net,
+        batch: &Batch,
+        t: usize,
+        fire: u64,
+        into: Into<'_, '_>,
+    ) -> Result<(), Stop> {
         let flip = self.keyed.span.flips[t];
         let made = (t as u32) << 6;
         let note = |c: usize, j: u32| self.made[c] = made | j;
@@ -202,7 +224,7 @@ impl<W: Width, S: Slot> Arrivals<W> for ByKey<'_, S> {
     }
 
     #[inline(always)]
-    fn end(&mut self, width: W, net: &Net, batch: &Batch, _: bool, into: Into<'_>) -> Result<(), Stop> {
+    fn end(&mut self, width: W, net: &Net, batch: &Batch, _: bool, into: Into<'_, '_>) -> Result<(), Stop> {
         self.settle(width, net, batch, into)
     }
 }

@@ -70,7 +70,7 @@ fn pearce(
     memory: &Memory,
     watch: &mut Watch<'_>,
 ) -> Result<(Vec<u32>, usize), Stop> {
-    let count = edges.offsets.len() - 1;
+    let (count, targets) = (edges.offsets.len() - 1, edges.targets.all());
     let top = count as u32 + 1;
     let mut rank = memory.filled(0u32, count)?;
     let mut order = 1;
@@ -87,7 +87,7 @@ fn pearce(
         memory.push(&mut way, (root, true, edges.offsets[root as usize]))?;
         while let Some(&mut (at, ref mut is_root, ref mut edge)) = way.last_mut() {
             if *edge < edges.offsets[at as usize + 1] {
-                let target = edges.targets[*edge as usize];
+                let target = targets[*edge as usize];
                 if rank[target as usize] == 0 {
                     // The edge is followed once more when the target is done: then its rank is compared.
                     rank[target as usize] = order;
@@ -172,16 +172,18 @@ pub fn live(space: &Space, scc: &Scc, watch: &mut Watch<'_>) -> Result<Vec<bool>
 mod tests {
     use super::*;
     use crate::budget::unwatched;
+    use crate::region::Region;
 
     fn components(edges: &[&[u32]]) -> Scc {
         let memory = Memory::new(1 << 20);
         let mut poll = unwatched;
         let mut watch = Watch::new(None, &mut poll);
-        let mut csr = Csr { offsets: vec![0], targets: Vec::new() };
+        let (mut offsets, mut targets) = (vec![0], Vec::new());
         for row in edges {
-            csr.targets.extend_from_slice(row);
-            csr.offsets.push(csr.targets.len() as u64);
+            targets.extend_from_slice(row);
+            offsets.push(targets.len() as u64);
         }
+        let csr = Csr { offsets, targets: Region::Heap(targets) };
         Scc::of_edges(&csr, None, &memory, &mut watch).expect("fits")
     }
 

@@ -12,7 +12,7 @@
 
 mod candidates;
 
-use crate::budget::{Memory, Stop};
+use crate::budget::{Memory, Stop, Watch};
 use crate::marking::{Width, linear_hash, mix};
 use crate::region::Region;
 use crate::store::Store;
@@ -179,7 +179,7 @@ impl Table {
         }
         // At most three quarters full: the index plus one then always fits below the tag.
         if index >= 3 << (self.log2 - 2) {
-            self.grow(width, memory)?;
+            self.grow(width, memory, &mut |_| Ok(()))?;
             at = match self.probe(width, marking, mixed) {
                 Err(at) => at,
                 Ok(_) => return Ok(false),
@@ -191,12 +191,42 @@ impl Table {
         Ok(true)
     }
 
-    /// Doubles the slots and files every marking again.
+    /// Makes room for so many markings more, as long as there is time: growing by itself, an insertion asks nobody.
+    #[inline(always)]
+    pub fn make_room<W: Width>(
+        &mut self,
+        width: W,
+        more: usize,
+        memory: &Memory,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
+        while self.store.len() + more > 3 << (self.log2 - 2) {
+            self.grow(width, memory, &mut |work| watch.tick(work))?;
+        }
+        Ok(())
+    }
+
+    /// Doubles the slots and files every marking again; where that ends early, the table is what it was.
     #[cold]
-    fn grow<W: Width>(&mut self, width: W, memory: &Memory) -> Result<(), Stop> {
-        let wider = self.wider(memory)?;
+    fn grow<W: Width>(
+        &mut self,
+        width: W,
+        memory: &Memory,
+        poll: &mut dyn FnMut(usize) -> Result<(), Stop>,
+    ) -> Result<(), Stop> {
+        const PART: usize = 1 << 12;
+        let mut wider = self.wider(memory)?;
+        let (shape, slots) = (wider.shape(), wider.all_mut());
+        for first in (0..self.store.len()).step_by(PART) {
+            for index in first..self.store.len().min(first + PART) {
+                file(shape, slots, mix(linear_hash(width, self.store.get(width, index))), index);
+            }
+            if let Err(stop) = poll(PART) {
+                memory.release(8 << self.log2);
+                return Err(stop);
+            }
+        }
         self.replace(wider, memory);
-        self.refile(width);
         Ok(())
     }
 
@@ -237,13 +267,7 @@ impl Table {
     /// Files an index under a mixed hash that no slot has.
     #[inline(always)]
     pub(crate) fn file(&mut self, mixed: u64, index: usize) {
-        let shape = self.shape();
-        let slots = self.slots.all_mut();
-        let mut at = shape.home(mixed);
-        while slots[at] != 0 {
-            at = (at + 1) & (slots.len() - 1);
-        }
-        slots[at] = shape.slot(mixed, index);
+        file(self.shape(), self.slots.all_mut(), mixed, index);
     }
 
     /// The array, the slots and what these say, to be worked on together.
@@ -251,6 +275,15 @@ impl Table {
         let shape = self.shape();
         (&self.store, self.slots.all_mut(), shape)
     }
+}
+
+#[inline(always)]
+fn file(shape: Shape, slots: &mut [u32], mixed: u64, index: usize) {
+    let mut at = shape.home(mixed);
+    while slots[at] != 0 {
+        at = (at + 1) & (slots.len() - 1);
+    }
+    slots[at] = shape.slot(mixed, index);
 }
 
 #[cfg(test)]
@@ -303,6 +336,19 @@ mod tests {
     }
 
     #[test]
+    fn the_end_of_time_ends_growth_and_loses_nothing() {
+        let memory = Memory::new(1 << 30);
+        let mut table = filled(2, 1000, &memory);
+        let (log2, used) = (table.log2, memory.used());
+        let mut poll = crate::budget::unwatched;
+        let mut watch = Watch::new(Some(std::time::Instant::now()), &mut poll);
+        assert_eq!(table.make_room(Dynamic(2), 1 << 20, &memory, &mut watch), Err(Stop::Time));
+        assert_eq!((table.log2, memory.used()), (log2, used));
+        let found = |i: u64| table.find(Dynamic(2), &[i, 2 * i], linear_hash(Dynamic(2), &[i, 2 * i]));
+        assert!((0..1000).all(|i| found(i) == Some(i as u32)) && found(1000).is_none());
+    }
+
+    #[test]
     fn one_marking_too_many_is_refused() {
         let memory = Memory::new(1 << 20);
         let mut table = Table::new(1, &memory).expect("fits");
@@ -317,7 +363,7 @@ mod tests {
         let memory = Memory::new(usize::MAX);
         let mut table = Table::new(1, &memory).expect("fits");
         table.log2 = 32;
-        assert_eq!(table.grow(Fixed::<1>, &memory), Err(Stop::Markings));
+        assert_eq!(table.grow(Fixed::<1>, &memory, &mut |_| Ok(())), Err(Stop::Markings));
         // The fullest table of 2^32 slots: its last index plus one is an index still, and none is `NONE`.
         assert!((3_u64 << 30) < u64::from(NONE));
     }

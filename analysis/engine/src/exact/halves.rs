@@ -9,9 +9,10 @@ use crate::seat::{FACTOR, LANES, REACH, Shape, Slot};
 use std::hint::black_box;
 use std::mem;
 use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use crate::budget::{Memory, Stop};
+use crate::budget::{Memory, Stop, Watch};
 
 /// The factor that takes `FACTOR` back.
 const INVERSE: u64 = {
@@ -65,32 +66,50 @@ impl<S: Slot> Exact<S> {
         self.len += more;
     }
 
-    /// Takes more buckets, which two threads fill; false where there is no memory for them. No key is lost by that.
-    pub(crate) fn grow_by_two(&mut self, memory: &Memory) -> bool {
-        let Ok(shape) = self.shape.larger() else { return false };
-        let Ok(mut room) = Self::room(shape, memory) else { return false };
+    /// Takes more buckets, which two threads fill; false where there is no memory for them. No key is lost by that, nor
+    /// where time is over.
+    pub(crate) fn grow_by_two(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<bool, Stop> {
+        let Ok(shape) = self.shape.larger() else { return Ok(false) };
+        let Ok(mut room) = Self::room(shape, memory) else { return Ok(false) };
         let [mut low, mut high] = halves(shape, room.all_mut());
+        let ended = AtomicBool::new(false);
         let past = thread::scope(|scope| {
-            let work = || high.refill(self);
+            let work =
+                || high.refill(self, || if ended.load(Ordering::Relaxed) { Err(Stop::Cancelled) } else { Ok(()) });
             // Where the system has no thread to give, all is done here.
             let other = thread::Builder::new().spawn_scoped(scope, work).ok()?;
-            let past = low.refill(self);
-            Some([past, other.join().unwrap_or_else(|panic| resume_unwind(panic))])
+            let past = low.refill(self, || watch.tick(LANES));
+            ended.store(past.is_err(), Ordering::Relaxed);
+            Some((past, other.join().unwrap_or_else(|panic| resume_unwind(panic))))
         });
-        let Some(past) = past else {
-            drop(room);
-            memory.release(Self::bytes(shape));
-            return self.grow(memory).is_ok();
+        let past = match past {
+            Some((Ok(low), Ok(high))) => [low, high],
+            Some((Err(stop), _) | (_, Err(stop))) => {
+                memory.release(Self::bytes(shape));
+                return Err(stop);
+            }
+            None => {
+                drop(room);
+                memory.release(Self::bytes(shape));
+                return self.grow_alone(memory, watch);
+            }
         };
         let old = (mem::replace(&mut self.slots, room), mem::replace(&mut self.shape, shape));
         if !past.into_iter().flatten().all(|key| self.place(key)) {
             // The old table still has all keys.
             (self.slots, self.shape) = old;
             memory.release(Self::bytes(shape));
-            return self.grow(memory).is_ok();
+            return self.grow_alone(memory, watch);
         }
         memory.release(Self::bytes(old.1));
-        true
+        Ok(true)
+    }
+
+    fn grow_alone(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<bool, Stop> {
+        match self.grow(memory, watch) {
+            Err(Stop::Memory) => Ok(false),
+            end => end.map(|()| true),
+        }
     }
 
     /// Puts a key, which is counted already, where it belongs; false where all buckets that would be tried are full.
@@ -108,13 +127,13 @@ impl<S: Slot> Exact<S> {
         &mut self,
         asked: &mut Asked<S>,
         key: u64,
-        memory: &Memory,
+        (memory, watch): (&Memory, &mut Watch<'_>),
         new: impl FnOnce() -> Result<(), Stop>,
     ) -> Result<(), Stop> {
         asked.count = 0;
         self.ask(asked, 1, |_| key, |_, _| ());
-        self.insert(asked, 0, memory, new)?;
-        self.answered(asked, memory)
+        self.insert(asked, 0, (memory, watch), new)?;
+        self.answered(asked, memory, watch)
     }
 }
 
@@ -170,8 +189,9 @@ impl<S: Slot> HalfExact<'_, S> {
         usize::from(count)
     }
 
-    /// Puts those of all keys that belong here into this half; gives back those that belong past its end.
-    fn refill(&mut self, from: &Exact<S>) -> Vec<u64> {
+    /// Puts those of all keys that belong here into this half; gives back those that belong past its end. Asks at each
+    /// bucket whether to go on.
+    fn refill(&mut self, from: &Exact<S>, mut poll: impl FnMut() -> Result<(), Stop>) -> Result<Vec<u64>, Stop> {
         let old = from.shape;
         let (start, end) =
             if self.id == 0 { (0, old.buckets as usize / 2) } else { (old.buckets as usize / 2, usize::MAX) };
@@ -179,6 +199,7 @@ impl<S: Slot> HalfExact<'_, S> {
         // What belongs before the middle may stand past it.
         let until = (end.saturating_add(REACH)).min(from.buckets().len());
         for (at, bucket) in from.buckets()[..until].iter().enumerate().skip(start) {
+            poll()?;
             for slot in bucket.iter().map(|slot| slot.get()).take_while(|&slot| slot != 0) {
                 let home = at + 1 - (slot & REACH as u64) as usize;
                 if home < start || home >= end {
@@ -200,7 +221,7 @@ impl<S: Slot> HalfExact<'_, S> {
                 }
             }
         }
-        past
+        Ok(past)
     }
 
     /// Where the key of a record stands, or where it belongs.
@@ -263,13 +284,15 @@ fn read<S: Slot>(record: &[u64]) -> (usize, S) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::budget::unwatched;
 
     #[test]
     fn two_threads_grow_the_table_that_one_grows() {
         for (bits, count) in [(16, 60_000_u64), (30, 50_000), (44, 50_000)] {
             let memory = Memory::new(1 << 28);
             let mut table = Exact::<u64>::new(bits, &memory).expect("fits");
-            let mut asked = Asked::new();
+            let (mut asked, mut poll) = (Asked::new(), unwatched);
+            let mut watch = Watch::new(None, &mut poll);
             let keys = || (0..count).map(|i| i.wrapping_mul(0x1234_5677_9abc_def1) & ((1 << bits) - 1));
             let mut distinct = 0;
             for (i, key) in keys().enumerate() {
@@ -277,9 +300,9 @@ mod tests {
                     distinct += 1;
                     Ok(())
                 };
-                table.put(&mut asked, key, &memory, count).expect("fits");
+                table.put(&mut asked, key, (&memory, &mut watch), count).expect("fits");
                 if i % 10_000 == 5000 {
-                    assert!(table.grow_by_two(&memory));
+                    assert_eq!(table.grow_by_two(&memory, &mut watch), Ok(true));
                 }
             }
             assert_eq!(table.len, distinct);
@@ -293,16 +316,16 @@ mod tests {
         for limit in [1 << 14, 1 << 16, 1 << 18, 1 << 24] {
             let memory = Memory::new(limit);
             let mut table = Exact::<u64>::new(20, &memory).expect("fits");
-            let mut asked = Asked::new();
+            let (mut asked, mut poll) = (Asked::new(), unwatched);
+            let mut watch = Watch::new(None, &mut poll);
             let shape = table.shape;
             // Neighbours in the order of the mixed keys, most of them before the middle.
             let keys: Vec<u64> = ((1 << 19) - 900..(1 << 19) + 100).map(|mixed: u64| shape.key(mixed << 44)).collect();
-            let put = |table: &mut Exact<u64>, key: u64| table.put(&mut asked, key, &memory, || Ok(()));
-            let mut put = put;
-            let kept = keys.iter().take_while(|&&key| put(&mut table, key).is_ok()).count();
+            let mut put = |&key: &u64| table.put(&mut asked, key, (&memory, &mut watch), || Ok(())).is_ok();
+            let kept = keys.iter().take_while(|key| put(key)).count();
             for _ in 0..12 {
                 let before = table.shape.buckets;
-                let grown = table.grow_by_two(&memory);
+                let grown = table.grow_by_two(&memory, &mut watch).expect("nobody ends it");
                 assert_eq!(grown, table.shape.buckets > before);
                 assert!(keys[..kept].iter().all(|&key| table.has(key)));
                 assert!(memory.used() == Exact::<u64>::bytes(table.shape) && memory.used() <= limit);

@@ -55,6 +55,7 @@ impl Space {
             for (j, firable) in firable.iter().enumerate().take(batch.count) {
                 let marking = &batch.markings[j * words..(j + 1) * words];
                 let factors = steps.factors(firable, &self.memory, watch)?;
+                self.table.make_room(width, 1, &self.memory, watch)?;
                 let (table, memory, parents) = (&mut self.table, &self.memory, &mut self.parents);
                 let mut edges = 0;
                 Steps::each(width, marking, batch.hashes[j], &factors, watch, &mut |_, after, hash| {

@@ -4,7 +4,7 @@
 //! words these are is the set's affair: the place of a key (`keyed.rs`), or a hash with a marking (`hashed.rs`).
 
 use crate::batch::Batch;
-use crate::budget::{Memory, Stop};
+use crate::budget::{Memory, Stop, Watch};
 use crate::explore::Space;
 use crate::known::Arrivals;
 use crate::marking::Width;
@@ -110,10 +110,17 @@ pub(crate) trait Shared<W: Width>: Arrivals<W> {
 
     /// Makes room for more; false where there is no memory for that. After an error a set of hashes cannot be used any
     /// more; one of keys has lost none.
-    fn grow(&mut self, width: W, space: &mut Space) -> Result<bool, Stop>;
+    fn grow(&mut self, width: W, space: &mut Space, watch: &mut Watch<'_>) -> Result<bool, Stop>;
 
     /// Puts what found no place in its half into the whole set: keys, or records of markings.
-    fn insert_left(&mut self, width: W, space: &mut Space, records: &[u64], max: usize) -> Result<(), Stop>;
+    fn insert_left(
+        &mut self,
+        width: W,
+        space: &mut Space,
+        records: &[u64],
+        max: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop>;
 
     /// Forgets what is not in the array.
     fn forget_others(&mut self, width: W, space: &mut Space);

@@ -4,11 +4,12 @@
 //! level as if both found equally many, 64 in turn; at the end only those by which one has found more than the other are
 //! numbered anew.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use super::half::{BLOCK, End, Finds, Half, Shared};
 use crate::batch::Batch;
-use crate::budget::Stop;
+use crate::budget::{Stop, Watch};
 use crate::explore::Space;
 use crate::known::Hashed;
 use crate::marking::{Width, linear_hash, mix};
@@ -93,8 +94,13 @@ impl HashedHalf<'_> {
         finds.leave(record);
     }
 
-    /// Files those of all markings that belong here; gives back what belongs past the end.
-    fn file<W: Width>(&mut self, width: W) -> Vec<(u64, usize)> {
+    /// Files those of all markings that belong here; gives back what belongs past the end. Asks now and then, with the work
+    /// done since, whether to go on.
+    fn file<W: Width>(
+        &mut self,
+        width: W,
+        mut poll: impl FnMut(usize) -> Result<(), Stop>,
+    ) -> Result<Vec<(u64, usize)>, Stop> {
         let words = width.words();
         let mut past = Vec::new();
         let mut own = [(0_u64, 0_usize); BATCH];
@@ -116,9 +122,10 @@ impl HashedHalf<'_> {
                     None => past.push((mixed, index)),
                 }
             }
+            poll(count)?;
             count = 0;
         }
-        past
+        Ok(past)
     }
 }
 
@@ -253,15 +260,25 @@ impl<W: Width> Shared<W> for Hashed {
         Ok(())
     }
 
-    fn grow(&mut self, width: W, space: &mut Space) -> Result<bool, Stop> {
+    fn grow(&mut self, width: W, space: &mut Space, watch: &mut Watch<'_>) -> Result<bool, Stop> {
         let Ok(mut wider) = space.table.wider(&space.memory) else { return Ok(false) };
-        let shape = wider.shape();
+        let (shape, bytes) = (wider.shape(), size_of_val(wider.all_mut()));
         let [mut low, mut high] = halves((&space.table.store, wider.all_mut(), shape));
+        let ended = AtomicBool::new(false);
         let past = thread::scope(|scope| {
-            let other = scope.spawn(move || high.file(width));
-            let past = low.file(width);
-            [past, other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))]
+            let go_on = |_| if ended.load(Ordering::Relaxed) { Err(Stop::Cancelled) } else { Ok(()) };
+            let other = scope.spawn(move || high.file(width, go_on));
+            let past = low.file(width, |work| watch.tick(work));
+            ended.store(past.is_err(), Ordering::Relaxed);
+            (past, other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
         });
+        let past = match past {
+            (Ok(low), Ok(high)) => [low, high],
+            (Err(stop), _) | (_, Err(stop)) => {
+                space.memory.release(bytes);
+                return Err(stop);
+            }
+        };
         space.table.replace(wider, &space.memory);
         for (mixed, index) in past.into_iter().flatten() {
             space.table.file(mixed, index);
@@ -269,7 +286,15 @@ impl<W: Width> Shared<W> for Hashed {
         Ok(true)
     }
 
-    fn insert_left(&mut self, width: W, space: &mut Space, records: &[u64], max: usize) -> Result<(), Stop> {
+    fn insert_left(
+        &mut self,
+        width: W,
+        space: &mut Space,
+        records: &[u64],
+        max: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
+        space.table.make_room(width, records.len() / stride(width), &space.memory, watch)?;
         for record in records.chunks_exact(stride(width)) {
             let (mixed, marking) = read(width, record);
             space.table.insert_mixed(width, marking, mixed, max, &space.memory)?;

@@ -5,7 +5,7 @@
 
 use super::half::{End, Finds, Half, Shared};
 use crate::batch::Batch;
-use crate::budget::Stop;
+use crate::budget::{Stop, Watch};
 use crate::exact::ROOM;
 use crate::exact::halves::{HalfExact, Sought, stride};
 use crate::explore::Space;
@@ -120,16 +120,23 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
         Ok(())
     }
 
-    fn grow(&mut self, _: W, space: &mut Space) -> Result<bool, Stop> {
-        Ok(self.keyed.parts().2.grow_by_two(&space.memory))
+    fn grow(&mut self, _: W, space: &mut Space, watch: &mut Watch<'_>) -> Result<bool, Stop> {
+        self.keyed.parts().2.grow_by_two(&space.memory, watch)
     }
 
-    fn insert_left(&mut self, width: W, space: &mut Space, records: &[u64], max: usize) -> Result<(), Stop> {
+    fn insert_left(
+        &mut self,
+        width: W,
+        space: &mut Space,
+        records: &[u64],
+        max: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
         let (_, spread, exact) = self.keyed.parts();
         let mut marking = vec![0; width.words()];
         for &key in records {
             let store = &mut space.table.store;
-            exact.put(&mut self.asked, key, &space.memory, || {
+            exact.put(&mut self.asked, key, (&space.memory, watch), || {
                 if store.len() >= max {
                     return Err(Stop::Markings);
                 }

@@ -83,12 +83,12 @@ impl Pair {
             match worst {
                 Some(End::Stopped(stop)) => return Err(stop),
                 // Whether there is really no memory, one thread will find out.
-                Some(End::Full) => self.retired |= !set.grow(width, space)?,
+                Some(End::Full) => self.retired |= !set.grow(width, space, watch)?,
                 Some(End::Short) => self.retired = true,
                 None => {}
             }
             for member in &mut self.members {
-                set.insert_left(width, space, &std::mem::take(&mut member.finds.left), max)?;
+                set.insert_left(width, space, &std::mem::take(&mut member.finds.left), max, watch)?;
             }
             if worst.is_none() || self.retired {
                 return Ok(self.rest(start, end));

@@ -301,7 +301,10 @@ impl Graph {
         let patience = Patience::new(max_seconds, cancelled)?;
         self.whole("the list of edges")?;
         let csr = self.long(py, &patience, |space, watch| Csr::new(space, None, &space.memory.clone(), watch))?;
-        Ok((little_endian(py, &csr.offsets, u64::to_le_bytes)?, little_endian(py, &csr.targets, u32::to_le_bytes)?))
+        Ok((
+            little_endian(py, &csr.offsets, u64::to_le_bytes)?,
+            little_endian(py, csr.targets.all(), u32::to_le_bytes)?,
+        ))
     }
 
     #[pyo3(signature = (*, max_seconds=None, cancelled=None))]

@@ -47,6 +47,12 @@ impl Candidates {
         }
     }
 
+    /// How many wait.
+    #[inline(always)]
+    pub(crate) fn len(&self) -> usize {
+        self.count
+    }
+
     /// Adds `from ^ flip` for each marking of `fire`; true when the candidates should be looked up.
     ///
     /// The bound is soft: the 64 that one transition adds at most find room beyond it.
