@@ -1,22 +1,31 @@
-"""Speed and memory of the explicit engine, as ratios to three yardsticks in the same run.
+"""Speed and memory of the explicit engine, as ratios to yardsticks in the same run.
 
 - the *limit*: the same number of look-ups and inserts at random in a table of the same number of keys, and nothing else
   (`analysis/engine/examples/random_inserts.rs`): no exploration that asks a table once for each edge can be quicker;
+- for two threads, the *limit by two*: one such program against two at once, each with half of the look-ups in a table
+  of half the size. They share nothing but caches and memory, and need no numbering, so this is what the machine gives;
 - `hashbrown` and `std`: the same exploration the plain way, by a mask scan into a general hash set
   (`examples/hash_sets.rs`). It shares no code with the engine, so its markings and edges are a check as well.
 
 The nets are the families of the catalogue. Some are made wider by places that never change, to fill more words.
+
+`firable check` itself, Python's start and the report included, is held to what an explicit model checker of the field
+takes for the same net: the time of that one is as published for a machine of this kind, and not measured here.
 """
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Final, TypeVar
 
-from measuring import Table, against, example, spread, timed
+from measuring import CRATE, Table, against, children_seconds, example, spread, timed
 
 from firable.analysis import _engine
 from firable.analysis.compiled import rows
@@ -25,10 +34,12 @@ from firable.nets.net import Net, Place
 
 T = TypeVar("T")
 
+EXAMPLE: Final = (str(CRATE / "target" / "release" / "examples" / "random_inserts"),)
 MEMORY_BYTES_MAX: Final = 8 << 30
 LIMIT_GOALS: Final = {1: 1.0, 2: 1.0, 4: 2.0, 8: 2.0}
 HASHBROWN_GOAL, STD_GOAL, BYTES_GOAL = 2.0, 4.0, 16.0
 EDGE_STORE_GOAL_NS, COMPONENT_GOAL = 15.0, 1.3
+VERIFYPN_SECONDS, CHECK_GOAL = 6.5, 20.0
 TWO_THREADS_GOAL, COMPACT_BYTES_GOAL, COMPACT_TIME_GOAL = 1.7, 8.0, 2.0
 
 
@@ -177,8 +188,15 @@ def clocked(work: Callable[[], T]) -> tuple[T, float, float]:
     return result, time.perf_counter() - clock, time.process_time() - start
 
 
+def bare_inserts(words: str, markings: int, edges: int, processes: int) -> float:
+    """The seconds by the clock of bare random inserts, shared out among so many processes: those of the slowest."""
+    command = [*EXAMPLE, words, str(markings // processes), str(edges // processes)]
+    running = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(processes)]
+    return max(float(process.communicate()[0].split()[1]) for process in running)
+
+
 def two_threads(repeat: int) -> Table:
-    """Exploration on two threads against one, by the clock."""
+    """Exploration on two threads against one, by the clock, and what bare random inserts gain by two."""
     rows = []
     for subject in SUBJECTS:
         net = subject.net()
@@ -187,7 +205,14 @@ def two_threads(repeat: int) -> Table:
         if (graph.n_markings, graph.n_edges, graph.fired()) != (again.n_markings, again.n_edges, again.fired()):
             raise SystemExit(f"{subject}: {graph} by one thread, {again} by two")
         # Of the clock more runs are needed: whatever else the machine does is in it.
-        runs = [(clocked(one)[1:], clocked(two)[1:]) for _ in range(3 * repeat)]
+        words = str(1 << (graph.words - 1).bit_length())
+        bare: list[list[float]] = [[], []]
+        runs = []
+        for _ in range(3 * repeat):
+            runs.append((clocked(one)[1:], clocked(two)[1:]))
+            for processes, seconds in enumerate(bare, 1):
+                seconds.append(bare_inserts(words, graph.n_markings, graph.n_edges, processes))
+        limit = min(bare[0]) / min(bare[1])
         clock, spent = (min(run[0][k] for run in runs) for k in (0, 1))
         clock_two, spent_two = (min(run[1][k] for run in runs) for k in (0, 1))
         rows.append(
@@ -195,14 +220,18 @@ def two_threads(repeat: int) -> Table:
                 str(subject),
                 spread([by_two[0] for _, by_two in runs], graph.n_edges),
                 against(TWO_THREADS_GOAL, clock / clock_two, at_least=True),
+                f"{limit:.2f}",
+                f"{clock / clock_two / limit:.2f}",
                 f"{spent_two / spent:.2f}",
             )
         )
     return Table(
         "Exploration, two threads",
         "Nanoseconds an edge by the clock; how many times quicker than one thread by the clock, which means something "
-        "where nothing else wants the two processors; the processor time of both threads as a multiple of that of one.",
-        ("net", "ns/edge by the clock", "x one thread", "processor time, x one thread"),
+        "where nothing else wants the two processors; the same for bare random inserts, one program against two that "
+        "share nothing, each with half of the work; the first as a part of the second; the processor time of both "
+        "threads as a multiple of that of one.",
+        ("net", "ns/edge by the clock", "x one thread", "bare inserts, x one", "part", "processor time, x one thread"),
         tuple(rows),
     )
 
@@ -240,6 +269,32 @@ def compact(repeat: int) -> Table:
     )
 
 
+def checked(repeat: int) -> Table:
+    """`firable check` as a person types it, and how much of it is Python that starts."""
+    firable, net = str(Path(sys.executable).with_name("firable")), "philosophers-16"
+    commands = {"start": [sys.executable, "-c", ""], "check": [firable, "check", f"catalogue:{net}", "--no-cache"]}
+    times: dict[str, list[float]] = {what: [] for what in commands}
+    # An installed package is compiled, so whoever keeps Python from writing that down is not heard.
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    for _ in range(1 + 3 * repeat):  # the first compiles
+        for what, command in commands.items():
+            before = children_seconds()
+            done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+            times[what].append(children_seconds() - before)
+            if done.returncode > 1 or (what == "check" and "1,331,714 markings" not in done.stdout):
+                raise SystemExit(f"{command} ends with {done.returncode}:\n{done.stdout}{done.stderr}")
+    start, whole = times["start"][1:], times["check"][1:]
+    quicker = against(CHECK_GOAL, VERIFYPN_SECONDS / min(whole), at_least=True)
+    return Table(
+        "A whole check",
+        "Processor seconds of `firable check --no-cache` in a process of its own, all threads together (smallest / "
+        f"median / largest of the runs); how many times quicker than the {VERIFYPN_SECONDS} s that verifypn is known "
+        "to take for the markings alone.",
+        ("net", "Python's start", "seconds", "x verifypn"),
+        ((net, f"{min(start):.3f}", spread(whole, scale=1), quicker),),
+    )
+
+
 def tables(repeat: int) -> list[Table]:
     """All tables of this benchmark."""
-    return [*interleaving(repeat), two_threads(repeat), compact(repeat), synchronous(repeat)]
+    return [*interleaving(repeat), two_threads(repeat), compact(repeat), synchronous(repeat), checked(repeat)]

@@ -54,12 +54,13 @@ def timed(work: Callable[[], T]) -> tuple[T, float]:
 def example(name: str, *arguments: str, text: str = "") -> tuple[list[str], float]:
     """The words that an example of the crate prints, and the processor seconds that it took."""
     command = [str(CRATE / "target" / "release" / "examples" / name), *arguments]
-    before = _children_seconds()
+    before = children_seconds()
     words = subprocess.run(command, input=text, capture_output=True, text=True, check=True).stdout.split()
-    return words, _children_seconds() - before
+    return words, children_seconds() - before
 
 
-def _children_seconds() -> float:
+def children_seconds() -> float:
+    """The processor seconds of all processes that this one has waited for."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
 
