@@ -18,8 +18,8 @@ technique that found it, can check:
   never reached again;
 - *progress* shows a response under fairness: ranks that no firing without the answer raises, and for each rank a
   transition that must fire at last, and lowers it;
-- a closed set of markings, *unfolded*, shows a formula of LTL: a tableau of the negation has no run on it. The set is
-  all that is written; the checker unfolds the tableau itself;
+- a set of markings, *unfolded*, shows a formula of LTL: a tableau of the negation has no run on it, and nothing that it
+  follows leaves the set. The set is all that is written; the checker unfolds the tableau itself;
 - a *theorem* names a class of nets, and what of its premises cannot be read off the arcs.
 
 Where the invariant does not exclude the goal by itself, the absence of the goal may still be d-inductive within it: the
@@ -215,7 +215,7 @@ class Theorem:
 
 @dataclass(frozen=True, slots=True)
 class Unfolded:
-    """A formula of LTL is decided anew, on the markings of this closed set, by a tableau that the checker makes."""
+    """A formula of LTL is decided anew, on the markings of this set, by a tableau that the checker makes."""
 
     space: Markings
 

@@ -6,17 +6,33 @@ from dataclasses import replace
 import pytest
 from support.evidence_examples import LOOP, RACING
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.evidence.certificate import Certificate, Equation, InductiveInvariant, Inequality
+from firable.analysis.evidence.certificate import (
+    Certificate,
+    Diagram,
+    Equation,
+    InductiveInvariant,
+    Inequality,
+    Labelling,
+    Markings,
+    Unfolded,
+)
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
 from firable.analysis.evidence.checking.obligations import Evidence, obligations
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record, document_from_text
 from firable.analysis.evidence.meaning import suffices
+from firable.analysis.evidence.producing import claims as producing
+from firable.analysis.evidence.producing.claims import Certifier
+from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.evidence.refusal import TimeIsOverError
+from firable.analysis.goal import Limits
+from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Holds
 from firable.nets.net import Command, Net, Place
+from firable.nets.temporal import parse_temporal
 from firable.semantics.trace import Discipline
 
 STILL = Net("still", tuple(Place(f"p{i}", marked=i % 2 == 0) for i in range(60)))
@@ -82,3 +98,30 @@ def test_a_document_says_one_thing_of_each_verdict(records: list[Record], reason
 def test_claims_of_no_verdict_may_stand_beside_each_other() -> None:
     text = Document(LOOP, Discipline.INTERLEAVING, (Record("", True, ()), Record("", True, ()))).to_text()
     assert len(document_from_text(text).records) == 2
+
+
+def test_a_formula_of_ltl_that_few_markings_show_is_shown_where_nobody_lists_all() -> None:
+    net = family_net("machines-40")
+    claim = Claim(ClaimKind.LTL, parse_temporal("start"))
+    certificate = Certifier(net, Discipline.INTERLEAVING, Limits()).certify(claim)
+    assert certificate == Unfolded(Markings((net.initial_marking,)))
+
+
+def test_without_a_diagram_in_time_ctl_is_shown_on_more_listed_markings(monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(*_: object) -> None:
+        raise BudgetExceeded
+
+    net, claim = family_net("machines-4"), Claim(ClaimKind.CTL, parse_temporal("AG EF start"))
+    monkeypatch.setattr(producing, "MARKINGS_MAX", 3)
+    on_diagram = Certifier(net, Discipline.INTERLEAVING, Limits()).certify(claim)
+    assert isinstance(on_diagram, Labelling)
+    assert isinstance(on_diagram.space, Diagram)
+    monkeypatch.setattr(producing, "explore_symbolically", late)
+    listed = Certifier(net, Discipline.INTERLEAVING, Limits()).certify(claim)
+    assert isinstance(listed, Labelling)
+    assert isinstance(listed.space, Markings)
+    assert len(listed.space.markings) == 16
+    assert check_evidence(Evidence(net, Discipline.INTERLEAVING, claim, listed)).shown
+    monkeypatch.setattr(producing, "WIDE_MAX", 15)
+    with pytest.raises(LackingError, match="more than 15 markings"):
+        Certifier(net, Discipline.INTERLEAVING, Limits()).certify(claim)

@@ -6,20 +6,30 @@ from threading import Event
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.dense_nets import dense_nets
 from support.examples import examples, seeds
+from support.lively_nets import lively_nets
+from support.ring_nets import ring_nets
 from support.temporal_formulas import ltl_formulas
+from support.true_claims import true
 
+from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.evidence.certificate import Markings, Unfolded
+from firable.analysis.evidence.certificate import Labelling, Markings, Unfolded
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
-from firable.analysis.evidence.checking.listed import Listed
+from firable.analysis.evidence.checking.listed import Part
 from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.checking.runs import Lasso
 from firable.analysis.evidence.checking.unfolding import Unfolding
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record
+from firable.analysis.evidence.producing.labels import TooLargeError
+from firable.analysis.evidence.producing.unfolding import unfolded_markings
 from firable.analysis.evidence.refusal import TimeIsOverError
+from firable.analysis.spaces.reachability import explore
+from firable.nets.catalogue.families import family_net
 from firable.nets.diagnostics import InputError
+from firable.nets.formula import Holds
 from firable.nets.net import Net, Place, Transition
 from firable.nets.temporal import Temporal, parse_temporal
 from firable.semantics.trace import Discipline
@@ -39,7 +49,7 @@ CLAUSES = "not (" + " and ".join(f"({'X ' * i}p or {'X ' * i}q)" for i in range(
 """Its negation can begin in 2^29 ways, of which none owes less than another."""
 
 
-class Run(Listed):
+class Run(Part):
     """One run as a set of markings, whatever the net would fire: a word of letters that the tableau reads."""
 
     def __init__(self, run: Lasso) -> None:
@@ -121,3 +131,70 @@ def test_a_formula_that_cannot_be_unfolded_in_time_is_only_claimed() -> None:
 def test_the_time_is_looked_at_at_every_node_though_what_is_owed_there_is_known() -> None:
     with pytest.raises(TimeIsOverError):
         satisfied(lasso([(1, "t")] * 100, 0), parse_temporal("G p"), Deadline(cancelled=Countdown(50)))
+
+
+@st.composite
+def asked(draw: st.DrawFn) -> tuple[Net, Temporal]:
+    net = draw(st.one_of(ring_nets(signals=True), dense_nets(signals=True), lively_nets()))
+    return net, draw(ltl_formulas([place.name for place in net.places], list(net.transition_index)))
+
+
+def unfolded(net: Net, formula: Temporal, markings: Markings) -> Evidence:
+    return Evidence(net, Discipline.INTERLEAVING, Claim(ClaimKind.LTL, formula), Unfolded(markings))
+
+
+def shows(evidence: Evidence) -> bool:
+    try:
+        return check_evidence(evidence).shown is True
+    except InputError:
+        return False
+
+
+@given(question=asked(), data=st.data())
+@examples(150)
+def test_the_markings_that_a_formula_asks_for_show_it_iff_it_holds_and_none_can_be_spared(
+    question: tuple[Net, Temporal], data: st.DataObject
+) -> None:
+    net, formula = question
+    found = unfolded_markings(net, formula, 1_000, NEVER)
+    whole = explore(net)
+    everything = Markings(tuple(whole.marking(i) for i in range(whole.n_markings)))
+    holds = true(unfolded(net, formula, everything))
+    assert (found is not None) is holds
+    assert shows(unfolded(net, formula, everything)) is holds
+    if found is not None:
+        assert shows(unfolded(net, formula, found))
+        assert set(found.markings) <= set(everything.markings)
+        for i in range(len(found.markings)):
+            assert not shows(unfolded(net, formula, Markings(found.markings[:i] + found.markings[i + 1 :])))
+    part = data.draw(st.lists(st.sampled_from(everything.markings), unique=True))
+    assert holds or not shows(unfolded(net, formula, Markings(tuple(part))))
+
+
+def test_a_formula_that_is_decided_early_is_shown_by_few_of_many_markings() -> None:
+    net = family_net("machines-40")  # 2^40 markings
+    formula = parse_temporal(f"{net.places[0].name} or X X {net.places[1].name} or not {net.places[0].name}")
+    found = unfolded_markings(net, formula, 1_000, NEVER)
+    assert found is not None
+    assert len(found.markings) == 1
+    assert shows(unfolded(net, formula, found))
+
+
+def test_more_markings_than_are_listed_are_told() -> None:
+    formula = parse_temporal("G not r")
+    with pytest.raises(TooLargeError):
+        unfolded_markings(NET, formula, 1, NEVER)
+    assert unfolded_markings(NET, formula, 2, NEVER) is not None
+    with pytest.raises(BudgetExceeded):
+        unfolded_markings(NET, formula, 2, Deadline.after(0))
+
+
+def test_a_part_that_serves_a_formula_shows_nothing_that_wants_a_closed_set() -> None:
+    part = Markings((NET.initial_marking,))
+    formula = parse_temporal("p")
+    claim = Claim(ClaimKind.NEVER, Holds("q"))
+    shown = ((Claim(ClaimKind.LTL, formula), Unfolded(part)), (claim, Labelling(part)))
+    document = Document(NET, Discipline.INTERLEAVING, (Record("", True, shown[:1]),))
+    assert [one.shown for one in check_document(document)] == [True]
+    with pytest.raises(InputError, match="leads out of the set"):
+        list(check_document(Document(NET, Discipline.INTERLEAVING, (Record("", True, shown),))))

@@ -36,7 +36,7 @@ from firable.analysis.evidence.certificate import (
 )
 from firable.analysis.evidence.checking.diagrams import Diagrams
 from firable.analysis.evidence.checking.labelling import LabelledSpace, labelled
-from firable.analysis.evidence.checking.listed import Listed
+from firable.analysis.evidence.checking.listed import Listed, Part
 from firable.analysis.evidence.checking.obligations import (
     Evidence,
     Obligation,
@@ -166,6 +166,7 @@ class _Checker:
 
     timeout_ms: int
     _spaces: list[tuple[Net, Markings | Diagram, Listed | Diagrams]] = field(default_factory=list)
+    _parts: list[tuple[Net, Markings, Part]] = field(default_factory=list)
 
     def check(self, evidence: Evidence) -> Checked:
         """Check one claim."""
@@ -214,10 +215,10 @@ class _Checker:
                     return Checked(None, words, premise.bound or late)
                 return Checked(shown=True, method=words)
             case Unfolded(space):
-                listed = self._listed(evidence, space)
-                unfolding = Unfolding(listed, claim.goal, self.deadline)
+                part = self._part(evidence, space)
+                unfolding = Unfolding(part, claim.goal, self.deadline)
                 unfolding.check()
-                return Checked(shown=True, method=f"{listed.method}, {unfolding.nodes:,} nodes of a tableau on them")
+                return Checked(shown=True, method=f"{part.method}, {unfolding.nodes:,} nodes of a tableau on them")
 
     @property
     def deadline(self) -> Deadline:
@@ -237,6 +238,15 @@ class _Checker:
         else:
             made = Listed(evidence.net, evidence.discipline, of.markings, self.deadline)
         self._spaces.append((evidence.net, of, made))
+        return made
+
+    def _part(self, evidence: Evidence, of: Markings) -> Part:
+        """Markings of which nothing is asked but what fires in them: never one of `_spaces`, which are closed."""
+        for net, known, part in self._parts:
+            if net is evidence.net and known is of:
+                return part
+        made = Part(evidence.net, evidence.discipline, of.markings, self.deadline)
+        self._parts.append((evidence.net, of, made))
         return made
 
     def _listed(self, evidence: Evidence, of: Markings) -> Listed:

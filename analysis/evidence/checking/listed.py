@@ -1,4 +1,4 @@
-"""A closed set of listed markings: each is fired through by the reference player, and labels are ranks.
+"""A set of listed markings, closed as a rule: each is fired through by the reference player, and labels are ranks.
 
 Columns of Booleans, one for each marking of the list, are its subsets. Everything is one look at each marking and its
 successors, so a check costs about what it costs to read the list.
@@ -25,8 +25,12 @@ Column = list[bool]
 _CLOCK_EVERY = 256
 
 
-class Listed:
-    """A set of markings that is closed under firing, and holds M0; refused where it is not."""
+OUTSIDE = -1
+"""The number of a marking that is not in the set."""
+
+
+class Part:
+    """A set of markings that holds M0; firings may lead out of it, to `OUTSIDE`."""
 
     def __init__(
         self, net: Net, discipline: Discipline, markings: Sequence[Marking], deadline: Deadline = NEVER
@@ -44,10 +48,21 @@ class Listed:
                 raise TimeIsOverError
             row = []
             for fired, after in self._successors(i, marking):
-                if after not in places:
-                    refuse(f"a firing leads out of the set, to {shown(net, after)}")
-                row.append((fired, places[after]))
+                row.append((fired, places[after] if after in places else self._outside(after)))
             self.edges.append(row)
+
+    def _outside(self, _: Marking) -> int:
+        return OUTSIDE
+
+    @cached_property
+    def _held(self) -> dict[Formula, Column]:
+        return {}
+
+    def holds(self, formula: Formula, at: int) -> bool:
+        """Whether a state formula holds in a marking of the set."""
+        if formula not in self._held:
+            self._held[formula] = self.where(formula)
+        return self._held[formula][at]
 
     @property
     def method(self) -> str:
@@ -89,14 +104,21 @@ class Listed:
         size = len(self.markings)
         return [digit == "1" for digit in reversed(f"{number:0{size}b}")] if size else []
 
-    def holds_initially(self, column: Column) -> bool:
-        """Whether M0 is in a subset."""
-        return column[self.start]
-
     def where(self, formula: Formula) -> Column:
         """The markings in which a state formula holds."""
         algebra, of_places = self._columns
         return self._column(evaluate(algebra, self.net, formula, of_places.__getitem__))
+
+
+class Listed(Part):
+    """A set of markings that is closed under firing, and holds M0; refused where it is not."""
+
+    def _outside(self, marking: Marking) -> int:
+        refuse(f"a firing leads out of the set, to {shown(self.net, marking)}")
+
+    def holds_initially(self, column: Column) -> bool:
+        """Whether M0 is in a subset."""
+        return column[self.start]
 
     def all_of(self, sets: Iterable[Column]) -> Column:
         """The markings in all of the subsets."""

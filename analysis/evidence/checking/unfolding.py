@@ -1,4 +1,4 @@
-"""A formula of LTL on a closed set of markings: every run that could refute it is followed, by a tableau made here.
+"""A formula of LTL on a set of markings: every run that could refute it is followed, by a tableau made here.
 
 A node is a marking with what the rest of the run owes to satisfy the negation. What is owed is unfolded into what
 holds now and what is owed next (Couvreur 1999, "On-the-fly verification of linear temporal logic"): `p U q` is q now,
@@ -6,6 +6,10 @@ or p now and the same next, which postpones q; `p R q` is q now, and p now or th
 iff it can go round for ever without postponing any one until all the time. So the formula holds iff in no strongly
 connected part of what is reached from M0, for every until, some firing does not postpone it. In a deadlock the
 marking is repeated.
+
+The set need not be closed. Where no way is left to refute the formula, a run is not followed, so the markings after it
+are not asked for; a run that may still refute it must not leave the set. So a formula that is decided early is
+shown by a part of the markings.
 
 The parts of the formula are numbered, each after those that it is made of, and what is owed is a set of numbers:
 unfolded from the highest down, no part is unfolded twice, and a part that occurs often is one number. It is unfolded
@@ -29,14 +33,16 @@ markings; the tableau shares nothing with that of `firable.analysis.temporal` bu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import Protocol
 
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.evidence.checking.listed import Column, Listed
+from firable.analysis.evidence.checking.listed import OUTSIDE
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse, shown
 from firable.nets.formula import Constant, Formula
+from firable.nets.net import Marking, Net
 from firable.nets.temporal import (
     Eventually,
     Fires,
@@ -196,14 +202,54 @@ Edge = tuple[Product, Numbers]
 """The node after, and the untils that are postponed."""
 
 
+class Unfoldable(Protocol):
+    """Markings by number, M0 being `start`, and their firings, to the numbers of the markings after."""
+
+    @property
+    def net(self) -> Net:
+        """The net."""
+        ...
+
+    @property
+    def discipline(self) -> Discipline:
+        """How transitions fire."""
+        ...
+
+    @property
+    def start(self) -> int:
+        """The number of M0."""
+        ...
+
+    @property
+    def markings(self) -> Sequence[Marking]:
+        """The markings."""
+        ...
+
+    @property
+    def edges(self) -> Edges:
+        """Of each marking what fires there, and the number of the marking after."""
+        ...
+
+    def holds(self, formula: Formula, at: int, /) -> bool:
+        """Whether a state formula holds in a marking."""
+        ...
+
+
+class Edges(Protocol):
+    """The firings of each marking."""
+
+    def __getitem__(self, at: int, /) -> list[tuple[FiringSet, int]]:
+        """Those of one."""
+        ...
+
+
 class Unfolding:
     """The nodes that the negation of a formula leads to, from M0."""
 
-    def __init__(self, space: Listed, formula: Temporal, deadline: Deadline = NEVER) -> None:
+    def __init__(self, space: Unfoldable, formula: Temporal, deadline: Deadline = NEVER) -> None:
         self.space, self.formula, self.deadline = space, formula, deadline
         self.tableau = _Tableau(formula, deadline, negative=True)
         self.nodes = 0
-        self._columns: dict[Formula, Column] = {}
         self._holding: dict[int, Numbers] = {}
         self._firing: dict[FiringSet, Numbers] = {}
 
@@ -225,8 +271,12 @@ class Unfolding:
         at, owed = node
         found = []
         for fired, after in self.space.edges[at] or [((), at)]:
-            letter = self._held(at) | self._fired(fired)
-            found += [((after, way.owed), way.postponed) for way in self.tableau.ways(letter, owed)]
+            ways = self.tableau.ways(self._held(at) | self._fired(fired), owed)
+            if ways and after == OUTSIDE:
+                names = " + ".join(self.space.net.transitions[t].name for t in fired)
+                here = shown(self.space.net, self.space.markings[at])
+                refuse(f"a run that may refute the formula leads out of the set, by {names} from {here}")
+            found += [((after, way.owed), way.postponed) for way in ways]
         return found
 
     def _held(self, at: int) -> Numbers:
@@ -237,7 +287,7 @@ class Unfolding:
                 for number, part in enumerate(self.tableau.parts)
                 if isinstance(part, _Literal)
                 and not isinstance(part.atom, Fires)
-                and self._column(part.atom)[at] is part.wanted
+                and self.space.holds(part.atom, at) is part.wanted
             )
         return self._holding[at]
 
@@ -253,13 +303,6 @@ class Unfolding:
                 and (part.atom.transition in names) is part.wanted
             )
         return self._firing[fired]
-
-    def _column(self, formula: Formula) -> Column:
-        if formula not in self._columns:
-            if self.deadline.over:
-                raise TimeIsOverError
-            self._columns[formula] = self.space.where(formula)
-        return self._columns[formula]
 
     def _parts(self, start: Product) -> Iterator[list[Product]]:
         """The strongly connected parts of what is reached (Tarjan 1972), without recursion."""

@@ -46,6 +46,7 @@ from firable.analysis.evidence.producing.runs import (
 )
 from firable.analysis.evidence.producing.stubborn import stubborn_sets
 from firable.analysis.evidence.producing.theorems import theorem_on
+from firable.analysis.evidence.producing.unfolding import unfolded_markings
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
 from firable.analysis.induction.pdr import decide_by_pdr
@@ -64,7 +65,7 @@ from firable.semantics.trace import Discipline
 MARKINGS_MAX: Final = 20_000
 """How many markings are listed where a decision diagram would do as well."""
 WIDE_MAX: Final = 100_000
-"""How many markings are listed where none would: for responses, LTL and synchronous steps."""
+"""How many markings are listed where none would, or none is at hand: for responses, LTL, synchronous steps, CTL."""
 _SECONDS: Final = 30.0
 
 
@@ -167,9 +168,7 @@ class Certifier:
             case ClaimKind.NOT_LTL | ClaimKind.NOT_LEADS_TO:
                 return None if witness is None else maximal(self.net, self.discipline, witness)
             case ClaimKind.LTL:
-                if self.wide_markings is None:
-                    raise LackingError(f"a tableau is unfolded on up to {WIDE_MAX:,} markings")
-                return Unfolded(self.wide_markings)
+                return self._unfolded(claim)
             case ClaimKind.LEADS_TO:
                 if self.wide is None or self.wide_markings is None:
                     raise LackingError(f"ranks for a response are written for up to {WIDE_MAX:,} markings")
@@ -183,6 +182,20 @@ class Certifier:
             case ClaimKind.FIRES:
                 raise LackingError("runs are looked for together")
         return self._labelled(claim)
+
+    def _unfolded(self, claim: Claim) -> Unfolded | None:
+        """Markings that serve every formula, where they are few; else those that this one asks for; else all."""
+        if self.markings is not None:
+            return Unfolded(self.markings)
+        if self.discipline is Discipline.INTERLEAVING:
+            try:
+                found = unfolded_markings(self.net, claim.goal, WIDE_MAX, self._part(0.2))
+                return None if found is None else Unfolded(found)
+            except (TooLargeError, BudgetExceeded):
+                pass  # all markings, which a graph finds faster, may be few enough
+        if self.wide_markings is None:
+            raise LackingError(f"a tableau is unfolded on up to {WIDE_MAX:,} markings")
+        return Unfolded(self.wide_markings)
 
     def _unordered(self, witness: Witness) -> FiringSequence | None:
         """The run, with the step after it that has no order."""
@@ -201,7 +214,9 @@ class Certifier:
             return labelling(self.graph, self.markings, formula)
         if self.symbolic is not None and self.diagram is not None:
             return labelling(self.symbolic, self.diagram, formula)
-        raise LackingError(f"there are more than {MARKINGS_MAX:,} markings, and no decision diagram of them at hand")
+        if self.wide is not None and self.wide_markings is not None:
+            return labelling(self.wide, self.wide_markings, formula)
+        raise LackingError(f"there are more than {WIDE_MAX:,} markings, and no decision diagram of them at hand")
 
     def _never(self, goal: Formula) -> NeverCertificate | None:
         finding = self._findings.get(goal)
