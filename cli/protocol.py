@@ -8,7 +8,7 @@ fault do to the cell (`--faults`), and which of the protocols known to be wrong 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
@@ -86,7 +86,7 @@ def ask(
     from firable.decompose.protocol.refuting import readable, refute
     from firable.decompose.protocol.verdicts import protocol_verdicts
     from firable.decompose.protocol.wrong import wrong_protocols
-    from firable.decompose.splitting.persistence import freed
+    from firable.decompose.splitting.persistence import persistence
 
     def limits() -> Limits:
         return Limits(Deadline.after(seconds))
@@ -101,14 +101,16 @@ def ask(
     try:
         if asked.protocol or asked.faults:
             begins("asking which parts need no promise")
-            running = freed(decomposition)
+            votes = persistence(decomposition)
+            voted, shown_votes = votes.with_evidence()
+            running = replace(decomposition, free=votes.free_as_shown(voted))
             begins("exploring the protocol" + " with and without faults" * asked.faults)
             timeout_ms = max(1, round(seconds * 1000))
             found = protocol_verdicts(running, limits, faults=asked.faults, timeout_ms=timeout_ms)
             free = len(running.free)
             verdicts, protocols = found.verdicts, found.protocols
             begins("writing the evidence of it")
-            files = found.evidence() if evidence else {}
+            files = {**shown_votes, **found.evidence()} if evidence else {}
         if asked.faults:
             begins("asking what goes on while somebody is dead")
             for inquest in inquests(decomposition, limits):

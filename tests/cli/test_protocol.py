@@ -142,6 +142,12 @@ def test_evidence_is_written_beside_the_obligations_and_verified(
     assert main(["verify", str(evidence)]) == 0
 
 
+def test_what_shows_that_votes_stand_is_written_beside_what_rests_on_it(tmp_path: Path) -> None:
+    folder = tmp_path / "smt"
+    assert main(["prove", "catalogue:one_robot", "--protocol", "--smt-dir", str(folder)]) == 0
+    assert main(["verify", str(folder / "persistence.evidence.json")]) == 0
+
+
 def test_page_tells_what_was_found(net: str, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     assert main(["prove", net, "--wrong", "--report", str(page)]) == 0
