@@ -11,7 +11,7 @@ in docs/codes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -223,3 +223,14 @@ def did_you_mean(name: str, known: Sequence[str]) -> str:
     known = [candidate for candidate in known if abs(len(candidate) - len(name)) <= 4][:2000] if len(name) <= 80 else []
     close = get_close_matches(name, known, n=1, cutoff=0.6)
     return f"did you mean '{close[0]}'? " if close else ""
+
+
+def unknown_name(code: str, kind: str, name: str, known: Collection[str], subject: Subject) -> Diagnostic:
+    """The diagnostic on a name that nothing has, with the known name that was probably meant."""
+    local = min((full for full in known if full.rpartition(".")[2] == name), default=None)
+    # Names much longer or shorter are no slips of the pen, and would be sorted for nothing.
+    similar = sorted(full for full in known if abs(len(full) - len(name)) <= 4)
+    suggestion = f"did you mean '{local}'? " if local else did_you_mean(name, similar)
+    return Diagnostic(
+        code, f"there is no {kind} '{name}'", f"{suggestion}Declare it first, or correct the name.".strip(), subject
+    )

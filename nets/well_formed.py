@@ -7,11 +7,11 @@ express, such as a completion signal that gates nothing, is a `ValueError`: the 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean
+from firable.nets.diagnostics import Diagnostic, Subject, did_you_mean, unknown_name
 from firable.nets.formula import CONSTANT_ATOMS, Firable, Holds, names_in
 from firable.nets.net import (
     ArbitrationRule,
@@ -179,7 +179,7 @@ def _completions(net: Net) -> Iterator[Diagnostic]:
         subject: Subject = ("places", place.name, "until")
         signal = signals.get(place.completion)
         if signal is None:
-            yield _unknown("F2003", "signal", place.completion, signals, subject)
+            yield unknown_name("F2003", "signal", place.completion, signals, subject)
         elif signal.kind is not SignalKind.COMPLETION:
             declared = "a sensor" if signal.kind is SignalKind.SENSOR else "a timer"
             yield Diagnostic(
@@ -304,29 +304,19 @@ def _transition_problems(transition: Transition, known: _Known) -> Iterator[Diag
                     subject,
                 )
             elif not is_gate:
-                yield _unknown("F2002", "place", name, places, subject)
+                yield unknown_name("F2002", "place", name, places, subject)
             elif name not in signals:
-                yield _unknown("F2021", "place or signal", name, places | signals, subject)
+                yield unknown_name("F2021", "place or signal", name, places | signals, subject)
     seen_gates: set[ExternalGate] = set()
     for gate in transition.external:
         subject = ("transitions", transition.name, "if" if gate.wanted else "unless", gate.signal)
         if gate.signal not in signals:
-            yield _unknown("F2003", "signal", gate.signal, signals, subject)
+            yield unknown_name("F2003", "signal", gate.signal, signals, subject)
         if gate in seen_gates:
             yield Diagnostic(
                 "F2022", f"the gate '{gate.signal}' of '{transition.name}' stands twice", "write it once", subject
             )
         seen_gates.add(gate)
-
-
-def _unknown(code: str, kind: str, name: str, known: Collection[str], subject: Subject) -> Diagnostic:
-    local = min((full for full in known if full.rpartition(".")[2] == name), default=None)
-    # Names much longer or shorter are no slips of the pen, and would be sorted for nothing.
-    similar = sorted(full for full in known if abs(len(full) - len(name)) <= 4)
-    suggestion = f"did you mean '{local}'? " if local else did_you_mean(name, similar)
-    return Diagnostic(
-        code, f"there is no {kind} '{name}'", f"{suggestion}Declare it first, or correct the name.".strip(), subject
-    )
 
 
 def _numbers(net: Net) -> Iterator[Diagnostic]:
@@ -362,7 +352,7 @@ def _arbiters(net: Net) -> Iterator[Diagnostic]:
             )
         for name in dict.fromkeys(arbiter.among):
             if name not in names:
-                yield _unknown("F2004", "transition", name, names, (*subject, name))
+                yield unknown_name("F2004", "transition", name, names, (*subject, name))
             elif (other := taken.setdefault(name, arbiter.name)) != arbiter.name:
                 yield Diagnostic(
                     "F2013",
@@ -387,10 +377,10 @@ def _properties(net: Net) -> Iterator[Diagnostic]:
             if isinstance(atom, Holds):
                 if atom.place not in places:
                     subject: Subject = ("properties", prop.name, atom.place)
-                    yield _unknown("F2002", "place", atom.place, places, subject)
+                    yield unknown_name("F2002", "place", atom.place, places, subject)
             elif atom.transition not in transitions:
                 subject = ("properties", prop.name, atom.transition)
-                yield _unknown("F2004", "transition", atom.transition, transitions, subject)
+                yield unknown_name("F2004", "transition", atom.transition, transitions, subject)
 
 
 def _atoms(prop: Property | TemporalProperty) -> Iterator[Holds | Firable | Fires]:
