@@ -12,17 +12,20 @@ import click
 
 from firable.cli import text
 from firable.cli.report import Report
+from firable.cli.watched import machines_verdict
 from firable.nets.source import printable
 
 if TYPE_CHECKING:
     from firable.executor.drivers.driver import Driver
     from firable.executor.links.link import Link
     from firable.executor.operating.log import Log
+    from firable.executor.operating.running import Watch
     from firable.executor.operating.service import Service
     from firable.executor.operating.situation import Situation
     from firable.executor.protocol.commands import Answer
     from firable.nets.bundle import Bundle
     from firable.nets.diagnostics import Diagnostic
+    from firable.nets.machines.plant_file import PlantModel
     from firable.nets.verdict import Verdict
 
 _ADDRESS: Final = re.compile(r"(tcp|tls)/(\[[0-9A-Fa-f:.]+(%\w+)?\]|[^\s/:\[\]#?]+):(?P<port>[0-9]{1,5})")
@@ -149,6 +152,9 @@ def run_host_of(
     said: Mapping[str, Answer],
     service: Service | None,
     log: Log | None,
+    *,
+    plant: PlantModel | None,
+    watch: Watch,
 ) -> Report:
     """Run this host until it is stopped or fails, and report how it ended."""
     from firable.executor.operating.hosting import machines_of, run_host
@@ -170,12 +176,14 @@ def run_host_of(
         tell=_told,
         service=service,
         log=log,
+        plant=plant,
+        watch=watch,
     )
     return Report(
         "run",
         path,
         bundle.net,
-        (_verdict(report.situation, machines),),
+        (_verdict(report.situation, machines), *machines_verdict(report, "run of one host, of its own machines")),
         files=(trace,) if trace else (),
         run=report.to_json(),
     )

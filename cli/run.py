@@ -106,7 +106,8 @@ def run(
 
     With --controller, only these controllers run here, on machines that --bind names, and the others on hosts that are
     linked to this one by --listen and --join, or by --serial. A host that holds another bundle is refused. The run ends
-    by Ctrl-C; `firable replay` joins the traces of all hosts. Without machines, --dry-run tries all that.
+    by Ctrl-C; `firable replay` joins the traces of all hosts. With --plant, the machines here are held against the
+    plant file, as far as this host sees. Without machines, --dry-run tries all that.
     """
     refuse_a_net(bundle, "what runs is a bundle", "firable run")
     options = HostOptions(**host)
@@ -116,12 +117,12 @@ def run(
     served = ServeOptions(serve, token_file, serve_tls, operators)
     if serve is not None and _SPEEDS[speed] is None and options.bind is None and not options.is_one_of_several:
         raise click.UsageError("in virtual time a run is over before anybody acts: with --serve, name --speed 1 or 10")
-    if options.is_one_of_several and (plant is not None or watch == "stop" or step):
-        raise click.UsageError(
-            "--plant, --watch and --step are of a whole run: what the machines of one host should do depends on those "
-            "of the others, which it does not see; hold the joined traces against the plant file, with "
-            "`firable replay ... -o FILE` and `firable replay FILE --machines PLANT`"
-        )
+    if options.is_one_of_several and step:
+        raise click.UsageError("--step is of a whole run: on one host of several, `firable operate` steps (--serve)")
+    if options.is_one_of_several and (plant is not None or watch == "stop") and options.bind is None:
+        raise click.UsageError("--plant and --watch are of machines: say with --bind where those of this host are")
+    if options.is_one_of_several and watch == "stop" and plant is None:
+        raise click.UsageError("say with --plant what the machines of this host should do")
 
     def make() -> Report:
         from firable.cli.stepping import stepping
@@ -130,7 +131,7 @@ def run(
 
         loaded = load(bundle, trust)
         plant_file = None
-        if not options.is_one_of_several and (plant is not None or options.bind is None):
+        if plant is not None or (options.bind is None and not options.is_one_of_several):
             plant_file = _plant_file(loaded, plant)
         secrets = (token_file, operators, *(serve_tls or ()), *(options.tls or ()))
         read = [path for path in (bundle, options.bind, plant_file, *trust, *secrets) if path is not None]
@@ -138,7 +139,10 @@ def run(
         service = served.service()
         if options.is_one_of_several:
             said = _said(loaded.net, say, options.journal)
-            return run_host_of(bundle, loaded, options, trace, said, service, log_to(log))
+            model = None if plant_file is None else read_plant(plant_file)
+            return run_host_of(
+                bundle, loaded, options, trace, said, service, log_to(log), plant=model, watch=Watch(watch)
+            )
         if options.bind is not None:
             return run_bound_of(
                 bundle,
@@ -154,10 +158,9 @@ def run(
                 service=service,
                 log=log_to(log),
             )
-        model = read_plant(plant_file or _plant_file(loaded, plant))
         report = run_bundle(
             loaded,
-            model,
+            read_plant(plant_file or _plant_file(loaded, plant)),
             workpieces=workpieces,
             seed=seed,
             speed=_SPEEDS[speed],

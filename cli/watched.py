@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from firable.executor import RunReport
+    from firable.executor.operating.hosting import HostReport
     from firable.nets.verdict import Verdict
 
 
-def machines_verdict(report: RunReport, method: str) -> tuple[Verdict, ...]:
+def machines_verdict(report: RunReport | HostReport, method: str) -> tuple[Verdict, ...]:
     """The verdict on the machines of a run; none where they were not watched."""
     from firable.nets.verdict import Status, Verdict
 

@@ -42,6 +42,7 @@ from firable.executor.operating.acts import Acts, SignalRead
 from firable.executor.operating.clock import RunClock
 from firable.executor.operating.dispatch import Dispatch
 from firable.executor.operating.figures import Figures
+from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.peers import Peers
@@ -87,7 +88,7 @@ class Host:
         resume: bool = False,
         said: Mapping[str, Answer] | None = None,
         tell: Told | None = None,
-        monitor: Monitor | None = None,
+        monitor: Monitor | LocalMonitor | None = None,
         stop_at_divergence: bool = False,
         figures: Figures | None = None,
         patience: Patience | None = None,
@@ -118,6 +119,8 @@ class Host:
         self.owner_of = {
             signal.name: name for name in self.controllers for signal in decomposition.subnet(name).signals
         }
+        if isinstance(monitor, LocalMonitor):
+            monitor.excuse(lambda signal: self.controllers[self.owner_of[signal]].holds(signal))
         self.said = said or {}
         """What the operator has said beforehand of commands, by place."""
         self.taking_up: restart.TakingUp | None = None
@@ -397,7 +400,9 @@ class Host:
         return not self.working and not self.acts.posted
 
     def _diverged(self, found: Divergence) -> None:
-        """The machines do what their model excludes."""
+        """The machines do what their model excludes; what they do when they are stopped it does not know."""
+        if self.stopping:
+            return
         self.divergence = found
         self.recorder.note(found.at_seconds, "divergence", message=str(found))
         self._wake()

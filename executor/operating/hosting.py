@@ -16,7 +16,10 @@ from typing import Final
 from firable.executor.drivers.driver import Driver
 from firable.executor.links.link import Greeting, Link
 from firable.executor.operating.host import Host, Told
+from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.log import Log
+from firable.executor.operating.monitor import Divergence
+from firable.executor.operating.running import Watch
 from firable.executor.operating.service import Service, figures_for, patience_with, run_to_the_end
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.taken_up import opened
@@ -26,6 +29,7 @@ from firable.nets.bundle import Bundle
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
 from firable.nets.layers import Layers
+from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Net
 from firable.nets.source import printable, read_bytes
 
@@ -54,13 +58,18 @@ class SerialLine:
 
 @dataclass(frozen=True, slots=True)
 class HostReport:
-    """How a host ended, and what it had to say and to repeat; `never_met` are machines that were never reached."""
+    """How a host ended, and what it had to say and to repeat; `never_met` are machines that were never reached.
+
+    Where its own machines were `watched`, `divergence` is the first thing that they did and cannot have done.
+    """
 
     situation: Situation
     machines: tuple[str, ...]
     messages: int
     repeats: int
     never_met: tuple[str, ...]
+    watched: bool = False
+    divergence: Divergence | None = None
 
     def to_json(self) -> dict[str, object]:
         """The report as JSON data."""
@@ -73,6 +82,7 @@ class HostReport:
             "messages": self.messages,
             "repeats": self.repeats,
             "never_met": list(self.never_met),
+            **({"divergence": self.divergence.to_json()} if self.divergence is not None else {}),
         }
 
 
@@ -164,13 +174,23 @@ def run_host(
     tell: Told | None = None,
     service: Service | None = None,
     log: Log | None = None,
+    plant: PlantModel | None = None,
+    watch: Watch = Watch.TELL,
 ) -> HostReport:
     """Run a host until it is stopped (Ctrl-C, SIGTERM, an operator) or fails.
 
     `resume` ends the hold after a restart by itself; `said` is what an operator says of commands, by place, where no
-    machine can tell what became of them. Raises `InputError` as link, journal and trace do.
+    machine can tell what became of them. Where a `plant` says what the machines should do, those here are held against
+    it as the run goes (`watch`), unless it is taken up. Raises `InputError` as link, journal and trace do, and F5003
+    where the plant does not fit.
     """
+    controllers = [subnet.name for subnet in bundle.decomposition.subnets if subnet.name in machines]
+    monitor = None
+    if plant is not None and watch is not Watch.IGNORE:
+        monitor = LocalMonitor(bundle.decomposition, controllers, plant)
     with opened(bundle.decomposition, bundle.digest, journal_path, trace_path, machines=machines) as files:
+        if files.is_taken_up:
+            monitor = None
         figures = figures_for(bundle.net, service, machines)
         host = Host(
             bundle.decomposition,
@@ -187,6 +207,10 @@ def run_host(
             tell=tell,
             figures=figures,
             log=log,
+            monitor=monitor,
+            stop_at_divergence=watch is Watch.STOP,
         )
         situation = run_to_the_end(host, service, figures)
-    return HostReport(situation, machines, host.acts.messages, host.acts.repeats, host.peers.never_met)
+    acts = host.acts
+    never_met, watched = host.peers.never_met, monitor is not None
+    return HostReport(situation, machines, acts.messages, acts.repeats, never_met, watched, host.divergence)

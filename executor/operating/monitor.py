@@ -27,12 +27,12 @@ A pure machine: events with their times in, one divergence out, at the event tha
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
 from firable.nets.machines.closing import close
-from firable.nets.machines.laws import Laws
+from firable.nets.machines.laws import PLANT, Laws
 from firable.nets.machines.loop import Sending
 from firable.nets.machines.plant_file import Carry, PlantModel, Put, Stop
 from firable.nets.net import Marking, Net
@@ -109,10 +109,18 @@ _Belief = dict[Marking, tuple[float, ...]]
 class Monitor:
     """The belief in a cell with the machines of a plant, from its beginning.
 
-    Raises `InputError` F5003 where the plant does not fit the net.
+    At the stations of `elsewhere` others do what they like, who are not seen (`local_monitor.py`). Raises `InputError`
+    F5003 where the plant does not fit the net.
     """
 
-    def __init__(self, net: Net, model: PlantModel, *, latency_seconds: float = LATENCY_SECONDS) -> None:
+    def __init__(
+        self,
+        net: Net,
+        model: PlantModel,
+        *,
+        latency_seconds: float = LATENCY_SECONDS,
+        elsewhere: Collection[str] = (),
+    ) -> None:
         loop = close(_without_sensor_gates(net), model, sending=Sending.LATE)
         laws = Laws(model, net)
         self.net = net
@@ -131,8 +139,14 @@ class Monitor:
                 if moves[name].flips & bit:
                     (self.refusing if name in loop.accidents else self.sending)[place].append(moves[name])
         self.hidden = [m for name, m in moves.items() if name not in own | sends and name not in loop.accidents]
+        self.hidden += [move for station in elsewhere for move in self._by_others(laws, station)]
         self.signals = tuple(signal.name for signal in net.signals if signal.name in loop.shown)
         """All but timers: that a time is over says nothing of the machines."""
+        self.is_held: Callable[[str], bool] = lambda _: False
+        """Whether a promise keeps a signal as it was; until it ends no change of it is taken."""
+        self.held: set[str] = set()
+        self.freed_seconds = dict.fromkeys(self.signals, _NEVER)
+        """When a promise on each signal was last seen."""
         self.shown = tuple((self._bit(place), means) for place, means in map(loop.shown.__getitem__, self.signals))
         self.work = {place.name: self._work(laws, place.name, loop.at) for place in laws.commanding}
         self.taken = [bool(loop.net.initial_marking & bit) == means for bit, means in self.shown]
@@ -198,6 +212,7 @@ class Monitor:
         """Time has passed, and nothing was seen: what has become too late is left, one deadline after the other."""
         if self.divergence is not None:
             return None
+        self._look_at_promises(at_seconds)
         while (due := self.deadline_seconds()) is not None and due < at_seconds:
             believed = self._closed(self.belief, due)  # what has not moved may move at the last moment
             late = {
@@ -214,7 +229,8 @@ class Monitor:
         if self.divergence is not None:
             return None
         demands = (demand for marking, since in self.belief.items() for demand in self._demands(marking, since))
-        return min((demand.due_seconds for demand in demands), default=None)
+        due = min((demand.due_seconds for demand in demands), default=None)
+        return None if due == math.inf else due
 
     def _seen(
         self, at_seconds: float, moves: Iterable[_Move], subject: str, message: str, places: tuple[str, ...]
@@ -274,11 +290,34 @@ class Monitor:
         for place, work in self.work.items():
             waits = work.waits_while_empty and not marking & work.waits_while_empty
             if marking & work.busy and not waits:
-                begun = self.sent_seconds.get(place, 0.0)
-                yield _Demand(begun + work.longest_seconds + self.latency_seconds, place)
+                begun = self.sent_seconds.get(place, 0.0) + work.longest_seconds
+                completion = self.net.place(place).completion
+                yield _Demand(self._excused(begun, completion) + self.latency_seconds, place)
         for name, (bit, means), stamp, taken in zip(self.signals, self.shown, since, self.taken, strict=True):
             if (bool(marking & bit) == means) != taken:
-                yield _Demand(stamp + self.latency_seconds, name)
+                yield _Demand(self._excused(stamp, name) + self.latency_seconds, name)
+
+    def _look_at_promises(self, at_seconds: float) -> None:
+        held = {name for name in self.signals if self.is_held(name)}
+        for name in held | self.held:
+            self.freed_seconds[name] = at_seconds
+        self.held = held
+
+    def _excused(self, since_seconds: float, signal: str | None) -> float:
+        """Since when it has been possible to take a change: not as long as a promise holds the signal."""
+        if signal in self.held:
+            return math.inf
+        return max(since_seconds, self.freed_seconds.get(signal, _NEVER)) if signal is not None else since_seconds
+
+    def _by_others(self, laws: Laws, station: str) -> Iterator[_Move]:
+        """What machines that are not seen may do at a station: each workpiece comes and goes, each sensor follows."""
+        ways = [self._bit(laws.empty(station)), *(self._bit(laws.has(station, kind)) for kind in laws.kinds)]
+        for before in ways:
+            yield from (_Move(before, after, before | after, "") for after in ways if after != before)
+        for name, sensor in laws.model.sensors.items():
+            if sensor.occupied == station and (sensor.may_flicker or sensor.may_linger):
+                bit = self._bit(f"{PLANT}.{name}.sensor" if f"{PLANT}.{name}.sensor" in self.index else name)
+                yield from (_Move(bit, 0, bit, ""), _Move(0, bit, bit, ""))
 
     def _told(self, missed: _Demand) -> tuple[str, str, tuple[str, ...]]:
         """Subject, message and places of a demand that was not met."""

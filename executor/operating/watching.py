@@ -10,6 +10,7 @@ import asyncio
 from collections.abc import Callable
 
 from firable.executor.drivers.driver import Clock
+from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.semantics.trace import Event
 
@@ -17,7 +18,7 @@ from firable.semantics.trace import Event
 class Watching:
     """A monitor beside a run; `tell` is called once at most."""
 
-    def __init__(self, monitor: Monitor, tell: Callable[[Divergence], None]) -> None:
+    def __init__(self, monitor: Monitor | LocalMonitor, tell: Callable[[Divergence], None]) -> None:
         self.monitor = monitor
         self.tell = tell
         self.clock: Clock | None = None

@@ -249,6 +249,10 @@ class LocalController:
         """The coordinators that have not said yet that no round needs it; nobody unless it is leaving."""
         return tuple(name for name, above in self.above.items() if self._is_unanswered(above))
 
+    def holds(self, signal: str) -> bool:
+        """Whether a promise keeps a signal in the image as it was."""
+        return bool(self.promises and self.player.signal_bit(signal) & self._locked_reads())
+
     def applies(self, decision: Decision) -> bool:
         """Whether this order would fire a part here: it commits one, and has not been obeyed."""
         return decision.committed in self.parts and not self._is_closed(decision.round)

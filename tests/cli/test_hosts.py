@@ -52,10 +52,12 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
         ],
         "cell.bundle is no certificate of an authority",
     ),
-    "machines held against their model": (
+    "no machines to be held against a model": (
         ["--controller", "robot", "--dry-run", "1", "--join", "tcp/[::1]:1", "--watch", "stop"],
-        "depends on those of the others",
+        "say with --bind",
     ),
+    "no model": (["--controller", "robot", "--bind", "x", "--join", "tcp/[::1]:1", "--watch", "stop"], "with --plant"),
+    "steps at the terminal": (["--controller", "robot", "--dry-run", "1", "--step"], "`firable operate` steps"),
     "one file for two": (["--controller", "mc", "--trace", "{bundle}", "--journal", "x"], "overwrite"),
 }
 

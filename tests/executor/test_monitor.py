@@ -2,44 +2,19 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 
 import pytest
+from support.watched_runs import CELLS, run_of, slower
 
 from firable.decompose.splitting.cut import split
-from firable.executor.cell.plant import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.cell.plant import NeverCompletes, StuckSensor
 from firable.executor.operating.monitor import Divergence, Monitor, watch
 from firable.executor.operating.running import RunReport, Watch, execute
 from firable.executor.operating.situation import State
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.diagnostics import InputError
-from firable.nets.machines.plant_file import Move, PlantModel
-from firable.semantics.trace import CommandSent, Event, SignalChanged, Trace, parse_trace
-
-CELLS = [
-    "one_robot",
-    "one_robot_mc_late",
-    "one_robot_mc_late_capacity",
-    "two_cells",
-    "two_robots_separate",
-    "two_robots_shared",
-]
-
-
-def run_of(
-    cell: str, *disturbances: Disturbance, workpieces: int = 6, seed: int = 1, plant: PlantModel | None = None
-) -> Trace:
-    stream = io.StringIO()
-    execute(
-        split(catalogue_net(cell)),
-        plant or catalogue_plant(cell),
-        workpieces=workpieces,
-        seed=seed,
-        trace=stream,
-        disturbances=disturbances,
-    )
-    return parse_trace(stream.getvalue())
+from firable.semantics.trace import CommandSent, Event, SignalChanged, Trace
 
 
 def watched(cell: str, trace: Trace) -> Divergence | None:
@@ -48,15 +23,6 @@ def watched(cell: str, trace: Trace) -> Divergence | None:
 
 def altered(trace: Trace, events: list[Event]) -> Trace:
     return replace(trace, events=tuple(events))
-
-
-def slower(model: PlantModel, machine: str, command: str, takes_s: float) -> PlantModel:
-    machines = dict(model.machines)
-    action = machines[machine].commands[command]
-    assert isinstance(action, Move)
-    commands = {**machines[machine].commands, command: action.model_copy(update={"takes_s": takes_s})}
-    machines[machine] = machines[machine].model_copy(update={"commands": commands})
-    return model.model_copy(update={"machines": machines})
 
 
 @pytest.mark.parametrize("cell", CELLS)
