@@ -344,7 +344,12 @@ class World:
         for coordinator in (each.machine for each in self.coordinators.values() if each.machine is not None):
             for opened in coordinator.rounds.values():
                 is_waited_for = process.name in coordinator.ordered(opened)
-                if opened.committed is not None and is_waited_for and process.name not in opened.acknowledged:
+                if opened.committed is None or not is_waited_for or process.name in opened.acknowledged:
+                    continue
+                # Who has restarted since it gave its word has forgotten what was acknowledged, and will hear it again.
+                is_anew = coordinator.epoch > process.machine.above[coordinator.name].epoch
+                order = Decision(process.name, opened.number, opened.committed, 0, -1, 0, coordinator.name)
+                if not is_anew or process.machine.applies(order):
                     raise RunFailedError(f"{process.name} ends in order, and its order of '{opened.committed}' is open")
             if votes := coordinator.ready[process.name] & coordinator.of_free.get(process.name, frozenset()):
                 raise RunFailedError(f"{process.name} ends in order, and its votes for {sorted(votes)} still count")

@@ -28,6 +28,7 @@ from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.messages import Decision, Hello, Readiness, Report, VoteRequest
 from firable.executor.simulation.campaign import Failed, Run, campaign, rehearse
+from firable.executor.simulation.drawn import DRAWN
 from firable.executor.simulation.exploring import Budget, Configuration, Explorer, Step, explore, wander
 from firable.executor.simulation.judge import Subject
 from firable.executor.simulation.world import Machines
@@ -134,6 +135,20 @@ def test_hosts_of_a_cell_that_end_and_come_back_leave_nothing_open_through_fault
     done = campaign(lambda _: subject, (Run(seed, kinds) for seed in seeds(60)))
     assert not done.failed, done.failed[0].message
     assert done.counts["ends"] > 60
+
+
+FORGOTTEN = [
+    (
+        "drawn-layered",
+        Run(1002931, ("loss", "duplication", "delay", "partition", "crash", "drift", "standstill", "leave"), 181),
+    ),
+    ("drawn-timed", Run(1004095, ("crash", "torn", "disk", "drift", "standstill", "stale", "leave"), 488)),
+]
+
+
+@pytest.mark.parametrize(("family", "run"), FORGOTTEN, ids=["layered", "timed"])
+def test_a_coordinator_that_restarts_after_its_word_may_forget_what_was_acknowledged(family: str, run: Run) -> None:
+    assert not isinstance(rehearse(Subject(freed(split(DRAWN[family](run.seed // 10)))), run), Failed)
 
 
 WRONG: list[tuple[Machines, tuple[str, ...]]] = [
