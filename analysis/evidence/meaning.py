@@ -40,7 +40,18 @@ from firable.nets.formula import (
 )
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty, Transition
 from firable.nets.queries import Query, QueryKind
-from firable.nets.temporal import Logic, Temporal
+from firable.nets.temporal import (
+    Fires,
+    Globally,
+    Logic,
+    Next,
+    Temporal,
+    TemporalAnd,
+    TemporalNot,
+    TemporalOr,
+    format_temporal,
+    parse_temporal,
+)
 from firable.semantics.conflict import jointly_openable, structural_conflicts
 from firable.semantics.trace import Discipline
 
@@ -285,9 +296,36 @@ def _followed(shown: Shown) -> set[tuple[str, str]]:
 
 
 def _never_stopped(shown: Shown) -> bool:
-    """A machine knows one command alone, and it is sent. (Where it knows more, no claim says that none follows.)"""
-    alone = [next(iter(names.values())) for names in senders(shown.net).values() if len(names) == 1]
-    return any(shown.fires(t) for sending in alone for t in sending)
+    """A command is sent, and its machine knows no other, or none is sent at another moment of any run."""
+    return any(
+        any(map(shown.fires, sending)) and (not others or Claim(ClaimKind.LTL, never_beside(sending, others)) in shown)
+        for sending, others in commands(shown.net)
+    )
+
+
+def commands(net: Net) -> Iterator[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """For each command who sends it, and who sends others to its machine."""
+    for names in senders(net).values():
+        for name, sending in names.items():
+            yield sending, tuple(dict.fromkeys(t for other, of in names.items() if other != name for t in of))
+
+
+def never_beside(one: tuple[str, ...], others: tuple[str, ...]) -> Temporal:
+    """In LTL: after one of these fires none of those does any more, and the other way round.
+
+    >>> format_temporal(never_beside(("t",), ("u",)))
+    'G (not fires(t) or X G not fires(u)) and G (not fires(u) or X G not fires(t))'
+    """
+
+    def none(names: tuple[str, ...]) -> Temporal:
+        return TemporalNot(Fires(names[0]) if len(names) == 1 else TemporalOr(tuple(map(Fires, names))))
+
+    def after(first: tuple[str, ...], then: tuple[str, ...]) -> Temporal:
+        return Globally(TemporalOr((none(first), Next(Globally(none(then))))))
+
+    found = [after(first, then) for first, then in ((one, others), (others, one)) if first and then]
+    whole = TemporalAnd(tuple(found)) if len(found) > 1 else Constant(value=True)
+    return parse_temporal(format_temporal(whole))
 
 
 def _served(shown: Shown, proved: bool) -> bool:

@@ -10,21 +10,26 @@ from support.lively_nets import lively_net
 from support.naive_space import NaiveSpace
 from support.true_claims import true
 
+from firable.analysis.check import check
 from firable.analysis.evidence.certificate import FiringSequence
+from firable.analysis.evidence.checking.checker import check_document
 from firable.analysis.evidence.checking.obligations import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking
 from firable.analysis.evidence.meaning import (
     commands_clash,
     competing,
     contact,
+    never_beside,
     senders,
     some_firable,
     suffices,
     tidy,
 )
+from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.report import report_on
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
 from firable.nets.net import Command, Net, Place, Transition
+from firable.nets.temporal import parse_temporal
 from firable.nets.verdict import Status
 from firable.semantics.trace import Discipline
 
@@ -162,3 +167,32 @@ def test_true_claims_never_suffice_for_the_opposite_of_a_verdict(discipline: Dis
                 opposite = verdict.status is not Status.PROVED
                 assert not suffices(of, discipline, verdict.name, opposite, known, None), f"{seed}: {verdict.name}"
     assert judged > 200
+
+
+def test_a_machine_is_never_stopped_where_no_run_sends_another_command_before_or_after() -> None:
+    places = (
+        Place("a", marked=True),
+        Place("b", command=Command("M", "RUN")),
+        Place("c", command=Command("M", "STOP")),
+    )
+    go, halt = Transition("go", ("a",), ("b",)), Transition("halt", ("a",), ("c",))
+    either = Net("either", places, (go, halt))
+    beside = Claim(ClaimKind.LTL, never_beside(("go",), ("halt",)))
+    sent = fires(Start(), "go")
+
+    def enough(*claims: Claim) -> bool:
+        return suffices(either, Discipline.INTERLEAVING, "machine-never-stopped", False, claims, None)
+
+    assert enough(sent, beside)
+    assert not enough(sent)
+    assert not enough(beside)
+    for text in ("G (not fires(go) or X G not fires(halt))", "G (not fires(halt) or X G not fires(go))"):
+        assert not enough(sent, Claim(ClaimKind.LTL, parse_temporal(text)))
+    evidence = Evidence(either, Discipline.INTERLEAVING, beside, FiringSequence(()))
+    assert true(evidence)
+    again = Transition("again", ("b",), ("a",))
+    assert not true(replace(evidence, net=Net("again", places, (go, halt, again))))
+    found = evidence_of_report(check(either))
+    (shown,) = (one for one in check_document(found) if one.record.name == "machine-never-stopped")
+    assert not shown.record.proved
+    assert shown.shown

@@ -58,6 +58,7 @@ from firable.analysis.structure.state_equation import decide_by_state_equation
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
+from firable.nets.temporal import Temporal
 from firable.nets.verdict import Witness
 from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
@@ -196,6 +197,18 @@ class Certifier:
         if self.wide_markings is None:
             raise LackingError(f"a tableau is unfolded on up to {WIDE_MAX:,} markings")
         return Unfolded(self.wide_markings)
+
+    def asked_for(self, formula: Temporal) -> Unfolded:
+        """What shows a formula of LTL of which it is not known yet whether it holds; raises `LackingError`."""
+        if self.discipline is Discipline.STEP:
+            raise LackingError("what fires is not spoken of in steps")
+        try:
+            found = unfolded_markings(self.net, formula, WIDE_MAX, self._part(0.3))
+        except (TooLargeError, BudgetExceeded):
+            raise LackingError(NO_TIME) from None
+        if found is None:
+            raise LackingError("some run refutes the formula")
+        return Unfolded(found)
 
     def _unordered(self, witness: Witness) -> FiringSequence | None:
         """The run, with the step after it that has no order."""

@@ -18,11 +18,13 @@ from firable.analysis.evidence.checking.runs import holds
 from firable.analysis.evidence.claims import TRUE, Claim, ClaimKind, is_marking
 from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.meaning import (
+    commands,
     commands_clash,
     compete,
     competing,
     completions_clash,
     contact,
+    never_beside,
     property_claim,
     senders,
     some_firable,
@@ -272,13 +274,17 @@ class _Verdicts:
         return iter(()) if goal == _FALSE else self._one(Claim(ClaimKind.NEVER, goal))
 
     def _never_stopped(self) -> Iterator[tuple[Claim, Certificate]]:
-        alone = [next(iter(names.values())) for names in senders(self.net).values() if len(names) == 1]
-        for sending in alone:
+        """A command that is sent, and beside which no run sends another one to its machine."""
+        for sending, others in commands(self.net):
+            beside = never_beside(sending, others) if others else None
             for name in sending:
                 try:
-                    yield from self._fired(TRUE, self.certifier.runs_firing((name,)))
+                    sent = self._fired(TRUE, self.certifier.runs_firing((name,)))
+                    if beside is not None:
+                        sent.append((Claim(ClaimKind.LTL, beside), self.certifier.asked_for(beside)))
                 except LackingError:
                     continue
+                yield from sent
                 return
         raise LackingError("that no other command follows in any run is not certified")
 
