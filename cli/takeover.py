@@ -33,6 +33,7 @@ def takeover(
     the same command in every place that has a token. The journal of OLD is left as it is. `firable run NEW --journal`
     then goes on: held, until the machines are asked where they are and the operator resumes.
     """
+    from firable.executor.journal.journal import sync_now
     from firable.executor.journal.sqlite_journal import SqliteJournal
     from firable.executor.journal.takeover import take_over
     from firable.executor.operating.running import load
@@ -58,7 +59,7 @@ def takeover(
     try:
         for machine, of in moved.kept.items():
             written.write(machine, [Keep(key, value) for key, value in of.items()])
-        written.sync()
+        sync_now(written)
     finally:
         written.close()
     if Path(f"{journal}.cell").is_file():  # the simulated cell that the journal is of, if it is one

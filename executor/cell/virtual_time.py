@@ -1,16 +1,22 @@
 """An event loop whose clock jumps: simulated hours pass as fast as the work in them is done.
 
 asyncio asks its selector to wait until the next timer is due. This loop's selector does not wait; it moves the loop's
-own clock there. Tasks, timers and futures are the ordinary ones, so the same code runs in real time on an ordinary
-loop; and nothing depends on how fast the machine is, so a run is a function of its seed. The alternative, a clock
-parameter threaded through all code that waits, gives two ways to wait and tests only one of them.
+own clock there. What is given to a thread is done at once instead and takes no time, or time would jump while the
+thread works, as far as the machine is slow. Tasks, timers and futures are the ordinary ones, so the same code runs in
+real time on an ordinary loop; and nothing depends on how fast the machine is, so a run is a function of its seed. The
+alternative, a clock parameter threaded through all code that waits, gives two ways to wait and tests only one of them.
 """
 
 from __future__ import annotations
 
 import asyncio
 import selectors
-from typing import Any
+from collections.abc import Callable
+from concurrent.futures import Executor
+from typing import Any, TypeVar, TypeVarTuple
+
+T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 
 
 class _JumpingSelector(selectors.DefaultSelector):
@@ -39,6 +45,16 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         """The virtual time in seconds."""
         return self._jumping.now_seconds
+
+    def run_in_executor(self, executor: Executor | None, func: Callable[[*Ts], T], *args: *Ts) -> asyncio.Future[T]:
+        """Call a function at once, on no thread of any executor; the future that is returned is done."""
+        del executor
+        done: asyncio.Future[T] = self.create_future()
+        try:
+            done.set_result(func(*args))
+        except Exception as error:  # it is the future's
+            done.set_exception(error)
+        return done
 
 
 def run_in_virtual_time(coroutine: Any) -> Any:

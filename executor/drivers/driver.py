@@ -24,7 +24,7 @@ that can only be polled do so inside, behind this protocol. Real machines are re
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, MutableSequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, TypeVar
@@ -148,7 +148,17 @@ class Driver(Protocol):
         ...
 
 
-def withdraw(driver: Driver, places: Iterable[Place], leaving: MutableSequence[Leaving]) -> list[str]:
+class Held(Protocol[Leaving]):
+    """What is held back behind the journal (`Outbox`)."""
+
+    def __iter__(self) -> Iterator[Leaving]: ...
+
+    def remove(self, value: Leaving, /) -> None:
+        """Hold something back for ever."""
+        ...
+
+
+def withdraw(driver: Driver, places: Iterable[Place], leaving: Held[Leaving]) -> list[str]:
     """Give up the commands of places whose token has left: a machine must not move by them later, by no token.
 
     They are with the driver, or still among what is `leaving` the process behind the journal, and are taken out there.

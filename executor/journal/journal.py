@@ -7,6 +7,10 @@ same process need not wait for the disk: if its sending is lost, so is everythin
 process waits: commands to machines, messages to other processes, lines of the trace. A chain of votes and decisions
 that ends in a command costs one sync (*group commit*; Gray and Reuter, "Transaction Processing", 1993).
 
+A sync is begun in one place and done in another: the writes are taken where the acts are done, and go to the disk on a
+thread, because a disk may take milliseconds, or seconds, in which a stop and the messages of other hosts must be heard.
+What rests on them waits (`outbox.py`).
+
 Rejected: one file for each machine. It costs a sync for each machine that takes part in a transition, and files whose
 last acts were lost differently show a state in which the process never was.
 
@@ -17,10 +21,13 @@ failures?", 2020).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Protocol
 
 from firable.executor.protocol.messages import Effect, Keep, Stored
+
+Storing = Callable[[], None]
+"""Makes durable what a sync was begun for, on any thread; called once. Raises `InputError` where that fails."""
 
 
 class Journal(Protocol):
@@ -34,13 +41,22 @@ class Journal(Protocol):
         """Take the writes of one act of a machine, in order behind all acts before; durable at the next `sync`."""
         ...
 
-    def sync(self) -> None:
-        """Make all acts written until now durable, together; raises `InputError` where that fails."""
+    def sync(self) -> Storing | None:
+        """Begin to make all acts written until now durable, together; returns what does it, None where nothing has to.
+
+        No other sync is begun before that is over. Raises `InputError` where an earlier one has failed.
+        """
         ...
 
     def close(self) -> None:
         """Let go of the storage. What is not synced is lost, as in a crash."""
         ...
+
+
+def sync_now(journal: Journal) -> None:
+    """Make all acts written until now durable, and wait for it; raises `InputError` where that fails."""
+    if (storing := journal.sync()) is not None:
+        storing()
 
 
 class MemoryJournal:
@@ -69,8 +85,9 @@ class MemoryJournal:
                 else:
                     of_machine[effect.key] = effect.value
 
-    def sync(self) -> None:
+    def sync(self) -> Storing | None:
         """Nothing more can be done for what is in memory."""
+        return None
 
     def close(self) -> None:
         """Keep what is there, for a next start within the process."""

@@ -25,10 +25,12 @@ import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, NoReturn
 from zlib import crc32
 
+from firable.executor.journal.journal import Storing
 from firable.executor.protocol.messages import Effect, Keep, Stored
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import printable
@@ -64,7 +66,8 @@ class SqliteJournal:
         self.generation = 0
         self.failed: InputError | None = None
         with self._failures("opened"):
-            self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None)
+            # One thread at a time uses it, and not always the same.
+            self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
         try:
             with self._failures("opened"):
                 self._open(digest)
@@ -87,12 +90,15 @@ class SqliteJournal:
                 else:
                     self.rows[row] = effect.value
 
-    def sync(self) -> None:
-        """Make all acts written until now durable; raises `InputError` F5034, and then always: the process must end."""
+    def sync(self) -> Storing | None:
+        """Begin to make all acts written until now durable; F5034 where that fails, and then always: the process ends.
+
+        What is stored is put together here, so that the thread that stores it shares nothing with the acts that go on.
+        """
         if self.failed is not None:
             raise self.failed
         if not self.changed:
-            return
+            return None
         written = []
         for row in self.changed:
             self.total -= self.checks.pop(row, 0)
@@ -102,23 +108,25 @@ class SqliteJournal:
                 self.total += check
                 written.append((*row, value, check))
         deleted = [row for row in self.changed if row not in self.rows]
+        self.changed.clear()
         self.generation += 1
+        return partial(self._store, written, deleted, self.generation, self.total)
+
+    def _store(
+        self, written: list[tuple[str, str, str, int]], deleted: list[_Row], generation: int, total: int
+    ) -> None:
         try:
-            self._write(written, deleted)
+            with self._failures("written"):
+                run = self.connection.execute
+                run("begin immediate")
+                self.connection.executemany("insert or replace into kept values (?, ?, ?, ?)", written)
+                self.connection.executemany("delete from kept where machine = ? and key = ?", deleted)
+                run("update header set generation = ?, total = ?", (generation, total))
+                run("commit")
+                self._bear_witness(generation)
         except InputError as error:
             self.failed = error
             raise
-        self.changed.clear()
-
-    def _write(self, written: list[tuple[str, str, str, int]], deleted: list[_Row]) -> None:
-        with self._failures("written"):
-            run = self.connection.execute
-            run("begin immediate")
-            self.connection.executemany("insert or replace into kept values (?, ?, ?, ?)", written)
-            self.connection.executemany("delete from kept where machine = ? and key = ?", deleted)
-            run("update header set generation = ?, total = ?", (self.generation, self.total))
-            run("commit")
-            self._bear_witness()
 
     def close(self) -> None:
         """Let go of the file; what is not synced is lost."""
@@ -143,7 +151,7 @@ class SqliteJournal:
             run("commit")
             self._read(digest)
         self.witness_descriptor = os.open(self.witness, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-        self._bear_witness()
+        self._bear_witness(self.generation)
         os.fsync(self.witness_descriptor)  # once, so that a power cut leaves an older number there, and not none
         _sync_folder(self.path.parent)
 
@@ -180,8 +188,8 @@ class SqliteJournal:
         said = self.witness.read_text("ascii", "replace").strip() if self.witness.exists() else ""
         return said or ("" if self.generation else "0")
 
-    def _bear_witness(self) -> None:
-        os.pwrite(self.witness_descriptor, f"{self.generation:020}\n".encode(), 0)
+    def _bear_witness(self, generation: int) -> None:
+        os.pwrite(self.witness_descriptor, f"{generation:020}\n".encode(), 0)
 
     def _damaged(self, what: str) -> NoReturn:
         message = f"{printable(str(self.path))}: the journal is damaged: {what}"

@@ -2,10 +2,14 @@
 
 Machines are pure: a message, a signal, or their turn to fire goes in, effects come out. What a machine says to another
 one of the same host is that one's next act, since a crash loses both or none. All acts of one turn of the event loop
-are one *group*; at its end comes the one sync of the journal, then the lines of the trace, and then the caller lets go
-of what leaves the host, commands and messages, in the order of the acts. So a signal and the command that follows from
-it, whatever controllers and coordinators say about it in between, are one callback and one sync (`journal.py` says why
-messages need not wait for the sync within a host).
+are one *group*; at its end begins the one sync of the journal, behind it are written the lines of the trace, and then
+the caller lets go of what leaves the host, commands and messages, in the order of the acts. So a signal and the command
+that follows from it, whatever controllers and coordinators say about it in between, are one callback and one sync
+(`journal.py` says why messages need not wait for the sync within a host).
+
+Acts go on while a disk takes its time; what they let out, and the lines that tell of them, wait for the next sync
+(`outbox.py`), whether they have written anything or not. Only as far as `AHEAD_MAX`: a disk that stands still fills no
+memory.
 
 A signal is not acted upon inside the call that tells it. A driver tells in the middle of its own bookkeeping, and would
 be commanded there; and signals that come together would cost a sync each.
@@ -24,7 +28,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Final, assert_never
 
-from firable.executor.journal.journal import Journal
+from firable.executor.journal.journal import Journal, Storing
+from firable.executor.journal.outbox import Outbox
 from firable.executor.links.link import called
 from firable.executor.operating.clock import RunClock
 from firable.executor.operating.figures import Figures
@@ -53,6 +58,8 @@ from firable.nets.decomposition import Decomposition
 
 ACTS_AT_ONCE_MAX: Final = 250
 """So many acts are one group at most; then they become durable, and the driver, the link and the operator are heard."""
+AHEAD_MAX: Final = 10_000
+"""So much may wait for a sync, things that leave and lines of the trace; then nothing is done before it is over."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,8 +116,10 @@ class Acts:
         }
         self.posted: deque[tuple[str, Item]] = deque()
         """What the machines here are given next."""
-        self.leaving: list[Sending | Message] = []
-        """What leaves the host when this group is durable."""
+        self.outbox = Outbox[Sending | Message]()
+        """What leaves the host when it is durable."""
+        self.lines = 0
+        """Of the trace, those that wait for the sync that is under way."""
         self.unsynced = False
         self.has_news = False
         """Whether anything is said to other hosts for the first time."""
@@ -311,7 +320,7 @@ class Acts:
                         self.recorder.note(now, "sent again", place=place)
                     else:
                         self.recorder.sent(now, place)
-                    self.leaving.append(effect)
+                    self.outbox.add(effect)
                 case VoteRequest() | Decision() | Hello():
                     self._say(effect.controller, effect, again=again)
                 case Vote(controller, number, promised):
@@ -357,21 +366,35 @@ class Acts:
         if receiver in self.coordinators or receiver in self.controllers:
             self.posted.append((receiver, message))
         else:
-            self.leaving.append(message)
+            self.outbox.add(message)
             self.has_news |= not again
 
-    def commit(self) -> list[Sending | Message]:
-        """Make the group durable, and tell it in the trace; returns what leaves the host now, or is never sent.
+    @property
+    def is_ahead(self) -> bool:
+        """Whether so much waits for the disk that nothing more is done before it has answered."""
+        return self.outbox.is_under_way and len(self.outbox) + len(self.recorder.unwritten) > AHEAD_MAX
 
-        Raises `InputError` where journal or trace cannot be written; then the process must end.
+    def commit(self) -> Storing | None:
+        """Begin the sync of all acts until now; returns what stores them, None where they are durable.
+
+        `let_go` follows when that is done. Raises `InputError` where the journal cannot be written; then, or where what
+        is returned raises it, the process must end.
         """
-        leaving, self.leaving = self.leaving, []
-        if self.unsynced:
-            self.unsynced = False
-            self.journal.write(TRACE, self.recorder.keep())
-            self.journal.sync()
-        self.recorder.flush()
-        return leaving
+        self.outbox.begin()
+        self.lines = len(self.recorder.unwritten)
+        if not self.unsynced:
+            return None
+        self.unsynced = False
+        self.journal.write(TRACE, self.recorder.keep())
+        return self.journal.sync()
+
+    def let_go(self) -> list[Sending | Message]:
+        """What was begun is durable: have the trace tell it, and return what leaves the host now, or is never sent.
+
+        Raises `InputError` where the trace cannot be written; then the process must end.
+        """
+        self.recorder.flush(self.lines)
+        return self.outbox.over()
 
     # What is open
 

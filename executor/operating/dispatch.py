@@ -55,7 +55,7 @@ class Dispatch:
         """Give up what the tokens of a controller have left behind."""
         inputs = map(self.run.net.place, self.run.net.transition(transition).inputs)
         places = [place for place in inputs if place.owner == controller]
-        for name in withdraw(self.run.driver, places, self.run.acts.leaving):
+        for name in withdraw(self.run.driver, places, self.run.acts.outbox):
             self.run.recorder.note(self.run.now_seconds(), "withdrawn", place=name)
 
     def watch(self, place: str) -> None:

@@ -1,9 +1,8 @@
 """The host: one process with some machines of a cell, or all of them, their driver, their journal, and an operator.
 
 A run of a whole cell is a host with all machines and no link; a controller beside its machine is a host with one. What
-they do is the same: one callback of the event loop does a group of acts (`acts.py`), makes it durable, and lets go of
-what leaves. This file is when that is done, who may halt it, and how it ends. Files are written in that callback alone,
-so what fails there ends the run with the machines stopped, whoever called.
+they do is the same: acts in groups (`acts.py`), which become durable before anything of them leaves (`groups.py`). This
+file is who may halt that, and how it ends.
 
 When nothing is posted any more the host is *quiescent*: that is when markings are shown (O7), situations are judged and
 an operator's step is over.
@@ -31,7 +30,7 @@ the protocol, for no gain in one process.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Collection, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from typing import Final
 
 from firable.executor.drivers.driver import Driver
@@ -42,6 +41,7 @@ from firable.executor.operating.acts import Acts, SignalRead
 from firable.executor.operating.clock import RunClock
 from firable.executor.operating.dispatch import Dispatch
 from firable.executor.operating.figures import Figures
+from firable.executor.operating.groups import Groups
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence, Monitor
@@ -53,11 +53,9 @@ from firable.executor.operating.uncut import Patience, uncut
 from firable.executor.operating.watching import Watching
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import coordinators
-from firable.executor.protocol.messages import Keep, Sending
+from firable.executor.protocol.messages import Keep, Message, Sending
 from firable.nets.decomposition import Decomposition
 
-FIRINGS_AT_ONCE_MAX: Final = 100_000
-"""More firings at one instant, or without anything from outside, are a net that runs in circles without its cell."""
 SETTLE_SECONDS: Final = 2.0
 """So long a stop waits for what is open at the most."""
 
@@ -101,10 +99,11 @@ class Host:
         everything = (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))
         self.dispatch = Dispatch(self, overdue_seconds)
         here = everything if machines is None else machines
-        self.acts = Acts(decomposition, here, self.journal, recorder, figures, self._wake, self.dispatch.left)
+        self.groups = Groups(self)
+        self.acts = Acts(decomposition, here, self.journal, recorder, figures, self.groups.wake, self.dispatch.left)
         self.coordinators, self.controllers = self.acts.coordinators, self.acts.controllers
         self.is_whole = link is None
-        self.peers = Peers(decomposition, self.acts, link, self.told, self._work_now)
+        self.peers = Peers(decomposition, self.acts, link, self.told, self.groups.at_once)
         self.speed = speed
         self.begin_seconds = begin_seconds
         self.is_complete = is_complete
@@ -144,8 +143,8 @@ class Host:
         self.fault = ""
         self.patience = patience or Patience()
         self.turn = 0
-        self.working = False
-        """Whether a group is done, or about to be."""
+        self.ended: Situation | None = None
+        """How the run has ended, as soon as that is decided."""
         self.quiet_waiters: list[asyncio.Future[None]] = []
         self.clock: RunClock | None = None
         self.outcome: asyncio.Future[Situation] | None = None
@@ -178,6 +177,7 @@ class Host:
             ended = await self._outcome(self.outcome)
         finally:
             hanging = await ending.close(self, tasks)
+            hanging += await self.groups.end(self.patience)
         ended = ending.with_unconfirmed(ending.with_hanging(ended, hanging), self.driver.unconfirmed)
         ended = ending.with_failed(ended, tasks[0])
         if self.left_nothing_open:
@@ -285,7 +285,7 @@ class Host:
     async def _operate(self, operator: Callable[[Host], Awaitable[None]]) -> None:
         await operator(self)
         self.operated = False
-        self._wake()
+        self.groups.wake()
 
     # What the driver tells
 
@@ -309,42 +309,16 @@ class Host:
 
     def moved(self) -> None:
         """Something happened in the cell; perhaps it has come to rest."""
-        self._wake()
+        self.groups.wake()
 
     # Groups
 
-    def _wake(self) -> None:
-        if not self.working and self.outcome is not None and not self.is_over:
-            self.working = True
-            asyncio.get_running_loop().call_soon(self._work)
-
-    def _work_now(self) -> None:
-        """Do a group at once, unless one is about to be done."""
-        if not self.working and self.outcome is not None and not self.is_over:
-            self.working = True
-            self._work()
-
-    def _work(self) -> None:
-        """One group: acts, then the journal, then what leaves; at quiescence, whether the run has ended."""
-        try:
-            self.acts.group()
-            self._leave()
-            if self.acts.firings_at_once > FIRINGS_AT_ONCE_MAX:
-                last = self.acts.fired_at_once[0]
-                self.fail(f"'{last}' and others fire without end, and no time passes: no gate ever holds them")
-            self.working = False
-            if self.acts.posted or self.acts.unsynced:
-                self._wake()
-            else:
-                self._settle()
-        except Exception as error:  # a callback has no caller: it must end the run, as an error in a task does
-            self._broken(error)
-
-    def _leave(self) -> None:
+    def leave(self, leaving: Sequence[Sending | Message]) -> None:
+        """Let go of what is durable: commands to the driver, messages to the link."""
         if self.acts.has_news:
             self.acts.has_news = False
             self.peers.something_new()
-        for effect in self.acts.commit():
+        for effect in leaving:
             if not isinstance(effect, Sending):
                 self.peers.send(effect)
             elif (
@@ -353,8 +327,10 @@ class Host:
                 self.note("kept back", place=effect.place)
             else:
                 self.dispatch.send(effect.place, effect.entry)
+        if self.ended is not None and self.outcome is not None:
+            self.outcome.set_result(self.ended)
 
-    def _settle(self) -> None:
+    def settle(self) -> None:
         """At quiescence, wake who waits for it, and end the run if nothing will happen."""
         self._release()
         if self.ends_at_home and not self.stopping and not self.paused and self._ends_cycle():
@@ -364,10 +340,10 @@ class Host:
             if ended.state is State.DONE:
                 self.journal.write(TRACE, [Keep(_END, ended.state.value)])
                 self.acts.unsynced = True
-            self.acts.commit()
+            self.ended = ended
             # What comes while the link is closed is not heard.
             self.left_nothing_open = self.acts.is_settled and self.peers.have_let_go
-            self.outcome.set_result(ended)
+            self.groups.commit()
 
     def _ends_cycle(self) -> bool:
         """Whether there is more to be done before the cycle is at its end, and is begun."""
@@ -392,12 +368,12 @@ class Host:
     @property
     def is_over(self) -> bool:
         """Whether it is known how the run has ended, if by an error."""
-        return self.outcome is not None and self.outcome.done()
+        return self.ended is not None or (self.outcome is not None and self.outcome.done())
 
     @property
     def is_quiet(self) -> bool:
         """Whether nothing is posted, nor waits for the journal."""
-        return not self.working and not self.acts.posted
+        return self.groups.are_over and not self.acts.posted
 
     def _diverged(self, found: Divergence) -> None:
         """The machines do what their model excludes; what they do when they are stopped it does not know."""
@@ -405,7 +381,7 @@ class Host:
             return
         self.divergence = found
         self.recorder.note(found.at_seconds, "divergence", message=str(found))
-        self._wake()
+        self.groups.wake()
         if self.stop_at_divergence:
             self.fail(f"the machines are not as they are modelled: {found}")
 
@@ -425,7 +401,7 @@ class Host:
         try:
             self.driver.stop()
         except Exception as error:  # a timer has no caller
-            self._broken(error)
+            self.broken(error)
 
     def _halt(self, note: str, **data: str) -> None:
         """Let nothing fire by itself any more, and have the trace say why."""
@@ -444,13 +420,13 @@ class Host:
 
     def _wait_no_longer(self) -> None:
         self.has_waited = True
-        self._wake()
+        self.groups.wake()
 
     def _task_ended(self, task: asyncio.Task[None]) -> None:
         if not task.cancelled() and (error := task.exception()) is not None:
-            self._broken(error)
+            self.broken(error)
 
-    def _broken(self, error: BaseException) -> None:
+    def broken(self, error: BaseException) -> None:
         """End the run by an error; the machines are stopped on the way out."""
         if self.outcome is not None and not self.outcome.done():
             self.outcome.set_exception(error)
@@ -462,7 +438,7 @@ class Host:
         """Have the trace tell something, durably."""
         self.recorder.note(self.now_seconds(), note, **data)
         self.acts.unsynced = True
-        self._wake()
+        self.groups.wake()
 
     def told(self, kind: str, sentence: str) -> None:
         """Have the trace tell something, and whoever follows the run."""

@@ -199,13 +199,13 @@ class Recorder:
         self.flush()  # not kept: a run that is taken up again goes on before it
         self.is_ended = True
 
-    def flush(self) -> None:
-        """Write the lines so far, and hand them over to who follows the file."""
+    def flush(self, lines: int | None = None) -> None:
+        """Write the lines so far, or the first so many, and hand them over to who follows the file."""
         if self.stream is not None and self.unwritten:
-            for line in self.unwritten:
+            for line in self.unwritten[:lines]:
                 self.stream.write(line)
                 self.size_bytes += len(line)
-            self.unwritten.clear()
+            del self.unwritten[:lines]
             self.stream.flush()
 
     def _write(self, item: Header | Event | End) -> None:

@@ -2,7 +2,8 @@
 
 A batch is whole or not at all, and batches become durable in order, as in a database with a write-ahead log: after a
 crash the disk holds what was synced and some first part of what was written since. That part is drawn, so a promise is
-never relied on before the sync, and never taken for lost before it either.
+never relied on before the sync, and never taken for lost before it either. A sync is of what was written when it began:
+it may take its time, and what is written meanwhile is for the next one.
 """
 
 from __future__ import annotations
@@ -35,12 +36,12 @@ class Disk:
         """Write a batch, durable after the next sync; None deletes."""
         self.unsynced.append(batch)
 
-    def sync(self) -> None:
-        """Make durable what was written; raises `DiskFailedError`, and then only the first part of it may be."""
+    def sync(self, batches: int) -> None:
+        """Make durable the first so many batches; raises `DiskFailedError`, and then a first part of them may be."""
         if self.failing and self.draw.random() < self.failing:
             raise DiskFailedError
         self.syncs += 1
-        self._keep(len(self.unsynced))
+        self._keep(batches)
 
     def crash(self) -> int:
         """Lose all but the first of the batches that were not synced; returns how many are kept."""

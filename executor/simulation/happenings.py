@@ -103,7 +103,7 @@ def _stop(world: World) -> None:
             if world.draw.random() < 0.5:
                 world.cell.halt(job)
         for process in world.processes:
-            world.sync(process)
+            world.sync_all(process)
             world.kill(process)
 
 

@@ -1,8 +1,9 @@
 """A simulated process: one machine on its disk, and what waits to leave it.
 
 It is the host of the machine, and does what every host has to: the writes of an act become durable before anything of
-the act leaves. What an act wants to let out stands in the outbox, in order, until the sync behind which it may leave.
-A command is then with the driver, which may have to
+the act leaves. What an act wants to let out stands in the outbox, in order, until the sync behind which it may leave;
+while that sync is under way the process goes on, and what it does waits for the next. The outbox is the executor's own
+(`executor/journal/outbox.py`). A command is then with the driver, which may have to
 wait for a line; what has not reached its machine is given up when its token leaves. Killed, the process loses the
 machine, the outbox, what its driver kept and what its disk had not synced. Of the acts whose writes survive,
 firings and changes of signals have happened, although nobody was told: a restart finds them done.
@@ -15,6 +16,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
+from firable.executor.journal.outbox import Outbox
 from firable.executor.protocol.messages import Effect, Firing, Keep, Sending, Stored, Taken
 from firable.executor.simulation.clock import Clock
 from firable.executor.simulation.disk import Disk
@@ -38,7 +40,7 @@ class Process(Generic[Machine]):
     draw: random.Random
     disk: Disk = field(init=False)
     machine: Machine | None = None
-    outbox: list[Act] = field(default_factory=list)
+    outbox: Outbox[Act] = field(default_factory=Outbox[Act])
     clock: Clock = field(default_factory=Clock)
     """It began anew with the process."""
     queue: list[Sending] = field(default_factory=list)
@@ -66,16 +68,14 @@ class Process(Generic[Machine]):
             self.disk.write(batch)
         elif not leaving:
             return False
-        self.outbox.append(Act(bool(batch), leaving))
+        self.outbox.add(Act(bool(batch), leaving))
         return True
 
     def sync(self) -> list[Effect]:
-        """Make durable what the acts wrote, and return what may leave now; raises `DiskFailedError`."""
-        if self.disk.unsynced:
-            self.disk.sync()
-        leaving = [effect for act in self.outbox for effect in act.leaving]
-        self.outbox.clear()
-        return leaving
+        """End the sync that is under way, and return what may leave now; raises `DiskFailedError`."""
+        if batches := sum(act.writes for act in self.outbox.behind):
+            self.disk.sync(batches)
+        return [effect for act in self.outbox.over() for effect in act.leaving]
 
     def hand(self, sending: Sending) -> bool:
         """Let the driver keep a command for later; returns whether that counts as sent."""

@@ -70,7 +70,7 @@ def mend(world: World) -> None:
     for process in world.processes:
         process.cut_off, process.disk.failing = False, 0.0
         process.clock.rate, process.clock.stands_still = 1.0, False
-        world.sync(process)
+        world.sync_all(process)
         tend(process, world)
     for process in world.processes:
         tend(process, world)

@@ -177,11 +177,27 @@ class World:
                     self._left(process, effect.transition)
         if process.act(effects):
             lazy = self.faults["unsynced"]
-            if at_once or not lazy or self.draw.random() >= lazy:
+            if at_once:
+                self.sync_all(process)
+            elif not lazy or self.draw.random() >= lazy:
                 self.sync(process)
 
-    def sync(self, process: Process[Any]) -> None:
-        """Let a process make durable what it wrote, and let out what waits behind it; a failed disk ends it."""
+    def sync_all(self, process: Process[Any]) -> None:
+        """Let a process make durable all that it wrote until now, whatever comes of it."""
+        while process.outbox:
+            self.sync(process, at_once=True)
+
+    def sync(self, process: Process[Any], *, at_once: bool = False) -> None:
+        """Let a process make durable what it wrote, and let out what waits behind it; a failed disk ends it.
+
+        A sync that is under way is over by that; one that is begun may stay under way.
+        """
+        if not process.outbox.is_under_way:
+            process.outbox.begin()
+            lazy = self.faults["unsynced"]
+            if lazy and not at_once and self.draw.random() < lazy:
+                self.counts["syncs that take time"] += 1
+                return
         try:
             leaving = process.sync()
         except DiskFailedError:

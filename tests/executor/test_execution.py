@@ -392,7 +392,7 @@ def test_nothing_fires_in_a_step_that_a_stop_overtakes(yields: int) -> None:
 
 
 def test_net_that_runs_in_circles_without_its_cell_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("firable.executor.operating.host.FIRINGS_AT_ONCE_MAX", 500)
+    monkeypatch.setattr("firable.executor.operating.groups.FIRINGS_AT_ONCE_MAX", 500)
     report = execute(circles("a"), NO_MACHINES, workpieces=1)
     assert report.state is State.FAULT
     assert "fire without end" in report.situation.message

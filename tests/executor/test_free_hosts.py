@@ -97,7 +97,8 @@ class OneHost:
 
     def leaving(self) -> list[object]:
         self.acts.group()
-        return list(self.acts.commit())
+        assert self.acts.commit() is None  # it is kept in memory
+        return list(self.acts.let_go())
 
     def order(self, number: int, transition: str) -> None:
         self.acts.hear("b", Decision("b", number, transition, 0, -1))

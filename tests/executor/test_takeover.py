@@ -9,6 +9,7 @@ import pytest
 
 from firable.cli.main import main
 from firable.decompose.splitting.cut import split
+from firable.executor.journal.journal import sync_now
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.journal.takeover import take_over
 from firable.executor.links.link import COORDINATOR
@@ -174,7 +175,7 @@ def journal(path: Path, of: Path, marking: set[str]) -> Path:
     written = SqliteJournal(path, read.digest, kept)
     for machine, records in kept.items():
         written.write(machine, [Keep(key, value) for key, value in records.items()])
-    written.sync()
+    sync_now(written)
     written.close()
     return path
 

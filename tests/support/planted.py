@@ -402,6 +402,28 @@ class GoesOnAfterFailedDisk(Process[Any]):
             self.disk.failing = failing
 
 
+class LetsOutWhatWasDoneMeanwhile(Process[Any]):
+    """A sync that is over lets out all that waits, also what was done while it was under way."""
+
+    def sync(self) -> list[Effect]:
+        durable = super().sync()
+        meanwhile = [effect for act in self.outbox for effect in act.leaving]
+        for act in self.outbox:
+            act.leaving.clear()
+        return [*durable, *meanwhile]
+
+
+class LetsOutWhatWroteNothing(Process[Any]):
+    """What an act says that has written nothing does not wait for the acts before it, whose sync is under way."""
+
+    def sync(self) -> list[Effect]:
+        early = [act for act in self.outbox.waiting if not act.writes]
+        said = [effect for act in early for effect in act.leaving]
+        for act in early:
+            act.leaving.clear()
+        return [*said, *super().sync()]
+
+
 class CountsQueuedCommandsAsSent(Process[Any]):
     """What the driver keeps for a line that is down is taken for sent."""
 
@@ -455,6 +477,8 @@ PROCESSES: tuple[type[Process[Any]], ...] = (
     AcknowledgesBeforeKeeping,
     CommandsBeforeKeeping,
     GoesOnAfterFailedDisk,
+    LetsOutWhatWasDoneMeanwhile,
+    LetsOutWhatWroteNothing,
     CountsQueuedCommandsAsSent,
 )
 
@@ -480,6 +504,8 @@ PROVOKED_BY: dict[str, tuple[str, ...]] = {
     "AcknowledgesBeforeKeeping": ("crash",),
     "CommandsBeforeKeeping": ("crash", "torn"),
     "GoesOnAfterFailedDisk": ("disk", "crash"),
+    "LetsOutWhatWasDoneMeanwhile": ("unsynced", "crash"),
+    "LetsOutWhatWroteNothing": ("unsynced", "crash"),
     "CountsQueuedCommandsAsSent": ("queued",),
 }
 """The kinds of faults that bring some of them out soonest; the others, and these too, are found with kinds drawn."""

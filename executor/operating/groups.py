@@ -1,0 +1,113 @@
+"""When groups of acts are done, made durable, and let go: by callbacks of the event loop that have no caller.
+
+A callback does one group (`acts.py`) and begins its sync. Where the journal is in memory that is all, and what leaves
+is let go at once. A file is synced on a thread, and the loop goes on: signals, messages and the operator are heard,
+further groups are done, and what they let out waits for the next sync, which begins when this one is over
+(`outbox.py`). A stop waits for no disk: it goes to the driver in the call that asks for it.
+
+What a driver says of a command while it is handed over, that its machine has it, is acted upon in the same callback,
+and not a turn of the loop later in front of the next signal. That once: a net that fires on it must not keep the loop.
+
+The journal and the trace are written for these callbacks alone, so what fails there ends the run with the machines
+stopped, whoever called, and nothing leaves any more.
+
+Rejected: to wait for the disk in the callback. It is the shortest text and, on a disk that answers at once, the
+quickest; but one that stands still for a second would keep a stop from the machines for that second.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Final
+
+from firable.executor.operating.uncut import Patience, uncut
+
+if TYPE_CHECKING:
+    from firable.executor.operating.host import Host
+
+FIRINGS_AT_ONCE_MAX: Final = 100_000
+"""More firings at one instant, or without anything from outside, are a net that runs in circles without its cell."""
+
+
+class Groups:
+    """The groups of one host."""
+
+    def __init__(self, run: Host) -> None:
+        self.run = run
+        self.are_due = False
+        """Whether a group is done, or about to be."""
+        self.storing: asyncio.Future[None] | None = None
+        """The sync that is under way on a thread."""
+
+    @property
+    def are_over(self) -> bool:
+        """Whether none is done or due, and no sync is under way."""
+        return not self.are_due and self.storing is None
+
+    def wake(self) -> None:
+        """Have a group done in a turn of the loop of its own, unless one is due."""
+        if not self.are_due and self.run.outcome is not None and not self.run.is_over:
+            self.are_due = True
+            asyncio.get_running_loop().call_soon(self._work)
+
+    def at_once(self) -> None:
+        """Do a group now, unless one is due."""
+        if not self.are_due and self.run.outcome is not None and not self.run.is_over:
+            self.are_due = True
+            self._work()
+
+    def commit(self) -> None:
+        """Let go of what leaves once it is durable, unless a sync is under way: then all that was done waits for it."""
+        if self.storing is not None:
+            return
+        if (storing := self.run.acts.commit()) is not None:
+            future = asyncio.get_running_loop().run_in_executor(None, storing)
+            if not future.done():
+                self.storing = future
+                future.add_done_callback(self._stored)
+                return
+            future.result()
+        self.run.leave(self.run.acts.let_go())
+
+    async def end(self, patience: Patience) -> list[str]:
+        """Wait for the sync that is under way; returns what had to be given up."""
+        hangs = self.storing is not None and await uncut([self.storing], patience)
+        return ["the journal"] if hangs else []
+
+    def _work(self) -> None:
+        """One group, and its sync; at quiescence, whether the run has ended."""
+        run, acts = self.run, self.run.acts
+        try:
+            self._act()
+            if acts.posted and self.storing is None:
+                self._act()
+            if acts.firings_at_once > FIRINGS_AT_ONCE_MAX:
+                last = acts.fired_at_once[0]
+                run.fail(f"'{last}' and others fire without end, and no time passes: no gate ever holds them")
+            self.are_due = False
+            if self.storing is not None:
+                if acts.posted and not acts.is_ahead:
+                    self.wake()
+            elif acts.posted or acts.unsynced:
+                self.wake()
+            else:
+                run.settle()
+        except Exception as error:  # a callback has no caller: it must end the run, as an error in a task does
+            run.broken(error)
+
+    def _act(self) -> None:
+        if not self.run.acts.is_ahead:
+            self.run.acts.group()
+        self.commit()
+
+    def _stored(self, storing: asyncio.Future[None]) -> None:
+        """A sync is over: what waited for it leaves, and what was done meanwhile is the next group."""
+        self.storing = None
+        try:
+            storing.result()
+            if self.run.outcome is None or self.run.outcome.done():
+                return  # ended by an error: nothing leaves any more
+            self.run.leave(self.run.acts.let_go())
+            self.at_once()
+        except Exception as error:
+            self.run.broken(error)

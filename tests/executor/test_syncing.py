@@ -1,0 +1,317 @@
+"""While a disk takes its time the host goes on, and nothing leaves that rests on what the disk may still lose."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+from threading import Semaphore, Thread
+from typing import Any
+
+import pytest
+
+from firable.decompose.splitting.cut import split
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.journal.journal import MemoryJournal, Storing
+from firable.executor.journal.outbox import Outbox
+from firable.executor.journal.sqlite_journal import SqliteJournal
+from firable.executor.operating import acts
+from firable.executor.operating.host import Host
+from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.situation import Situation, State
+from firable.executor.protocol.messages import Keep, Stored
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.interchange import net_digest
+from firable.nets.net import Place
+from firable.nets.text import parse_net
+
+CELL = """\
+firable: 1
+cell: cell
+controllers:
+  a:
+    start: low
+    inputs: s
+    places: {low: {send: {machine: A, command: LOW}}, high: {send: {machine: A, command: HIGH}}}
+  b:
+    start: free
+    inputs: key
+    places: {free: , working: {send: {machine: B, command: WORK}, until: worked}, waiting: }
+transitions:
+  up: {from: a.low, to: a.high, if: a.s}
+  down: {from: a.high, to: a.low, unless: a.s}
+  begin: {from: b.free, to: b.working, if: b.key}
+  leave: {from: b.working, to: b.waiting}
+"""
+
+
+class Machines(DryRunDriver):
+    """Machines that note what they are sent, and complete nothing by themselves."""
+
+    sent: list[str]
+
+    def send(self, place: Place, entry: int) -> None:
+        self.sent.append(place.name)
+        if place.completion is None and self.listener is not None:
+            self.listener.taken(place.name, entry)
+
+
+class Slow(MemoryJournal):
+    """A journal whose disk answers to each sync when it is let, or fails then."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.answers = Semaphore(0)
+        self.is_slow = False
+        self.fails = False
+        self.durable: Mapping[str, Mapping[str, Stored]] = {}
+
+    def sync(self) -> Storing | None:
+        kept = {machine: self.kept(machine) for machine in self.of}
+
+        def store() -> None:
+            assert self.answers.acquire(timeout=20)
+            if self.fails:
+                raise InputError([Diagnostic("F5034", "the disk is full", "make room")])
+            self.durable = kept
+
+        if self.is_slow:
+            return store
+        self.durable = kept
+        return None
+
+
+class Rig:
+    """A host of the cell with such a disk."""
+
+    def __init__(self, cell: str = CELL) -> None:
+        net = parse_net(cell)
+        decomposition = split(net)
+        self.journal = Slow()
+        self.stream = io.StringIO()
+        self.machines = Machines(decomposition.subnets, 1.0, {"a.s": False, "b.key": False})
+        self.machines.sent = []
+
+        async def present(_: Host) -> None:
+            await asyncio.get_running_loop().create_future()
+
+        recorder = Recorder(net, net_digest(net), self.stream)
+        self.host = Host(decomposition, self.machines, recorder, journal=self.journal, operator=present)
+
+    @asynccontextmanager
+    async def running(self) -> AsyncIterator[asyncio.Task[Situation]]:
+        ending = asyncio.create_task(self.host.main())
+        await turns()
+        try:
+            yield ending
+        finally:
+            self.journal.answers.release(1000)
+            self.host.stop()
+            await asyncio.wait([ending], timeout=10)
+            assert ending.done()
+
+    async def slow_from_now_on(self) -> None:
+        """The next sync begins, and does not end."""
+        self.journal.is_slow = True
+        self.host.signal("a.s", value=True, entry=None)
+        await turns()
+        assert self.host.groups.storing is not None
+
+    async def answer(self) -> None:
+        """Let the disk answer to one sync."""
+        storing = self.host.groups.storing
+        assert storing is not None
+        self.journal.answers.release()
+        await asyncio.wait([storing], timeout=10)
+        await turns()
+
+    @property
+    def lines(self) -> list[dict[str, Any]]:
+        return [json.loads(line) for line in self.stream.getvalue().splitlines()]
+
+    @property
+    def fired(self) -> list[str]:
+        return [name for line in self.lines for name in line.get("fired", ())]
+
+
+async def turns() -> None:
+    for _ in range(20):
+        await asyncio.sleep(0)
+
+
+def test_signals_are_taken_and_transitions_fire_while_the_disk_takes_its_time_and_nothing_leaves() -> None:
+    async def main() -> None:
+        rig = Rig()
+        async with rig.running():
+            await rig.slow_from_now_on()
+            rig.host.signal("b.key", value=True, entry=None)
+            await turns()
+            assert "b.working" in rig.host.marking
+            assert rig.machines.sent == rig.fired == []
+            await rig.answer()
+            assert rig.machines.sent == ["a.high"]  # what was done during the sync waits for the next one
+            assert rig.fired == ["up"]
+            assert "b.working" not in str(rig.journal.durable["b"])
+            await rig.answer()
+            assert rig.machines.sent == ["a.high", "b.working"]
+            assert rig.fired == ["up", "begin"]
+            assert "b.working" in str(rig.journal.durable["b"])
+
+    asyncio.run(main())
+
+
+def test_an_emergency_stop_reaches_the_machines_while_the_disk_takes_its_time_and_nothing_is_commanded_after() -> None:
+    async def main() -> None:
+        rig = Rig()
+        async with rig.running() as ending:
+            await rig.slow_from_now_on()
+            rig.host.emergency_stop("a person")
+            assert rig.machines.is_stopped
+            assert not ending.done()
+            await rig.answer()
+            assert rig.machines.sent == []
+            await rig.answer()
+            situation = await asyncio.wait_for(ending, 10)
+            assert situation.state is State.STOPPED
+            assert situation.is_emergency
+
+    asyncio.run(main())
+
+
+def test_a_disk_that_fails_on_its_thread_ends_the_run_with_the_machines_stopped_and_nothing_left() -> None:
+    async def main() -> None:
+        rig = Rig()
+        async with rig.running() as ending:
+            await rig.slow_from_now_on()
+            rig.host.signal("b.key", value=True, entry=None)
+            await turns()
+            rig.journal.fails = True
+            await rig.answer()
+            with pytest.raises(InputError, match="the disk is full"):
+                await asyncio.wait_for(ending, 10)
+            assert rig.machines.is_stopped
+            assert rig.machines.sent == rig.fired == []
+
+    asyncio.run(main())
+
+
+def test_a_command_whose_time_is_over_before_the_disk_has_answered_is_not_sent() -> None:
+    async def main() -> None:
+        rig = Rig(CELL.replace("until: worked", "until: worked, within: 20ms"))
+        async with rig.running():
+            rig.journal.is_slow = True
+            rig.host.signal("b.key", value=True, entry=None)
+            await turns()
+            for _ in range(1000):
+                if "b.working" not in rig.host.marking:
+                    break
+                await asyncio.sleep(0.005)  # until its time is over
+            assert rig.machines.sent == []
+            while rig.host.groups.storing is not None:
+                await rig.answer()
+            assert rig.machines.sent == []
+            assert [line["place"] for line in rig.lines if line.get("note") == "withdrawn"] == ["b.working"]
+
+    asyncio.run(main())
+
+
+def test_nobody_is_told_that_the_host_is_at_rest_before_the_disk_has_answered() -> None:
+    async def main() -> None:
+        rig = Rig()
+        async with rig.running():
+            await rig.slow_from_now_on()
+            quiet = asyncio.create_task(rig.host.quiet())
+            await turns()
+            assert not quiet.done()
+            assert rig.host.situation().state is State.RUNNING
+            await rig.answer()
+            while rig.host.groups.storing is not None:  # its machine has taken the command, which is kept as well
+                await rig.answer()
+            await asyncio.wait_for(quiet, 10)
+
+    asyncio.run(main())
+
+
+def test_a_run_ends_when_its_last_sync_is_over_and_not_before() -> None:
+    async def main() -> None:
+        rig = Rig()
+        async with rig.running() as ending:
+            rig.journal.is_slow = True
+            rig.host.stop()
+            await turns()
+            assert not ending.done()
+            await rig.answer()
+            assert (await asyncio.wait_for(ending, 10)).state is State.STOPPED
+            assert rig.lines[-1]["end"] == "stopped"
+
+    asyncio.run(main())
+
+
+def test_a_disk_that_stands_still_lets_the_host_get_so_far_ahead_and_no_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(acts, "AHEAD_MAX", 20)
+
+    async def main() -> None:
+        rig = Rig()
+        async with rig.running():
+            await rig.slow_from_now_on()
+            for i in range(100):
+                rig.host.signal("b.key", value=i % 2 == 0, entry=None)
+                await asyncio.sleep(0)
+            ahead = len(rig.host.recorder.unwritten) + len(rig.host.acts.outbox)
+            assert 20 < ahead < 30
+            assert rig.host.acts.posted
+            while rig.host.groups.storing is not None:
+                await rig.answer()
+            assert not rig.host.acts.posted
+            assert rig.host.is_quiet
+
+    asyncio.run(main())
+
+
+def test_what_a_thread_would_do_takes_no_virtual_time() -> None:
+    async def main() -> float:
+        loop = asyncio.get_running_loop()
+        asyncio.get_running_loop().call_later(1000, lambda: None)
+        assert await loop.run_in_executor(None, lambda: 7) == 7
+        with pytest.raises(ValueError, match="no"):
+            await loop.run_in_executor(None, int, "no")
+        return loop.time()
+
+    assert run_in_virtual_time(main()) == 0
+
+
+def test_the_sqlite_journal_stores_on_another_thread_what_was_written_when_the_sync_began(tmp_path: Path) -> None:
+    journal = SqliteJournal(tmp_path / "cell.journal", "d", ("a",))
+    journal.write("a", [Keep("word", "1")])
+    storing = journal.sync()
+    assert storing is not None
+    journal.write("a", [Keep("word", "2"), Keep("other", "3")])
+    thread = Thread(target=storing)
+    thread.start()
+    thread.join()
+    journal.close()
+    again = SqliteJournal(tmp_path / "cell.journal", "d", ("a",))
+    assert again.kept("a") == {"word": "1"}
+    again.close()
+
+
+def test_the_outbox_lets_go_in_the_order_of_the_acts_and_of_one_sync_at_a_time() -> None:
+    outbox = Outbox[int]()
+    left = []
+    for number in range(10):
+        outbox.add(number)
+        if number in {2, 5, 9}:
+            if outbox.is_under_way:
+                left += outbox.over()
+            outbox.begin()
+    assert left == [0, 1, 2, 3, 4, 5]
+    assert list(outbox) == [6, 7, 8, 9]
+    outbox.remove(7)
+    assert outbox.over() == [6, 8, 9]
+    assert len(outbox) == 0
