@@ -121,6 +121,8 @@ class Acts:
         self.lines = 0
         """Of the trace, those that wait for the sync that is under way."""
         self.unsynced = False
+        self.in_group = False
+        """Whether a group is being done: then nobody has to be woken for what is posted."""
         self.has_news = False
         """Whether anything is said to other hosts for the first time."""
         self.halted = False
@@ -170,10 +172,14 @@ class Acts:
 
     def group(self) -> None:
         """Acts until nothing is posted, or they are many."""
-        for _ in range(ACTS_AT_ONCE_MAX):
-            if not self.posted:
-                return
-            self._give(*self.posted.popleft())
+        self.in_group = True
+        try:
+            for _ in range(ACTS_AT_ONCE_MAX):
+                if not self.posted:
+                    return
+                self._give(*self.posted.popleft())
+        finally:
+            self.in_group = False
 
     def permit(self, firings: int | None) -> None:
         """Let each coordinator commit so many transitions from now on; None is without limit."""
@@ -242,6 +248,8 @@ class Acts:
             return
         controller = self.controllers[machine]
         match item:
+            case SignalRead(signal, value, entry):
+                self.act(machine, controller.read(signal, value, entry))
             case VoteRequest() if self._withholds(item):
                 self.withheld[machine, item.round] = item
                 return
@@ -250,8 +258,6 @@ class Acts:
                 return
             case VoteRequest() | Decision() | Hello():
                 self._receive(machine, controller, item)
-            case SignalRead(signal, value, entry):
-                self.act(machine, controller.read(signal, value, entry))
             case CommandTaken(place, entry):
                 self.act(machine, controller.sent(place, entry))
             case None:
@@ -305,12 +311,12 @@ class Acts:
         """
         if not effects:
             return
-        self.journal.write(machine, effects)
+        keeps: list[Keep] = []
         now = self.now_seconds()
         for effect in effects:
             match effect:
                 case Keep():
-                    self.unsynced = True
+                    keeps.append(effect)
                 case Firing(transition):
                     self._fired(now, machine, transition, effects)
                 case Taken(signal, value):
@@ -334,7 +340,11 @@ class Acts:
                     self._say(effect.coordinator, effect, again=again)
                 case _:
                     assert_never(effect)
-        self.wake()
+        if keeps:
+            self.journal.write(machine, keeps)
+            self.unsynced = True
+        if not self.in_group:
+            self.wake()
 
     def _fired(self, now: float, machine: str, transition: str, effects: list[Effect]) -> None:
         number = None

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from firable.executor.drivers.driver import withdraw
 from firable.executor.operating.acts import CommandTaken
+from firable.nets.net import Place
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
@@ -30,6 +31,8 @@ class Dispatch:
         """The alarm of each command that is awaited, by its completion or, without one, its place."""
         self.untaken: set[str] = set()
         """The places whose command has no completion, and is with the driver."""
+        self.commanding: dict[tuple[str, str], list[Place]] = {}
+        """The places with a command that a firing leaves, by controller and transition; looked up once."""
 
     def send(self, place: str, entry: int) -> None:
         """Hand the command of a place to the driver."""
@@ -53,8 +56,11 @@ class Dispatch:
 
     def left(self, controller: str, transition: str) -> None:
         """Give up what the tokens of a controller have left behind."""
-        inputs = map(self.run.net.place, self.run.net.transition(transition).inputs)
-        places = [place for place in inputs if place.owner == controller]
+        places = self.commanding.get((controller, transition))
+        if places is None:
+            inputs = map(self.run.net.place, self.run.net.transition(transition).inputs)
+            places = [place for place in inputs if place.owner == controller and place.command is not None]
+            self.commanding[controller, transition] = places
         for name in withdraw(self.run.driver, places, self.run.acts.outbox):
             self.run.recorder.note(self.run.now_seconds(), "withdrawn", place=name)
 

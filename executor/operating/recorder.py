@@ -161,12 +161,14 @@ class Recorder:
         if not self.machines:
             self.word = self.player.transitions[transition].fire(self.word)
         self.firings[transition] += 1
-        self._write(Fired(at_seconds, (transition,), number))
+        if self._is_told(at_seconds):
+            self._write(Fired(at_seconds, (transition,), number))
 
     def voted(self, at_seconds: float, controller: str, number: int, promised: frozenset[str]) -> None:
         """A controller has voted in a round: yes for these transitions."""
-        data = {"controller": controller, "round": number, "promised": sorted(promised)}
-        self._write(Noted(at_seconds, VOTED, data))
+        if self._is_told(at_seconds):
+            data = {"controller": controller, "round": number, "promised": sorted(promised)}
+            self._write(Noted(at_seconds, VOTED, data))
 
     def stands(self, at_seconds: float, controller: str, transitions: frozenset[str]) -> None:
         """A controller has said yes for parts that are free of promise: of one host among others, that is told."""
@@ -174,7 +176,7 @@ class Recorder:
 
     def applied(self, at_seconds: float, controller: str, number: int, transition: str) -> None:
         """A controller has applied its part of what a round committed: of one host among others, that is told."""
-        if self.machines:
+        if self.machines and self._is_told(at_seconds):
             data = {"controller": controller, "round": number, "transition": transition}
             self._write(Noted(at_seconds, APPLIED, data))
 
@@ -182,12 +184,14 @@ class Recorder:
         """A controller has taken a new value of a signal."""
         bit = self.player.signal_bit(name)
         self.word = self.word | bit if value else self.word & ~bit
-        self._write(SignalChanged(at_seconds, name, value))
+        if self._is_told(at_seconds):
+            self._write(SignalChanged(at_seconds, name, value))
 
     def sent(self, at_seconds: float, place: str) -> None:
         """The command of a place was sent."""
         self.commands += 1
-        self._write(CommandSent(at_seconds, place))
+        if self._is_told(at_seconds):
+            self._write(CommandSent(at_seconds, place))
 
     def note(self, at_seconds: float, note: str, **data: str) -> None:
         """Anything else that the trace should keep."""
@@ -207,6 +211,11 @@ class Recorder:
                 self.size_bytes += len(line)
             del self.unwritten[:lines]
             self.stream.flush()
+
+    def _is_told(self, at_seconds: float) -> bool:
+        """Whether anybody is shown what happens now: an event that nobody is shown is not made."""
+        self.at_seconds = at_seconds
+        return self.stream is not None or bool(self.observers)
 
     def _write(self, item: Header | Event | End) -> None:
         if self.is_ended:

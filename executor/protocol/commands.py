@@ -33,7 +33,7 @@ from functools import cache
 from typing import Final
 
 from firable.executor.protocol.messages import Effect, Keep, ProtocolError, Sending, Stored
-from firable.nets.net import Net
+from firable.nets.net import Net, Place
 
 PREFIX: Final = "command/"
 
@@ -63,6 +63,10 @@ class Command:
     entry: int
     stage: Stage
     answer: Answer | None = None
+
+
+_STORED: Final = {stage: stage.value for stage in Stage}
+"""As stable storage holds them."""
 
 
 class Commands:
@@ -105,21 +109,25 @@ class Commands:
         newest = self.newest.get(_signal_key(completion))
         return newest.entry if newest is not None else 0
 
-    def enter(self, place: str, *, held: bool) -> Iterator[Effect]:
+    def enter(self, place: Place, *, held: bool) -> list[Effect]:
         """A token enters a place with a command: issue it or, in a controller that is held, owe it."""
-        key = self._key(place)
+        effects: list[Effect] = []
+        key = own = _place_key(place.name)
+        if place.completion is not None:
+            key = _signal_key(place.completion)
         earlier = self.newest.get(key)
-        if earlier is not None and earlier.place != place and earlier.stage is not Stage.OVER:
+        if earlier is not None and earlier.place != place.name and earlier.stage is not Stage.OVER:
             beside = _place_key(earlier.place)
             self.newest[beside] = earlier
-            yield self._kept(beside)
-        if key != _place_key(place):
-            yield from self._over(_place_key(place))
+            effects.append(self._kept(beside))
+        if key != own:
+            effects += self._over(own)
         entry = earlier.entry + 1 if earlier is not None else 1
-        self.newest[key] = Command(place, entry, Stage.OWED if held else Stage.ISSUED)
-        yield self._kept(key)
+        self.newest[key] = Command(place.name, entry, Stage.OWED if held else Stage.ISSUED)
+        effects.append(self._kept(key))
         if not held:
-            yield Sending(place, entry)
+            effects.append(Sending(place.name, entry))
+        return effects
 
     def completed(self, completion: str) -> Iterator[Effect]:
         """The completion signal of the newest command has been taken into the process image."""
@@ -156,11 +164,12 @@ class Commands:
                 command.answer = None
                 yield Sending(command.place, command.entry, again=True)
 
-    def _over(self, key: str) -> Iterator[Effect]:
+    def _over(self, key: str) -> list[Effect]:
         command = self.newest.get(key)
-        if command is not None and command.stage is not Stage.OVER:
-            command.stage, command.answer = Stage.OVER, None
-            yield self._kept(key)
+        if command is None or command.stage is Stage.OVER:
+            return []
+        command.stage, command.answer = Stage.OVER, None
+        return [self._kept(key)]
 
     def _is_newest(self, key: str, entry: int) -> bool:
         return key in self.newest and self.newest[key].entry == entry
@@ -171,7 +180,7 @@ class Commands:
 
     def _kept(self, key: str) -> Keep:
         command = self.newest[key]
-        return Keep(key, (command.place, command.entry, command.stage.value))
+        return Keep(key, (command.place, command.entry, _STORED[command.stage]))
 
 
 @cache

@@ -148,6 +148,8 @@ class LocalController:
         self.free_mask = sum(1 << t for t, row in self.rows.items() if row in self.free)
         self.lasting = _union(self.parts[row].needs for row in self.free) & ~self.player.places
         """The completions that these wait for."""
+        self.cleared = {place.name: place.cleared for place in self.subnet.places if place.command is not None}
+        """The signals that the token of a place with a command clears."""
         self.arbiter = Arbiter(self.subnet, (group for group in decomposition.groups if group.controller == name))
         self.kept_turns = self.arbiter.turns
         self.word = self.subnet.initial_marking
@@ -434,15 +436,15 @@ class LocalController:
     def _fire(self, transition: Compiled) -> list[Effect]:
         before = self.word
         self.word = transition.fire(before)
-        effects: list[Effect] = [*self._keep_word()]
+        effects: list[Effect] = self._keep_word()
         for name in self.player.entered(transition.name):
             place = self.subnet.place(name)
-            for signal in place.cleared:
+            for signal in self.cleared[name]:
                 self.latched.pop(signal, None)  # a value from before the command
                 if before & self.player.signal_bit(signal):
                     effects.append(Taken(signal, value=False))
             self.timers.enter(name)
-            effects += self.commands.enter(name, held=self.held)
+            effects += self.commands.enter(place, held=self.held)
             if place.completion is None:
                 self.unsent |= 1 << self.subnet.place_index[name]
         return effects
@@ -467,7 +469,7 @@ class LocalController:
             self.word = self.word | bit if value else self.word & ~bit
             self.untold &= ~bit
             effects.append(Taken(signal, value))
-            if self.subnet.signals[self.subnet.signal_index[signal]].kind is SignalKind.COMPLETION:
+            if self.subnet.signal(signal).kind is SignalKind.COMPLETION:
                 effects += self._keep_word()
         if value:
             effects += self.commands.completed(signal)
@@ -478,10 +480,11 @@ class LocalController:
         parts = [self.parts[name] for name in promised]
         return Promise(promised, _union(part.writes for part in parts), _union(part.reads for part in parts))
 
-    def _keep_word(self) -> Iterator[Effect]:
-        if self.word != self.kept_word:
-            yield from changed_pieces(self.kept_word, self.word)
-            self.kept_word = self.word
+    def _keep_word(self) -> list[Effect]:
+        if self.word == self.kept_word:
+            return []
+        before, self.kept_word = self.kept_word, self.word
+        return list(changed_pieces(before, self.word))
 
     def _is_enabled(self, transition: Compiled) -> bool:
         """Enabled by what is known.

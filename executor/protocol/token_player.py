@@ -157,11 +157,16 @@ class Arbiter:
             raise ValueError("nothing is enabled that is arbitrated here")
         return self.net.transitions[chosen].name
 
-    def following(self, enabled: int, is_free: Callable[[int], bool] = lambda _: True) -> int | None:
+    def following(self, enabled: int, is_free: Callable[[int], bool] | None = None) -> int | None:
         """The transition to fire now, by its index, of the mask of those enabled as far as they are free to fire.
 
         It is the first behind the last winner that its arbiter grants; only its own rivals are looked at.
         """
+        if is_free is None:
+            if enabled and not enabled & (enabled - 1):  # one alone has no rivals
+                self.last = enabled.bit_length() - 1
+                return self.last
+            is_free = _anybody
         for t in bits_behind(enabled, self.last):
             if is_free(t) and self._is_granted(t, enabled, is_free):
                 self.last = t
@@ -184,3 +189,7 @@ class Arbiter:
             turn = self.arbitration.groups[g].turn_after(t, self.turns[g])
             self.turns = (*self.turns[:g], turn, *self.turns[g + 1 :])
         return True
+
+
+def _anybody(_: int) -> bool:
+    return True
