@@ -122,6 +122,7 @@ class PingPong:
             self.came.clear()
             self.sent = time.perf_counter()
             listener.signal("m.s", count % 2 == 0, None)
+            listener.all_told()
             await self.came.wait()
         listener.driver_fault("", "enough")
         await asyncio.get_running_loop().create_future()
@@ -217,6 +218,7 @@ class SocketDriver(PingPong, asyncio.Protocol):
         """The signal."""
         if self.listener is not None:
             self.listener.signal("m.s", data == b"1", None)
+            self.listener.all_told()
 
     def send(self, place: Place, entry: int) -> None:
         """The command."""

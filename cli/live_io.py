@@ -136,6 +136,9 @@ class _Heard:
     def taken(self, place: str, entry: int) -> None:
         self._told(f"{place}: taken, as command {entry}")
 
+    def all_told(self) -> None:
+        pass
+
     def moved(self) -> None:
         pass
 

@@ -114,6 +114,9 @@ class Heard:
         """Remember an emergency stop."""
         self.emergencies.append(reason)
 
+    def all_told(self) -> None:
+        """Nothing to remember."""
+
     def moved(self) -> None:
         """Nothing to remember."""
 

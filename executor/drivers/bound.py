@@ -294,6 +294,8 @@ class _Device:
                 self._replied(channel, key, point, value)
             if point == self.tripped:
                 self._watchdog(value)
+        if self.driver.listener is not None:
+            self.driver.listener.all_told()
 
     def ready(self) -> None:
         """A new connection has told what the device shows."""

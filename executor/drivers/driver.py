@@ -82,6 +82,13 @@ class Listener(Protocol):
         """Somebody, or a device, asks for the emergency stop: every driver here is stopped before this returns."""
         ...
 
+    def all_told(self) -> None:
+        """What came together has been told, and the driver is in the midst of nothing: it is acted upon now.
+
+        The driver may be commanded before this returns. Without this it is acted upon in a turn of the event loop.
+        """
+        ...
+
     def moved(self) -> None:
         """Something happened in the cell, whether or not a signal shows it."""
         ...

@@ -31,8 +31,6 @@ TABLES: Final = ("coil", "discrete", "input", "holding")
 BITS: Final = ("coil", "discrete")
 WRITTEN: Final = ("coil", "holding")
 ADDRESS_MAX: Final = 65_535
-_TURNS: Final = 2
-"""Turns of the loop from what was polled to the command that follows from it: the host acts, the writer begins."""
 AT_ONCE_MAX: Final = {"coil": 1968, "discrete": 2000, "input": 125, "holding": 123}
 """How many a request may carry, by the standard."""
 
@@ -131,9 +129,8 @@ class ModbusConnection:
     async def read(self) -> Sequence[tuple[Point, Value]]:
         """All points, when it is time to poll them again."""
         loop = asyncio.get_running_loop()
+        # A turn of the loop at least, in which the writer begins with the command that follows from what was polled.
         await asyncio.sleep(max(0.0, self.due_seconds - loop.time()))
-        for _ in range(_TURNS):
-            await asyncio.sleep(0)
         await self.is_free.wait()
         self.due_seconds = loop.time() + self.every_s
         shown: dict[tuple[str, int], int] = {}

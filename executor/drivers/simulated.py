@@ -39,6 +39,9 @@ class _Nobody:
     def emergency_stop(self, reason: str) -> None:
         """It was told in its time."""
 
+    def all_told(self) -> None:
+        """It was told in its time."""
+
     def moved(self) -> None:
         """It was told in its time."""
 

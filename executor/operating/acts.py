@@ -12,7 +12,8 @@ Acts go on while a disk takes its time; what they let out, and the lines that te
 memory.
 
 A signal is not acted upon inside the call that tells it. A driver tells in the middle of its own bookkeeping, and would
-be commanded there; and signals that come together would cost a sync each.
+be commanded there; and signals that come together would cost a sync each. It is acted upon when the driver says that
+all is told, or in the next turn of the loop.
 
 Nothing here waits, and nothing here is a machine's: no rule of the protocol stands in this file.
 

@@ -5,6 +5,9 @@ is let go at once. A file is synced on a thread, and the loop goes on: signals, 
 further groups are done, and what they let out waits for the next sync, which begins when this one is over
 (`outbox.py`). A stop waits for no disk: it goes to the driver in the call that asks for it.
 
+A driver that has told all that came together has the group done in that call (`do_due`), and a link has, too: a turn of
+the loop asks the kernel what else there is.
+
 What a driver says of a command while it is handed over, that its machine has it, is acted upon in the same callback,
 and not a turn of the loop later in front of the next signal. That once: a net that fires on it must not keep the loop.
 
@@ -36,6 +39,8 @@ class Groups:
         self.run = run
         self.are_due = False
         """Whether a group is done, or about to be."""
+        self.turn: asyncio.Handle | None = None
+        """In which a group is due."""
         self.storing: asyncio.Future[None] | None = None
         """The sync that is under way on a thread."""
 
@@ -48,12 +53,18 @@ class Groups:
         """Have a group done in a turn of the loop of its own, unless one is due."""
         if not self.are_due and self.run.outcome is not None and not self.run.is_over:
             self.are_due = True
-            asyncio.get_running_loop().call_soon(self._work)
+            self.turn = asyncio.get_running_loop().call_soon(self._work)
 
     def at_once(self) -> None:
         """Do a group now, unless one is due."""
         if not self.are_due and self.run.outcome is not None and not self.run.is_over:
             self.are_due = True
+            self._work()
+
+    def do_due(self) -> None:
+        """Do now the group that is due in a turn of the loop, if one is."""
+        if self.turn is not None:
+            self.turn.cancel()
             self._work()
 
     def commit(self) -> None:
@@ -76,7 +87,7 @@ class Groups:
 
     def _work(self) -> None:
         """One group, and its sync; at quiescence, whether the run has ended."""
-        run, acts = self.run, self.run.acts
+        run, acts, self.turn = self.run, self.run.acts, None
         try:
             self._act()
             if acts.posted and self.storing is None:

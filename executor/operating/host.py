@@ -307,6 +307,10 @@ class Host:
         """What a driver says of a machine or its link stands in the trace."""
         self.told("driver", f"{machine}: {message}")
 
+    def all_told(self) -> None:
+        """What came together is told: if it is anything, the group that is due for it is done now."""
+        self.groups.do_due()
+
     def moved(self) -> None:
         """Something happened in the cell; perhaps it has come to rest."""
         self.groups.wake()

@@ -148,8 +148,6 @@ class LocalController:
         self.free_mask = sum(1 << t for t, row in self.rows.items() if row in self.free)
         self.lasting = _union(self.parts[row].needs for row in self.free) & ~self.player.places
         """The completions that these wait for."""
-        self.cleared = {place.name: place.cleared for place in self.subnet.places if place.command is not None}
-        """The signals that the token of a place with a command clears."""
         self.arbiter = Arbiter(self.subnet, (group for group in decomposition.groups if group.controller == name))
         self.kept_turns = self.arbiter.turns
         self.word = self.subnet.initial_marking
@@ -439,7 +437,7 @@ class LocalController:
         effects: list[Effect] = self._keep_word()
         for name in self.player.entered(transition.name):
             place = self.subnet.place(name)
-            for signal in self.cleared[name]:
+            for signal in self.player.cleared[name]:
                 self.latched.pop(signal, None)  # a value from before the command
                 if before & self.player.signal_bit(signal):
                     effects.append(Taken(signal, value=False))

@@ -118,6 +118,11 @@ class TokenPlayer:
         return self._entered[transition]
 
     @cached_property
+    def cleared(self) -> dict[str, tuple[str, ...]]:
+        """The signals that a token clears when it enters a place."""
+        return {place.name: place.cleared for place in self.net.places}
+
+    @cached_property
     def _entered(self) -> dict[str, tuple[str, ...]]:
         order = self.net.place_index.__getitem__
         return {

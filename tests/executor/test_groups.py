@@ -1,4 +1,4 @@
-"""While a disk takes its time the host goes on, and nothing leaves that rests on what the disk may still lose."""
+"""When groups of acts are done, and what leaves: as soon as all is told, and nothing that the disk may still lose."""
 
 from __future__ import annotations
 
@@ -141,6 +141,38 @@ class Rig:
 async def turns() -> None:
     for _ in range(20):
         await asyncio.sleep(0)
+
+
+def test_what_is_told_together_is_acted_upon_when_all_is_told_and_else_in_a_turn_of_the_loop() -> None:
+    async def main() -> None:
+        rig = Rig()
+        async with rig.running():
+            rig.host.all_told()  # nothing is
+            rig.host.signal("a.s", value=True, entry=None)
+            rig.host.signal("b.key", value=True, entry=None)
+            assert rig.machines.sent == []  # the driver is in the midst of something
+            rig.host.all_told()
+            assert rig.machines.sent == ["a.high", "b.working"]
+            rig.host.signal("a.s", value=False, entry=None)
+            await turns()
+            assert rig.machines.sent == ["a.high", "b.working", "a.low"]
+
+    asyncio.run(main())
+
+
+def test_the_word_that_a_machine_has_its_command_is_acted_upon_before_the_next_signal() -> None:
+    async def main() -> None:
+        rig = Rig()
+        async with rig.running():
+            rig.host.signal("a.s", value=True, entry=None)
+            rig.host.all_told()
+            assert rig.machines.sent == ["a.high"]
+            assert not rig.host.controllers["a"].commands.unsent
+            rig.host.signal("a.s", value=False, entry=None)
+            rig.host.all_told()
+            assert rig.machines.sent == ["a.high", "a.low"]
+
+    asyncio.run(main())
 
 
 def test_signals_are_taken_and_transitions_fire_while_the_disk_takes_its_time_and_nothing_leaves() -> None:
