@@ -82,6 +82,8 @@ def ask(
     """
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
+    from firable.decompose.protocol.dead_script import FILE as DEAD_FILE
+    from firable.decompose.protocol.dead_script import prove_of_the_dead
     from firable.decompose.protocol.outages import inquests, outage_verdict
     from firable.decompose.protocol.refuting import readable, refute
     from firable.decompose.protocol.verdicts import protocol_verdicts
@@ -99,13 +101,13 @@ def ask(
     refutations: list[Refutation] = []
     interrupted: tuple[Verdict, ...] = ()
     try:
+        timeout_ms = max(1, round(seconds * 1000))
         if asked.protocol or asked.faults:
             begins("asking which parts need no promise")
             votes = persistence(decomposition)
             voted, shown_votes = votes.with_evidence()
             running = replace(decomposition, free=votes.free_as_shown(voted))
             begins("exploring the protocol" + " with and without faults" * asked.faults)
-            timeout_ms = max(1, round(seconds * 1000))
             found = protocol_verdicts(running, limits, faults=asked.faults, timeout_ms=timeout_ms)
             free = len(running.free)
             verdicts, protocols = found.verdicts, found.protocols
@@ -113,10 +115,12 @@ def ask(
             files = {**shown_votes, **found.evidence()} if evidence else {}
         if asked.faults:
             begins("asking what goes on while somebody is dead")
-            for inquest in inquests(decomposition, limits):
+            tie = prove_of_the_dead(decomposition, timeout_ms)
+            for inquest in inquests(decomposition, limits, tie):
                 verdict, shown = inquest.sealed() if evidence else (outage_verdict(inquest.outage), {})
                 dead.append((inquest.outage, verdict))
                 files |= dict(_packed(file, document) for file, document in shown.items())
+            files |= {DEAD_FILE: tie.text} if evidence else {}
         for wrong in wrong_protocols(decomposition.net) if asked.wrong else ():
             begins(f"trying the wrong protocol {wrong.name}")
             refutations.append(readable(refute(wrong, decomposition, limits())))

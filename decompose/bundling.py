@@ -82,7 +82,9 @@ def make_bundle(
     on_the_net = (replace(v, evidence=(*v.evidence, EVIDENCE)) if v.name in named else v for v in report.verdicts)
     families = ["explored"] * (protocol or faults) + ["faults"] * faults
     run, obligations = proved_without_exploring(decomposition, families, timeout_ms)
-    dead, last_rites = sealed_outages(decomposition, lambda: _anew(limits, seconds)) if faults else ((), {})
+    dead, last_rites = tuple[Verdict, ...](), dict[str, str]()
+    if faults:
+        dead, last_rites = sealed_outages(decomposition, lambda: _anew(limits, seconds), timeout_ms)
     held, machines = tuple[Verdict, ...](), dict[str, str]()
     if plant:
         held, machines = held_gates(decomposition, parse_plant(plant)).sealed(plant, _anew(limits, seconds))

@@ -23,8 +23,9 @@ the life of who dies, and the promises that a dead coordinator leaves:
     hold/t/c: while dying, c has promised its part of t             behind/t/c: and t was decided before
 
 Each question is a property of this net (`outages`), with evidence as any property. That what goes on here goes on in
-the protocol is argued in docs/protocol.md, and tests hold it to an exploration of the protocol's net, in which rounds
-may be given up, and to the machines that run.
+the protocol's net is proved, too (`dead_script`). What the executor does beyond that net is argued in docs/protocol.md:
+that a round with a dead controller may stay open, that a coordinator opens none beside what it would disturb, and that
+a promise holds signals still. Tests hold it to exploring the protocol's net, and to the machines that run.
 
 Rejected: to count on it that a round with a dead controller is given up. The coordinator that runs has no clock, and
 decides when everybody has voted. Rejected, too: to explore the protocol's net with somebody dead in it, which took the
@@ -147,6 +148,17 @@ class Bereft:
             return self.held_up
         return frozenset(part.whole for part in self.parts.local if part.controller == self.who)
 
+    @property
+    def verdict(self) -> str:
+        """The name of the verdict, without its family."""
+        return verdict_name(self.who, self.coordinator)
+
+    def rests(self, group: Iterable[str]) -> bool:
+        """Whether the rounds of a group come to rest without who is dead."""
+        if not self.who:
+            return self.held_up.isdisjoint(group)
+        return all(part.controller != self.who for t in group for part in self.parts.coordinated[t])
+
     @cached_property
     def left(self) -> tuple[Part, ...]:
         """The parts of which a promise may be left by a dead coordinator, and keeps somebody from firing."""
@@ -183,13 +195,7 @@ class Bereft:
         free = self._is_free(part)
         excluding = () if free else self.parts.excluding(part)
         others = {held[other] for other in excluding if other in held and not self._is_free(other)}
-        moved = {
-            place
-            for t in self.parts.groups[self.parts.group_of[part.whole]]
-            for mate in self.parts.coordinated[t]
-            if t != part.whole and mate.controller == part.controller
-            for place in mate.writes
-        }
+        moved = moved_beside(self.parts, part)
         full, empty = {*part.inputs, *part.permissive} - moved, {*part.outputs, *part.inhibitive} - moved
         name, here = f"{part.whole}/{part.controller}", (held[part],)
         yield Transition(f"hold/{name}", (), here, _sorted({DYING, *full}), _sorted(empty | others))
@@ -227,6 +233,18 @@ class Bereft:
         never_again = f"E[{dying} U {dead} and not EF ({one})]"
         text = f"AG (not EF ({alive} and ({one})) or AX (not {dying} or not {never_again}))"
         return TemporalProperty(f"goes-on.{name}", Logic.CTL, parse_temporal(text))
+
+
+def verdict_name(who: str, coordinator: str) -> str:
+    """The name of the verdict on a dead controller or, where `who` is empty, coordinator, without its family."""
+    return f"dead.{who}" if who else f"dead-{coordinator.removeprefix('the ').replace(' ', '.', 1)}"
+
+
+def moved_beside(parts: Parts, part: Part) -> frozenset[str]:
+    """The places that other parts of its round move at the controller of a part."""
+    group = parts.groups[parts.group_of[part.whole]]
+    mates = (mate for t in group if t != part.whole for mate in parts.coordinated[t])
+    return frozenset(place for mate in mates if mate.controller == part.controller for place in mate.writes)
 
 
 def deaths(parts: Parts, free: Iterable[tuple[str, str]] = ()) -> Iterator[Bereft]:

@@ -26,7 +26,8 @@ still if its use does, though nothing keeps back the switching on.
 All of it is asked of the central net without what the dead may hold up (`bereft`), of whose markings a table or a
 diagram is made. What is looked at first is M0. Whoever crashes may do so before anything has fired, and whatever can
 fire at all can fire from there; so what does not fire then is kept back. Only of the others is it asked from wherever
-somebody may die. Each answer is a property of that net, which a document of evidence shows (`Inquest.document`).
+somebody may die. Each answer is a property of that net, which a document of evidence shows (`Inquest.document`); that
+the net stands for the protocol without the dead is shown by obligations of its own (`dead_script`).
 """
 
 from __future__ import annotations
@@ -49,7 +50,9 @@ from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
 from firable.analysis.temporal.queries import decide_temporal
 from firable.analysis.verdicts.properties import decide_property
-from firable.decompose.protocol.bereft import Bereft, deaths
+from firable.decompose.protocol.bereft import Bereft, deaths, verdict_name
+from firable.decompose.protocol.dead_script import FILE as DEAD_FILE
+from firable.decompose.protocol.dead_script import DeadProof, prove_of_the_dead
 from firable.decompose.protocol.exploring import FIRST_MARKINGS, Exploration, explore_protocol
 from firable.decompose.protocol.parts import Parts
 from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL
@@ -61,6 +64,7 @@ from firable.nets.verdict import Status, Verdict, Weight
 WHILE_FAULTS: Final = "while messages are lost and doubled, and controllers and coordinators crash and restart"
 METHOD: Final = "the central net, without what the dead may hold up"
 EVIDENCE_SECONDS: Final = 60.0
+TIMEOUT_MS: Final = 10_000
 RESUMES: Final = "when faults have ceased, whatever the central net may fire next, the protocol can fire next"
 
 
@@ -115,22 +119,26 @@ def outages(decomposition: Decomposition, limits: Callable[[], Limits] = Limits)
     yield from (inquest.outage for inquest in inquests(decomposition, limits))
 
 
-def inquests(decomposition: Decomposition, limits: Callable[[], Limits] = Limits) -> Iterator[Inquest]:
-    """The same, each with what it rests on.
+def inquests(
+    decomposition: Decomposition, limits: Callable[[], Limits] = Limits, tie: DeadProof | None = None
+) -> Iterator[Inquest]:
+    """The same, each with what it rests on; `tie` shows that the nets that are left stand for the protocol.
 
     What a part would keep back that promises, one that is free of promise is said to keep back, too.
     """
     promising = Parts(replace(decomposition, free=()), PROTOCOL)
-    yield from (Inquest(bereft, limits()) for bereft in deaths(promising, decomposition.free))
+    for bereft in deaths(promising, decomposition.free):
+        yield Inquest(bereft, limits(), "" if tie is None else tie.lacks(bereft))
 
 
 def sealed_outages(
-    decomposition: Decomposition, limits: Callable[[], Limits] = Limits
+    decomposition: Decomposition, limits: Callable[[], Limits] = Limits, timeout_ms: int = TIMEOUT_MS
 ) -> tuple[tuple[Verdict, ...], dict[str, str]]:
-    """The verdicts on all who can be dead as a bundle holds them, and the documents that show them."""
-    found = [inquest.sealed() for inquest in inquests(decomposition, limits)]
+    """The verdicts on all who can be dead as a bundle holds them, and the files that show them."""
+    tie = prove_of_the_dead(decomposition, timeout_ms)
+    found = [inquest.sealed() for inquest in inquests(decomposition, limits, tie)]
     documents = {file: document.to_text() for _, some in found for file, document in some.items()}
-    return tuple(verdict for verdict, _ in found), documents
+    return tuple(verdict for verdict, _ in found), documents | ({DEAD_FILE: tie.text} if documents else {})
 
 
 @dataclass(frozen=True)
@@ -139,6 +147,8 @@ class Inquest:
 
     bereft: Bereft
     limits: Limits
+    untied: str = ""
+    """Why it is not known that the net stands for the protocol without who is dead."""
     answers: dict[str, tuple[Property | TemporalProperty, Verdict]] = field(default_factory=dict)
 
     @cached_property
@@ -152,6 +162,8 @@ class Inquest:
     def outage(self) -> Outage:
         """Who is dead, and what that keeps back; not known where the net is too large."""
         dead = Outage(self.bereft.who, coordinator=self.bereft.coordinator)
+        if self.untied:
+            return replace(dead, bound=self.untied)
         try:
             return self._divided(dead)
         except (IncompleteGraph, BudgetExceeded) as error:
@@ -181,7 +193,7 @@ class Inquest:
         if lacking := next((record.lacking for record in document.records if record.lacking), ""):
             return outage_verdict(replace(self.outage, bound=f"no evidence: {lacking}")), {}
         file = f"{file_stem(told.name)}.evidence.json"
-        return replace(told, evidence=(file,)), {file: document}
+        return replace(told, evidence=(file, DEAD_FILE)), {file: document}
 
     def _holds(self, of: Property | TemporalProperty) -> bool:
         if isinstance(of, TemporalProperty):
@@ -236,9 +248,8 @@ def commanding(net: Net, firing: Sequence[str]) -> dict[str, tuple[str, ...]]:
 def outage_verdict(outage: Outage) -> Verdict:
     """As a verdict, for information: what may stand still are its subjects, first what does so at once."""
     at_once, still, running = (", ".join(some) or "none" for some in (outage.at_once, outage.still, outage.running))
-    coordinator = outage.coordinator.removeprefix("the ").replace(" ", ".", 1)
     return Verdict(
-        f"faults.dead.{outage.who}" if outage.who else f"faults.dead-{coordinator}",
+        f"faults.{verdict_name(outage.who, outage.coordinator)}",
         Status.UNKNOWN if outage.bound else Status.PROVED,
         f"while {outage.name} is dead, these transitions may stand still for ever, and every other that can fire goes "
         "on, whenever the crash was: where the central net could fire it again when what is under way is over, it can",

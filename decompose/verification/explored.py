@@ -64,7 +64,7 @@ def check_explored(examination: Examination, cut: Cut, solver: str, answers: Ans
         if any(verdict.name.startswith(f"{family}.") for verdict in examination.bundle.verdicts):
             free = frozenset(examination.bundle.decomposition.free)
             stated = Obligations(Voting(cut, family == "faults", free))
-            open_ = _answered(examination, stated, answers, timeout_ms)
+            open_ = {name.partition(".")[0] for name in answered(examination, stated, answers, timeout_ms)}
             _judge(examination, stated, solver, open_)
 
 
@@ -85,8 +85,8 @@ def _sentences(stated: Obligations) -> dict[str, str]:
     return {name: f"{words}, {_FAULTS}" for name, words in safe.items()} | {"resumes": _RESUMES}
 
 
-def _answered(examination: Examination, stated: Obligations, answers: Answers, timeout_ms: int) -> set[str]:
-    """The kinds of obligations of which the solver gave up one; an answer that refutes one is refused."""
+def answered(examination: Examination, stated: Obligations, answers: Answers, timeout_ms: int) -> set[str]:
+    """The obligations of a file that the solver gave up; an answer that refutes one is refused."""
     file = same_text(examination, stated)
     try:
         said = answers(stated.text, timeout_ms)
@@ -99,7 +99,7 @@ def _answered(examination: Examination, stated: Obligations, answers: Answers, t
         if answer != "unsat" and not gave_up(answer):
             raise NotShownError(f"'{name}' of '{file}' is refuted: the solver says {answer}", "evidence", file)
         if answer != "unsat":
-            open_.add(name.partition(".")[0])
+            open_.add(name)
     return open_
 
 

@@ -62,7 +62,9 @@ def of_the_living(name: str) -> Bundle:
     return replace(
         bundle,
         verdicts=tuple(verdict for verdict in bundle.verdicts if not verdict.name.startswith("faults.dead")),
-        evidence={file: data for file, data in bundle.evidence.items() if not file.startswith("faults.dead")},
+        evidence={
+            file: data for file, data in bundle.evidence.items() if not file.startswith(("faults.dead", "dead.smt2"))
+        },
     )
 
 

@@ -13,11 +13,12 @@ from firable.analysis.evidence.document import Document
 from firable.decompose.bundling import make_bundle
 from firable.decompose.splitting.cut import split
 from firable.decompose.verification import documents
+from firable.decompose.verification.bereft import PREFIX
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.explored import TITLES, check_explored
 from firable.decompose.verification.obligations import compared
-from firable.decompose.verification.outages import PREFIX, check_outages
+from firable.decompose.verification.outages import check_outages
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import by_cvc5

@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import cache, partial
 
 import pytest
-from support.bundle_mutants import evidence_mutants, verdict_mutants
+from support.bundle_mutants import evidence_mutants, line_mutants, verdict_mutants
 from support.explored_outages import explored_outages
 from support.free_parts import freed
 from support.layered_nets import cells_in_a_line
@@ -18,14 +18,19 @@ from support.owned_nets import owned_net
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
 from firable.analysis.evidence.document import Document, document_from_text
 from firable.decompose.protocol.bereft import Bereft, deaths
+from firable.decompose.protocol.dead_script import DeadProof, prove_of_the_dead
 from firable.decompose.protocol.outages import inquests, outages, sealed_outages
-from firable.decompose.protocol.parts import Parts
+from firable.decompose.protocol.parts import Part, Parts
+from firable.decompose.protocol.shown import proved_without_exploring
 from firable.decompose.protocol.variant import PROTOCOL
 from firable.decompose.protocol.wrong import example
 from firable.decompose.splitting.cut import split
 from firable.decompose.verification import documents
+from firable.decompose.verification.bereft import PREFIX, Wake, wakes
 from firable.decompose.verification.checked import Examination
-from firable.decompose.verification.outages import PREFIX, Wake, check_outages, wakes
+from firable.decompose.verification.explored import check_explored
+from firable.decompose.verification.outage_obligations import OutageObligations
+from firable.decompose.verification.outages import check_outages
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import by_cvc5
@@ -77,10 +82,17 @@ def overtaken() -> Net:
 
 @cache
 def bundled(make: Callable[[], Net]) -> Bundle:
-    """What a bundle holds of who is dead, and nothing else."""
+    """What a bundle holds of faults, and nothing else."""
     decomposition = split(make())
+    run, proofs = proved_without_exploring(decomposition, ["faults"], TIMEOUT_MS)
     verdicts, files = sealed_outages(decomposition)
-    return Bundle(decomposition, verdicts, files)
+    return Bundle(decomposition, (*run, *verdicts), {**proofs, **files})
+
+
+@cache
+def asked(text: str, timeout_ms: int) -> tuple[str, ...]:
+    """What cvc5 says to a file, asked once."""
+    return by_cvc5(text, timeout_ms)
 
 
 @pytest.fixture(autouse=True)
@@ -99,8 +111,9 @@ def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def examined(bundle: Bundle) -> Examination:
-    examination = Examination(bundle)
-    check_outages(examination, Cut(bundle.net), by_cvc5, TIMEOUT_MS)
+    examination, cut = Examination(bundle), Cut(bundle.net)
+    check_explored(examination, cut, "cvc5", asked, TIMEOUT_MS)
+    check_outages(examination, cut, asked, TIMEOUT_MS)
     return examination
 
 
@@ -187,8 +200,13 @@ def test_without_the_promises_that_are_left_too_much_goes_on(monkeypatch: pytest
     monkeypatch.setattr(Bereft, "left", ())
     assert {outage.name: outage for outage in outages(split(gated()))}["the coordinator"].goes_on == ("turn", "back")
     decomposition = split(gated())
+    run, proofs = proved_without_exploring(decomposition, ["faults"], TIMEOUT_MS)
     verdicts, files = sealed_outages(decomposition)
-    assert refused(lambda: Bundle(decomposition, verdicts, files))
+    bounds = {verdict.name: verdict.bound for verdict in verdicts}
+    assert bounds["faults.dead-coordinator"] == "z3 does not show 'undisturbed.dead-coordinator' of dead.smt2"
+    monkeypatch.setattr(DeadProof, "lacks", lambda *_: "")
+    verdicts, files = sealed_outages(decomposition)
+    assert refused(lambda: Bundle(decomposition, (*run, *verdicts), {**proofs, **files}))
 
 
 @pytest.mark.parametrize("name", ["conceptual_one_robot", "one_robot", "two_robots_separate", "two_cells"])
@@ -231,8 +249,10 @@ def test_every_single_change_of_a_verdict_on_who_is_dead_is_refused() -> None:
     for make in (gated, partial(example, "shuttle")):
         bundle = bundled(make)
         assert not refused(partial(replace, bundle))
-        mutants = [(how, made) for how, made in verdict_mutants(bundle) if how.startswith("verdict")]
-        mutants += [(f"{v.name} {how}", made) for v in bundle.verdicts for how, made in more(bundle, v)]
+        mutants = [(how, made) for how, made in verdict_mutants(bundle) if how.startswith(f"verdict {PREFIX}")]
+        mutants += [
+            (f"{v.name} {how}", made) for v in bundle.verdicts if PREFIX in v.name for how, made in more(bundle, v)
+        ]
         assert len(mutants) > 50
         assert [how for how, made in mutants if not refused(made)] == []
 
@@ -267,9 +287,93 @@ def is_same(make: Callable[[], Bundle], bundle: Bundle) -> bool:
         return False
 
 
+# --------------------------------------------------------------------------------------------------------------------
+# The nets that are left are tied to the protocol
+
+
+@pytest.mark.parametrize("make", [looping_net, owned_net])
+def test_what_ties_the_nets_that_are_left_to_the_protocol_is_proved_and_both_texts_state_it(
+    make: Callable[[int], Net],
+) -> None:
+    for net in (cells_in_a_line(), overtaken(), gated(), catalogue_net("two_robots_shared"), *map(make, range(12))):
+        proof = prove_of_the_dead(split(net), TIMEOUT_MS)
+        assert proof.open_ == ()
+        assert OutageObligations(Voting(Cut(net), faults=True)).text == proof.text
+
+
+def unsound(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make the net that is left say more than it may."""
+    if how == "undisturbed: nothing is held up":
+        monkeypatch.setattr(Bereft, "held_up", frozenset())
+    elif how == "undisturbed: no promise is left":
+        monkeypatch.setattr(Bereft, "left", ())
+    elif how == "promised: no part is behind":
+        holding = Bereft._holding
+
+        def firable(self: Bereft, part: Part, held: dict[Part, str]) -> Iterator[Transition]:
+            hold, behind = holding(self, part, held)
+            yield from (hold, replace(hold, name=behind.name))
+
+        monkeypatch.setattr(Bereft, "_holding", firable)
+    elif how == "promised: nobody of its round has fired":
+        monkeypatch.setattr("firable.decompose.protocol.bereft.moved_beside", lambda *_: frozenset())
+    elif how == "keeps: a promise stands as it was given":
+        monkeypatch.setattr("firable.decompose.protocol.dead_script.moved_beside", lambda *_: frozenset())
+    else:
+        monkeypatch.setattr(Bereft, "at_once", property(lambda self: self.held_up))
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        "undisturbed: nothing is held up",
+        "undisturbed: no promise is left",
+        "promised: no part is behind",
+        "promised: nobody of its round has fired",
+        "keeps: a promise stands as it was given",
+        "at-once: what is held up stands still at once",
+    ],
+)
+def test_a_net_that_is_left_and_says_too_much_is_not_tied_to_the_protocol(
+    how: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unsound(how, monkeypatch)
+    open_ = prove_of_the_dead(split(overtaken()), TIMEOUT_MS).open_
+    assert {name.partition(".")[0] for name in open_} == {how.partition(":")[0]}
+
+
+def test_every_change_of_a_line_that_ties_them_is_refused() -> None:
+    bundle = bundled(gated)
+    text, count = bundle.evidence["dead.smt2"], 0
+    for _, changed in line_mutants(text):
+        count += 1
+        mutant = replace(bundle, evidence={**bundle.evidence, "dead.smt2": changed})
+        with pytest.raises(NotShownError, match=r"dead\.smt2"):
+            examined(mutant)
+    assert count > 500
+
+
+def test_an_obligation_on_one_who_is_dead_that_the_solver_gives_up_leaves_the_others_shown() -> None:
+    def tired(text: str, timeout_ms: int) -> tuple[str, ...]:
+        said = list(asked(text, timeout_ms))
+        if "at-once.dead.a" in said:
+            said[said.index("at-once.dead.a") + 1] = "unknown"
+        return tuple(said)
+
+    bundle = bundled(gated)
+    examination, cut = Examination(bundle), Cut(bundle.net)
+    check_explored(examination, cut, "cvc5", asked, TIMEOUT_MS)
+    check_outages(examination, cut, tired, TIMEOUT_MS)
+    assert [name for name, one in examination.checked.items() if not one.shown] == ["faults.dead.a"]
+
+
+def documents_of(bundle: Bundle) -> dict[str, str]:
+    return {file: text for file, text in bundle.evidence.items() if file.endswith(".evidence.json")}
+
+
 def test_every_change_of_an_answer_is_refused() -> None:
     bundle, count = bundled(gated), 0
-    for file, text in bundle.evidence.items():
+    for file, text in documents_of(bundle).items():
         document = document_from_text(text, file)
         for changed in other_answers(document):
             count += 1
@@ -299,7 +403,7 @@ def test_an_answer_without_evidence_is_only_claimed_and_such_a_verdict_is_not_ma
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     bundle = bundled(gated)
-    file, text = next(iter(bundle.evidence.items()))
+    file, text = next(iter(documents_of(bundle).items()))
     document = document_from_text(text, file)
     bare = replace(document, records=(replace(document.records[0], shown=(), lacking="no time"), *document.records[1:]))
     checked = examined(replace(bundle, evidence={**bundle.evidence, file: bare.to_text()})).checked
@@ -311,18 +415,19 @@ def test_an_answer_without_evidence_is_only_claimed_and_such_a_verdict_is_not_ma
 
 def test_a_verdict_on_who_is_dead_may_be_left_open_and_says_nothing_else() -> None:
     bundle = bundled(gated)
-    first, *others = bundle.verdicts
+    i = next(i for i, verdict in enumerate(bundle.verdicts) if verdict.name.startswith(PREFIX))
+    first, others = bundle.verdicts[i], (*bundle.verdicts[:i], *bundle.verdicts[i + 1 :])
     rest = {file: text for file, text in bundle.evidence.items() if file != first.evidence[0]}
     doubted = replace(first, status=Status.UNKNOWN, evidence=(), subjects=(), hint="", bound="no time")
-    checked = examined(replace(bundle, verdicts=(doubted, *others), evidence=rest)).checked
+    checked = examined(replace(bundle, verdicts=(*others, doubted), evidence=rest)).checked
     assert [name for name, one in checked.items() if not one.shown] == [first.name]
     for changed in (replace(doubted, hint="all goes on"), replace(doubted, subjects=first.subjects)):
-        mutant = replace(bundle, verdicts=(changed, *others), evidence=rest)
+        mutant = replace(bundle, verdicts=(*others, changed), evidence=rest)
         assert refused(partial(replace, mutant))
 
 
 def test_a_controller_of_any_name_is_told_from_the_coordinator() -> None:
-    found = bundled(partial(gated, "coordinator")).verdicts
+    found = [v for v in bundled(partial(gated, "coordinator")).verdicts if v.name.startswith(PREFIX)]
     assert [verdict.name for verdict in found] == [f"{PREFIX}.coordinator", f"{PREFIX}.b", f"{PREFIX}-coordinator"]
 
 

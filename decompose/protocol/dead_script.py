@@ -1,0 +1,268 @@
+"""That the net which the dead leave stands for the protocol without them: its obligations, and what z3 answers.
+
+What goes on while somebody is dead is found in a net of the size of the central one (`bereft`). Here it is tied to the
+protocol's net under faults, in one SMT-LIB 2 file for all who can be dead: of the protocol in which every part
+promises, as one that is free of promise locks nothing. Its invariant is kept (`starts`, `keeps`), and of each
+configuration of that it is asked, once for all:
+
+- `home.GROUP`: while a round is open, and its coordinator and those who take part live, it can be brought to its end;
+- `way.T`: where the round of T is at rest, no promise disturbs its parts and those who take part in it live, T fires by
+  the steps of its way if the central net can fire it;
+
+and of each who can be dead:
+
+- `at-once.WHO`: no step fires what is said to stand still at once;
+- `undisturbed.WHO`: where the rounds in which the dead have no hand are at rest, and T goes on in the net that is left,
+  nothing keeps T from its way;
+- `promised.WHO.PART`: a promise that the dead leave is one that the net that is left may hold at this marking.
+
+So, by hand: the rounds in which the dead have no hand come to rest by steps of the others alone (`home`; that these end
+is argued as for `homeward` of `faults.smt2`). What the protocol has then is a marking of the net that is left, with the
+promises that stand (`promised`; `astray` is empty by the invariant), and each of its firings is one of the protocol
+(`undisturbed`, `way`), after which the same holds again. What can fire again there can fire again here. What the
+executor does beyond the protocol's net, the signals that a promise holds still and the rounds that a coordinator does
+not open, is argued in docs/protocol.md.
+
+The invariant is that of `faults.smt2`, and one sentence more: *a promise stands*, whether its round was given up or
+not.
+Rejected: a question for each who is dead of every step and transition, which is quadratic and shows nothing more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+from firable.analysis.induction.smt import Answer, in_ascii, symbol
+from firable.decompose.proofs.script import LOGIC, Reader
+from firable.decompose.protocol.bereft import Bereft, deaths, moved_beside
+from firable.decompose.protocol.building import ProtocolNet, protocol_net
+from firable.decompose.protocol.completeness import way
+from firable.decompose.protocol.draft import CHANNELS, at, central, coordinator_down, down
+from firable.decompose.protocol.inductive import (
+    Sentence,
+    demands,
+    effect,
+    homeward,
+    implied,
+    invariant,
+    negated,
+    touched,
+)
+from firable.decompose.protocol.inductive_script import INVARIANT, after, all_of, any_of, literal, sentence
+from firable.decompose.protocol.rounds import asked, committed, decided
+from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL
+from firable.nets.decomposition import Decomposition
+from firable.nets.net import Transition
+from firable.nets.source import printable
+
+FILE: Final = "dead.smt2"
+STANDING: Final = "|a promise stands|"
+_HEAD: Final = (
+    "Each block asserts that its sentence does not hold, so the answer `unsat` proves it.",
+    "The constants: a place of the protocol's net holds a token; `let` says what a step changes.",
+    "To check it with another solver: cvc5 --incremental FILE, or z3 FILE; every name is followed by `unsat`.",
+)
+SAYS: Final = {
+    "starts": "at the start, the invariant holds, and promises stand",
+    "keeps": "after the step, they still do",
+    "home": "a round of the living can be brought to its end",
+    "way": "what the central net can fire, and no promise disturbs, is fired by these steps",
+    "at-once": "nobody but the dead fires what stands still at once",
+    "undisturbed": "what goes on in the net that is left finds nothing in its way",
+    "promised": "a promise to the dead is one that the net that is left may hold",
+}
+"""What each kind of obligation says, in the order of the file."""
+
+_OF_PART: Final = (*CHANNELS, "promised", "obeyed", "heard", "noted")
+
+
+@dataclass(frozen=True)
+class DeadObligations:
+    """The obligations on all who can be dead in a decomposition."""
+
+    decomposition: Decomposition
+
+    @cached_property
+    def protocol(self) -> ProtocolNet:
+        """The protocol in which every part promises, under any number of faults."""
+        return protocol_net(replace(self.decomposition, free=()), PROTOCOL, ANY_FAULTS)
+
+    def beginning(self) -> str:
+        """The head of the file, up to the first obligation."""
+        protocol = self.protocol
+        says = f"dead of the protocol of '{protocol.parts.net.name}': what goes on without the dead goes on in it"
+        lines = [f"; {printable(line)}" for line in (says, *_HEAD)]
+        places = sorted(place.name for place in protocol.net.places)
+        lines += [LOGIC, *(f"(declare-const {symbol(place)} Bool)" for place in places)]
+        defined = {
+            INVARIANT: all_of(map(sentence, invariant(protocol))),
+            STANDING: all_of(map(sentence, self._standing)),
+        }
+        defined |= {self._open(group): any_of(map(symbol, self._memory(group))) for group in self._groups}
+        lines += [f"(define-fun {name} () Bool {text})" for name, text in defined.items()]
+        return "\n".join(lines) + "\n"
+
+    def blocks(self) -> Iterator[tuple[str, str]]:
+        """Each obligation by its name. From the second one on, promises stand."""
+        marked = all_of(literal((place.name, place.marked)) for place in self.protocol.net.places)
+        name, block = _block("starts", "starts", [marked, f"(not (and {INVARIANT} {STANDING}))"])
+        yield name, f"{block}\n(assert {INVARIANT})\n(assert {STANDING})\n"
+        for made in (self._keeping(), self._home(), self._ways()):
+            yield from made
+        for bereft in self.deaths:
+            yield from self._of_one(bereft)
+
+    @cached_property
+    def deaths(self) -> tuple[Bereft, ...]:
+        """Everybody who can be dead, in the order of the names."""
+        return tuple(sorted(deaths(self.protocol.parts, self.decomposition.free), key=lambda bereft: bereft.verdict))
+
+    @cached_property
+    def _groups(self) -> list[tuple[str, ...]]:
+        return sorted(self.protocol.parts.groups, key="+".join)
+
+    # --- What stands, and what is open
+
+    @cached_property
+    def _standing(self) -> tuple[Sentence, ...]:
+        """A promised part is firable, but for what others of its round may have moved."""
+        parts, found = self.protocol.parts, list[Sentence]()
+        for part in (part for its in parts.coordinated.values() for part in its):
+            moved = moved_beside(parts, part)
+            needs = [(place, True) for place in (*part.inputs, *part.permissive)]
+            needs += [(place, False) for place in (*part.outputs, *part.inhibitive)]
+            found += [implied((at("promised", part), True), need) for need in needs if need[0] not in moved]
+        return tuple(dict.fromkeys(found))
+
+    def _memory(self, group: Iterable[str]) -> Iterator[str]:
+        """What is asked, promised, known or on its way in a round."""
+        for t in group:
+            yield from (asked(t), committed(t), decided(self.protocol.parts, t))
+            yield from (at(kind, part) for part in self.protocol.parts.coordinated[t] for kind in _OF_PART)
+
+    @staticmethod
+    def _open(group: Iterable[str]) -> str:
+        return symbol(f"open {'+'.join(group)}")
+
+    def _downs(self, t: str) -> list[str]:
+        """The places that hold a token while somebody is down without whom a transition does not fire."""
+        parts = self.protocol.parts
+        if t not in parts.coordinated:
+            return [down(part.controller) for part in parts.local if part.whole == t]
+        return [coordinator_down(parts.decider(t)), *(down(part.controller) for part in parts.coordinated[t])]
+
+    def _disturbing(self, t: str) -> Iterator[str]:
+        """The promises of others that keep a part of a transition from being promised or fired."""
+        parts = self.protocol.parts
+        its = parts.coordinated.get(t) or [part for part in parts.local if part.whole == t]
+        yield from (at("promised", other) for part in its for other in parts.excluding(part))
+
+    # --- The obligations
+
+    def _keeping(self) -> Iterator[tuple[str, str]]:
+        some = (*invariant(self.protocol), *self._standing)
+        texts, at_ = {one: sentence(one) for one in some}, touched(some)
+        for t in sorted(self.protocol.net.transitions, key=lambda t: t.name):
+            changes = effect(t)
+            goals = [texts[one] for of in changes.items() for one in at_[negated(of)]]
+            asserted = [all_of(map(literal, demands(t))), f"(not {after(changes, all_of(goals))})"]
+            yield _block(f"keeps.{t.name}", "keeps", asserted)
+
+    def _home(self) -> Iterator[tuple[str, str]]:
+        steps = list(homeward(self.protocol))
+        for group in self._groups:
+            its = set(self._memory(group))
+            ends = [
+                all_of(map(literal, (*demands(one.step), *one.where)))
+                for one in steps
+                if not its.isdisjoint((*one.step.inputs, *one.step.outputs))
+            ]
+            alive = all_of(literal((place, False)) for t in group for place in self._downs(t))
+            yield _block(f"home.{'+'.join(group)}", "home", [self._open(group), alive, f"(not {any_of(ends)})"])
+
+    def _ways(self) -> Iterator[tuple[str, str]]:
+        parts = self.protocol.parts
+        for t in sorted(parts.transitions, key=lambda t: t.name):
+            fired = "true"
+            for name in reversed(way(self.protocol, t.name) or ()):
+                step = self.protocol.net.transition(name)
+                fired = all_of([*map(literal, demands(step)), after(effect(step), fired)])
+            can = [literal((central(place), full)) for place, full in demands(t)]
+            free = [literal((place, False)) for place in (*self._downs(t.name), *self._disturbing(t.name))]
+            if t.name in parts.coordinated:
+                free.append(f"(not {self._open(parts.groups[parts.group_of[t.name]])})")
+            yield _block(f"way.{t.name}", "way", [all_of(can), all_of(free), f"(not {fired})"])
+
+    def _of_one(self, bereft: Bereft) -> Iterator[tuple[str, str]]:
+        who, parts, net = bereft.verdict, self.protocol.parts, self.protocol.net
+        is_down = down(bereft.who) if bereft.who else coordinator_down(bereft.coordinator)
+        dead = symbol(is_down)
+        firing = [u for u in net.transitions if self.protocol.steps[u.name].fires in bereft.at_once]
+        if firing:
+            yield _block(f"at-once.{who}", "at-once", [dead, any_of(all_of(map(literal, demands(u))) for u in firing)])
+        at_rest = [f"(not {self._open(group)})" for group in parts.groups if bereft.rests(group)]
+        others = [*(down(subnet.name) for subnet in self.decomposition.subnets), *map(coordinator_down, parts.deciders)]
+        alive = [literal((place, False)) for place in others if place != is_down]
+        kept = []
+        held = {f"held/{part.whole}/{part.controller}": at("promised", part) for part in bereft.left}
+        for t in (t for t in parts.transitions if t.name not in bereft.held_up):
+            seen = [literal((held[p], False)) for p in bereft.net.transition(t.name).inhibitive if p in held]
+            in_the_way = [*self._disturbing(t.name), *self._downs(t.name)]
+            ways = [*map(symbol, in_the_way), *(self._open(g) for g in parts.groups if t.name in g)]
+            kept.append(all_of([*seen, any_of(ways)]))
+        if kept:
+            asserted = [dead, all_of([*at_rest, *alive]), any_of(kept)]
+            yield _block(f"undisturbed.{who}", "undisturbed", asserted)
+        for part in sorted(bereft.left, key=lambda part: f"{part.whole}/{part.controller}"):
+            name = f"{part.whole}/{part.controller}"
+            may = [self._guard(bereft.net.transition(f"{act}/{name}"), held) for act in ("behind", "hold")]
+            yield _block(f"promised.{who}.{name}", "promised", [symbol(at("promised", part)), f"(not {any_of(may)})"])
+
+    def _guard(self, t: Transition, held: dict[str, str]) -> str:
+        """Where a transition of the net that is left may fire, said of the protocol's net."""
+        of = {**held, **{place.name: central(place.name) for place in self.protocol.parts.net.places}}
+        full = [literal((of[place], True)) for place in t.permissive if place in of]
+        return all_of([*full, *(literal((of[place], False)) for place in t.inhibitive if place in of)])
+
+
+def _block(name: str, kind: str, asserted: Iterable[str]) -> tuple[str, str]:
+    lines = [f"; {SAYS[kind]}", "(push 1)", f'(echo "{in_ascii(name)}")', *(f"(assert {text})" for text in asserted)]
+    return name, "\n" + "\n".join([*lines, "(check-sat)", "(pop 1)"]) + "\n"
+
+
+@dataclass(frozen=True)
+class DeadProof:
+    """The file, and the names of the obligations that z3 has not answered with `unsat`."""
+
+    text: str
+    open_: tuple[str, ...]
+
+    def lacks(self, bereft: Bereft) -> str:
+        """Why the verdict on who is dead is not shown; empty where all that it rests on is."""
+        for name in self.open_:
+            kind, _, rest = name.partition(".")
+            common = kind in {"starts", "keeps", "home", "way"}
+            if common or rest == bereft.verdict or (kind == "promised" and rest.startswith(f"{bereft.verdict}.")):
+                return f"z3 does not show '{name}' of {FILE}"
+        return ""
+
+
+def prove_of_the_dead(decomposition: Decomposition, timeout_ms: int) -> DeadProof:
+    """Ask z3 every obligation on who can be dead; `timeout_ms` is for each.
+
+    >>> from firable.decompose.splitting.cut import split
+    >>> from firable.nets.catalogue import catalogue_net
+    >>> prove_of_the_dead(split(catalogue_net("two_robots_shared")), 10_000).open_
+    ()
+    """
+    obligations = DeadObligations(decomposition)
+    beginning = obligations.beginning()
+    reader, text, open_ = Reader(timeout_ms, beginning), [beginning], list[str]()
+    for name, block in obligations.blocks():
+        text.append(block)
+        if reader.answer(block) is not Answer.UNSAT:
+            open_.append(name)
+    return DeadProof("".join(text), tuple(open_))
