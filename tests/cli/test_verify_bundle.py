@@ -64,7 +64,7 @@ def test_a_bundle_may_hold_the_proof_on_its_own_protocol(tmp_path: Path, capsys:
     told = capsys.readouterr().out
     assert "5 of 5    explored         the protocol of this very net does what the net does" in told
     assert "3 of 3    faults           while messages are lost" in told
-    assert {"explored.smt2", "faults.smt2"} <= {file.name for file in (tmp_path / "smt").iterdir()}
+    assert {"explored.smt2", "faults.smt2", "dead.smt2"} <= {file.name for file in (tmp_path / "smt").iterdir()}
 
 
 def test_a_damaged_bundle_is_refused(bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
