@@ -30,7 +30,7 @@ export PYO3_PYTHON = $(abspath $(BIN)/python)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test fmt bench bench-instructions campaign simulate mutants clean lint lint-python lint-ruff lint-format
+.PHONY: help demo test fmt docs bench bench-instructions campaign simulate mutants clean lint lint-python lint-ruff lint-format
 .PHONY: lint-types lint-types-tests
 .PHONY: lint-rust lint-rust-format lint-clippy test-rust test-python
 
@@ -76,6 +76,10 @@ fmt: $(MADE)/develop $(MADE)/rust-tools ## format all code, and repair what the 
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	cargo fmt --manifest-path $(CRATE)/Cargo.toml
+
+docs: $(MADE)/develop ## the documents as pages, in out/docs; every command that they show is run by the tests
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
+	@echo "out/docs/index.html"
 
 bench: $(MADE)/develop ## measure, as ratios to yardsticks in the same run; writes benchmarks/RESULTS.md
 	$(BIN)/python benchmarks/run.py

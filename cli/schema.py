@@ -18,11 +18,12 @@ def schema(kind: str) -> int:
 
     Editors complete and check net files by it.
     """
-    click.echo(json.dumps(_schema(kind), indent=2, ensure_ascii=False))
+    click.echo(json.dumps(schema_of(kind), indent=2, ensure_ascii=False))
     return 0
 
 
-def _schema(kind: str) -> Any:
+def schema_of(kind: str) -> Any:
+    """The JSON Schema of a kind of file or output, as data."""
     match kind:
         case "net":
             from firable.nets.document import json_schema

@@ -1,4 +1,4 @@
-"""The net model, its text format, PNML, diagnostics, the bundle format and the catalogue of example cells.
+r"""The net model, its text format, PNML, diagnostics, the bundle format and the catalogue of example cells.
 
 What a program imports from here. To read and to write: `load` reads a net from whatever file it is in, as `Loaded`;
 `read_net`, `parse_net` and `format_net` know the net file, `read_pnml` and `write_pnml` PNML. `catalogue_net` gives one
