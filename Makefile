@@ -30,7 +30,8 @@ export PYO3_PYTHON = $(abspath $(BIN)/python)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test fmt docs bench bench-instructions campaign simulate mutants clean lint lint-python lint-ruff lint-format
+.PHONY: help demo test fmt docs page bench bench-instructions campaign simulate mutants clean lint lint-python lint-ruff
+.PHONY: lint-format
 .PHONY: lint-types lint-types-tests
 .PHONY: lint-rust lint-rust-format lint-clippy test-rust test-python
 
@@ -80,6 +81,9 @@ fmt: $(MADE)/develop $(MADE)/rust-tools ## format all code, and repair what the 
 docs: $(MADE)/develop ## the documents as pages, in out/docs; every command that they show is run by the tests
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
 	@echo "out/docs/index.html"
+
+page: ## build the page of `firable view` from web/; needs Node 20.19 or later, with npm
+	cd web && npm ci --no-fund --no-audit && npm run build
 
 bench: $(MADE)/develop ## measure, as ratios to yardsticks in the same run; writes benchmarks/RESULTS.md
 	$(BIN)/python benchmarks/run.py

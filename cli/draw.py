@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from firable.cli.options import load_net, net_argument, write_text
 from firable.cli.text import counted
 
+if TYPE_CHECKING:
+    from firable.nets.net import Net
+
 NODES_MAX: Final = 600
 """How many places and transitions are drawn: lines are laid out to cross little, at a cost that grows with the cube."""
+
+
+def drawable(net: Net) -> None:
+    """Refuse a net that is too large for a picture."""
+    if (n_nodes := len(net.places) + len(net.transitions)) > NODES_MAX:
+        raise click.UsageError(
+            f"{n_nodes:,} places and transitions make no picture that anybody can read; at most {NODES_MAX:,} are drawn"
+        )
 
 
 @click.command(short_help="Draw a net as SVG.")
@@ -34,10 +45,7 @@ def draw(net: str, output: str, marking: str | None, trace: str | None) -> int:
     if marking is not None and trace is not None:
         raise click.UsageError("--marking and --trace both say which tokens to show: leave one out")
     loaded = load_net(net).net
-    if (n_nodes := len(loaded.places) + len(loaded.transitions)) > NODES_MAX:
-        raise click.UsageError(
-            f"{n_nodes:,} places and transitions make no picture that anybody can read; at most {NODES_MAX:,} are drawn"
-        )
+    drawable(loaded)
     if trace is not None:
         from firable.semantics.replaying import replay as play
         from firable.semantics.trace import Fired, read_trace

@@ -27,7 +27,10 @@ EXTRAS = {
         ("z3", "networkx", "numpy", "platformdirs", "junitparser"), ("prove", "all that checking and proving need")
     ),
     "mtkahypar": ("split", "what looks for owners of large nets"),
-    **dict.fromkeys(("aiohttp", "prometheus_client"), ("serve", "what lets an operator act from elsewhere")),
+    **dict.fromkeys(
+        ("aiohttp", "prometheus_client"),
+        ("serve", "what lets an operator act from elsewhere, and what serves the page"),
+    ),
     **dict.fromkeys(("pygls", "lsprotocol"), ("lsp", "what serves net files to an editor")),
     "zenoh": ("zenoh", "the link between hosts over a network"),
     "serial": ("serial", "what serial lines need"),
@@ -60,6 +63,7 @@ COMMANDS = {
     "split": "split.split",
     "takeover": "takeover.takeover",
     "verify": "verify.verify",
+    "view": "view.command.view",
 }
 """The commands, each with its function in `firable.cli`."""
 

@@ -140,6 +140,7 @@ CODES: Final[dict[str, str]] = {
     "F5061": "an operator's endpoint that cannot be served",
     "F5062": "a certificate that cannot be used",
     "F5063": "a run that cannot be operated",
+    "F5070": "a request of the page that cannot be answered",
     "F5101": "the binding does not fit the net",
     "F5102": "not an address that the device has",
     "F5103": "unknown or unusable driver",

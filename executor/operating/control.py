@@ -7,6 +7,9 @@
     POST /stop-at-end                let no new work in, and end when the cell, or what of it is here, is empty
     POST /emergency-stop             drive the safe outputs at once
 
+With a `Page` the endpoint serves that to a browser as well: its files, in which nothing of the run stands, to anybody,
+for a browser shows no token when it opens an address; and what it asks then, to those who may.
+
 *Who may* is asked of every request, reading ones too: a bearer token, compared in constant time, or, where a client
 authority is named, a certificate that it signed. Nothing is trusted for coming from this host, because a page in a
 browser here can post to it. Beyond loopback nothing is served without TLS: a token in the clear is everybody's.
@@ -23,7 +26,7 @@ from __future__ import annotations
 import ipaddress
 import secrets
 import ssl
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Final, Protocol
@@ -34,6 +37,9 @@ from firable.executor.operating.situation import Situation
 from firable.nets.diagnostics import Diagnostic, InputError
 
 METRICS_CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+Middleware = Callable[[web.Request, Handler], Awaitable[web.StreamResponse]]
+
 SHUTDOWN_SECONDS: Final = 1.0
 """So long what is being answered may take once the run is over; then the process ends, whatever a client does."""
 
@@ -70,6 +76,19 @@ class Operated(Protocol):
         ...
 
 
+class Page(Protocol):
+    """What an endpoint serves to a browser, beside its commands."""
+
+    @property
+    def public(self) -> Collection[str]:
+        """The paths that are served to anybody."""
+        ...
+
+    def routes(self) -> Iterable[web.AbstractRouteDef]:
+        """All that it serves."""
+        ...
+
+
 @dataclass(frozen=True)
 class Endpoint:
     """Where to serve, and for whom; raises `InputError` F5060 where that is open to everybody.
@@ -98,12 +117,21 @@ class Endpoint:
 
 
 @asynccontextmanager
-async def serving(run: Operated, endpoint: Endpoint, figures: Callable[[], bytes]) -> AsyncIterator[str]:
+async def serving(
+    run: Operated, endpoint: Endpoint, figures: Callable[[], bytes], page: Page | None = None
+) -> AsyncIterator[str]:
     """Serve a run for as long as the context lasts; gives the address that is served.
 
     Raises `InputError` F5061 where the address cannot be had.
     """
-    runner = web.AppRunner(application(run, endpoint, figures), access_log=None, shutdown_timeout=SHUTDOWN_SECONDS)
+    async with listening(application(run, endpoint, figures, page), endpoint) as address:
+        yield address
+
+
+@asynccontextmanager
+async def listening(app: web.Application, endpoint: Endpoint) -> AsyncIterator[str]:
+    """Serve an application for as long as the context lasts; gives the address, and raises `InputError` F5061."""
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN_SECONDS)
     await runner.setup()
     try:
         site = web.TCPSite(runner, endpoint.host, endpoint.port, ssl_context=endpoint.tls)
@@ -119,18 +147,24 @@ async def serving(run: Operated, endpoint: Endpoint, figures: Callable[[], bytes
         await runner.cleanup()
 
 
-def application(run: Operated, endpoint: Endpoint, figures: Callable[[], bytes]) -> web.Application:
-    """The endpoint as an application; every handler runs only for who may."""
+def admission(endpoint: Endpoint, public: Collection[str] = ()) -> Middleware:
+    """Let only those reach a handler who may, but for the paths that are public."""
 
     @web.middleware
-    async def who_may(
-        request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
-    ) -> web.StreamResponse:
-        if _name_of(request, endpoint) is None:
+    async def who_may(request: web.Request, handler: Handler) -> web.StreamResponse:
+        if request.path not in public and _name_of(request, endpoint) is None:
             return web.json_response(
                 {"error": "who are you? show the token"}, status=401, headers={"WWW-Authenticate": "Bearer"}
             )
         return await handler(request)
+
+    return who_may
+
+
+def application(
+    run: Operated, endpoint: Endpoint, figures: Callable[[], bytes], page: Page | None = None
+) -> web.Application:
+    """The endpoint as an application; every handler runs only for who may, but for those of a page's own files."""
 
     def who(request: web.Request) -> str:
         return _name_of(request, endpoint) or ""
@@ -160,7 +194,7 @@ def application(run: Operated, endpoint: Endpoint, figures: Callable[[], bytes])
         run.commanded("emergency-stop", by)
         return web.json_response(_situation(run))
 
-    app = web.Application(middlewares=[who_may], client_max_size=1024)
+    app = web.Application(middlewares=[admission(endpoint, () if page is None else page.public)], client_max_size=1024)
     app.router.add_get("/situation", situation)
     app.router.add_get("/metrics", metrics)
     app.router.add_post("/pause", commanding("pause", run.pause))
@@ -169,6 +203,8 @@ def application(run: Operated, endpoint: Endpoint, figures: Callable[[], bytes])
     app.router.add_post("/stop", commanding("stop", run.stop))
     app.router.add_post("/stop-at-end", commanding("stop-at-end", lambda: run.stop(at_end_of_cycle=True)))
     app.router.add_post("/emergency-stop", emergency_stop)
+    if page is not None:
+        app.router.add_routes(page.routes())
     return app
 
 

@@ -123,6 +123,7 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         (["run", "x", "--speed", "100"], "is not one of"),
         (["replay", "x"], "Missing option"),
         (["draw", "catalogue:machines-5000"], "20,000 places and transitions make no picture"),
+        (["view", "catalogue:machines-5000"], "20,000 places and transitions make no picture"),
         (["draw", "catalogue:one_robot", "--marking", "robot.fre"], "no place 'robot.fre'"),
         (["draw", "catalogue:one_robot", "--marking", "robot.free", "--trace", "x"], "leave one out"),
         (["refine", "catalogue:conceptual_one_robot", "-o", "-"], "cannot go to standard output"),

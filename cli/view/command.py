@@ -1,0 +1,72 @@
+"""`firable view`: a net in the browser, to play with and to see its counterexamples."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from firable.cli.options import load_net, net_argument
+
+if TYPE_CHECKING:
+    from firable.cli.view.playing import Playing
+
+
+@click.command(short_help="Show a net in the browser: play with it, see its counterexamples.")
+@net_argument
+@click.option("--trace", metavar="FILE", help="A run to play: of `firable check --trace-dir` or `firable run --trace`.")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, show_default=True, help="Where to serve on this host; 0: free."
+)
+@click.option("--no-browser", is_flag=True, help="Tell the address, and open no browser.")
+def view(net: str, trace: str | None, port: int, no_browser: bool) -> int:
+    """Show NET in a browser on this host, until Ctrl-C.
+
+    Click a transition that may fire, and switch the gates; a transition that may not says what it waits for. The page
+    checks the net, and plays each counterexample step by step, or the run that --trace names.
+
+    Only this host is served, and only who has the token, which stands in the address that is opened.
+    """
+    import asyncio
+
+    from firable.cli.draw import drawable
+    from firable.cli.text import show_diagnostic
+    from firable.cli.view.playing import Playing
+    from firable.cli.view.runs import Run
+    from firable.semantics.trace import read_trace
+
+    loaded = load_net(net)
+    drawable(loaded.net)
+    for note in loaded.notes:
+        show_diagnostic(note)
+    runs = []
+    if trace is not None:
+        run = Run(trace, "the run of that file", read_trace(trace))
+        run.to_json(loaded.net)  # what is no run of the net is refused before anything is served
+        runs.append(run)
+    try:
+        asyncio.run(_served(Playing(loaded, net, runs), port, open_it=not no_browser))
+    except KeyboardInterrupt:
+        click.echo("", err=True)
+    return 0
+
+
+async def _served(playing: Playing, port: int, *, open_it: bool) -> None:
+    import asyncio
+
+    from firable.cli.view.playing import application
+    from firable.executor.operating.control import Endpoint, listening, new_token
+
+    endpoint = Endpoint("127.0.0.1", port, new_token())
+    async with listening(application(playing, endpoint), endpoint) as address:
+        show(f"{address}/#token={endpoint.token}", open_it=open_it)
+        await asyncio.Event().wait()
+
+
+def show(address: str, *, open_it: bool) -> None:
+    """Tell the address of a page, and open a browser on it if that is wanted."""
+    click.echo(f"see it at {address}", err=True)
+    if open_it:
+        import webbrowser
+
+        webbrowser.open(address)

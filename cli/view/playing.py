@@ -1,0 +1,96 @@
+"""What the page asks when a net is played with: its structure and picture, a moment, a firing, a check, a run.
+
+The server holds the net and the runs that were found, and nothing of who plays: `moment.py` says why. A check is done
+beside the event loop, one at a time, so that somebody plays on while it lasts.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Collection, Iterable
+from typing import Any
+
+from aiohttp import web
+
+from firable.cli.view import moment
+from firable.cli.view.runs import Run, checked, verdict_json
+from firable.cli.view.site import BODY_BYTES_MAX, PUBLIC, answering, file_routes, refusal
+from firable.executor.operating.control import Endpoint, admission
+from firable.nets.drawing import draw_net
+from firable.nets.loading import Loaded
+from firable.semantics.player import Player
+
+
+class Playing:
+    """A net that the page plays with, and the runs of it that are known."""
+
+    def __init__(self, loaded: Loaded, file: str, runs: Iterable[Run] = ()) -> None:
+        self.loaded = loaded
+        self.file = file
+        self.runs = list(runs)
+        self.player = Player(loaded.net)
+        self.verdicts: list[dict[str, Any]] | None = None
+        self.checking = asyncio.Lock()
+
+    @property
+    def public(self) -> Collection[str]:
+        """The paths that anybody may read."""
+        return PUBLIC
+
+    def routes(self) -> Iterable[web.AbstractRouteDef]:
+        """All that is served."""
+        yield from file_routes()
+        yield web.get("/api/page", answering(self.page))
+        yield web.post("/api/moment", answering(self.moment))
+        yield web.post("/api/fire", answering(self.fire))
+        yield web.post("/api/check", answering(self.check))
+        yield web.post("/api/run", answering(self.run))
+
+    async def page(self, _: dict[str, Any]) -> dict[str, Any]:
+        """What is shown at first."""
+        net = self.loaded.net
+        return {
+            "mode": "play",
+            "file": self.file,
+            "net": moment.structure(net),
+            "picture": draw_net(net, marking=0),
+            "moment": moment.told(self.player, moment.begin(net)),
+            "runs": [run.summary() for run in self.runs],
+            "verdicts": self.verdicts,
+        }
+
+    async def moment(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """What may fire at a moment."""
+        return moment.told(self.player, moment.moment_of(self.player.net, asked))
+
+    async def fire(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """The moment after a firing."""
+        after, done = moment.fired(
+            self.player, moment.moment_of(self.player.net, asked), str(asked.get("transition", ""))
+        )
+        return {**moment.told(self.player, after), **done}
+
+    async def check(self, _: dict[str, Any]) -> dict[str, Any]:
+        """Check the net, once: a net that is not edited gets the same verdicts."""
+        async with self.checking:
+            if self.verdicts is None:
+                net = self.player.net
+                with self.loaded.placing():
+                    verdicts, runs = await asyncio.to_thread(checked, net)
+                self.verdicts = [verdict_json(verdict) for verdict in verdicts]
+                self.runs += runs
+        return {"verdicts": self.verdicts, "runs": [run.summary() for run in self.runs]}
+
+    async def run(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """The frames of a run, by its name."""
+        for run in self.runs:
+            if run.name == asked.get("name"):
+                return run.to_json(self.player.net)
+        raise refusal("the page asks for a run that is not known")
+
+
+def application(playing: Playing, endpoint: Endpoint) -> web.Application:
+    """A net to play with, as an application."""
+    app = web.Application(middlewares=[admission(endpoint, playing.public)], client_max_size=BODY_BYTES_MAX)
+    app.router.add_routes(playing.routes())
+    return app

@@ -1,0 +1,261 @@
+"""The page in a browser: a net is played with, checked, and its counterexamples are played."""
+
+from __future__ import annotations
+
+import json
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+from support.browser import PATIENCE_MS, browser, command, done, needs_browser, page_at
+
+from firable.cli.main import main
+from firable.cli.view.moment import Moment, fired, told
+from firable.nets.catalogue import catalogue_net
+from firable.nets.net import Net, Place, Transition
+from firable.semantics.player import Player
+
+expect.set_options(timeout=PATIENCE_MS)
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with browser() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def late() -> Iterator[str]:
+    """The page of the cell that deadlocks."""
+    with command("view", "catalogue:one_robot_mc_late", "--no-browser") as (address, _):
+        yield address
+
+
+def tokens(page: Page) -> set[str]:
+    """The places that show a token."""
+    ids = page.locator(".live.there").evaluate_all("all => all.map(one => one.parentElement.id)")
+    return {str(name).removeprefix("place:") for name in ids}
+
+
+def asked(address: str, path: str, body: object = None, token: str | None = None) -> tuple[int, Any]:
+    base, _, own = address.partition("#token=")
+    data = None if body is None else json.dumps(body).encode()
+    request = urllib.request.Request(f"{base}{path}", data)
+    if (shown := own if token is None else token) != "":
+        request.add_header("Authorization", f"Bearer {shown}")
+    try:
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return answer.status, json.loads(answer.read())
+    except urllib.error.HTTPError as error:
+        return error.code, json.loads(error.read())
+
+
+@needs_browser
+def test_a_click_fires_what_may_fire_and_a_switch_opens_a_gate(chromium: Browser, late: str) -> None:
+    with page_at(chromium, late) as page:
+        expect(page.locator("h1")).to_have_text("one-robot-mc-late")
+        assert tokens(page) == {"robot.free", "mc.free", "conveyor.cv1", "conveyor.cv2"}
+        assert "token" not in page.url, "the token does not stay in the address bar"
+        bar = page.locator('[id="transition:G1"]')
+        expect(bar).to_have_attribute("aria-label", "G1, start of carrying in, G1 waits for conveyor.part_at_entry")
+        page.get_by_role("switch", name="conveyor.part_at_entry").click()
+        expect(bar).to_have_attribute("aria-label", "G1, start of carrying in, may fire")
+        expect(page.locator('[id="gate:G1:conveyor.part_at_entry"]')).to_contain_class("open")
+        bar.locator("rect.hit").first.click()
+        expect(page.locator("#said")).to_contain_text("G1 has fired. Sent: CV1 RUN.")
+        assert tokens(page) == {"system.carrying_in", "conveyor.cv1_run", "robot.free", "mc.free", "conveyor.cv2"}
+
+
+@needs_browser
+def test_what_may_not_fire_says_and_shows_what_is_missing(chromium: Browser, late: str) -> None:
+    with page_at(chromium, late) as page:
+        page.locator('[id="transition:G6"] rect.hit').first.click()
+        expect(page.locator(".hint")).to_contain_text(
+            "G6 waits for a token on system.processing, a token on mc.release"
+        )
+        expect(page.locator('[id="place:mc.release"]')).to_contain_class("missing")
+        assert tokens(page) == {"robot.free", "mc.free", "conveyor.cv1", "conveyor.cv2"}
+
+
+@needs_browser
+def test_steps_are_undone_done_again_and_reset_and_a_reload_keeps_them(chromium: Browser, late: str) -> None:
+    begin = {"robot.free", "mc.free", "conveyor.cv1", "conveyor.cv2"}
+    with page_at(chromium, late) as page:
+        page.get_by_role("switch", name="Gates free").click()
+        page.locator("[data-transition=G1]").click()
+        expect(page.locator("#said")).to_contain_text("G1 has fired")
+        page.locator("[data-transition=G2]").click()
+        expect(page.locator("#said")).to_contain_text("G2 has fired")
+        after = tokens(page)
+        assert "system.loading" in after
+        page.reload()
+        expect(page.locator('[id="place:system.loading"] .live')).to_contain_class("there")
+        assert tokens(page) == after
+        page.get_by_role("button", name="Undo").click()
+        assert tokens(page) == begin
+        page.keyboard.press("Control+Shift+Z")
+        assert tokens(page) == after
+        page.get_by_role("button", name="Reset").click()
+        assert tokens(page) == begin
+
+
+@needs_browser
+def test_a_counterexample_is_played_with_a_slider(chromium: Browser, late: str) -> None:
+    with page_at(chromium, late) as page:
+        asking = page.get_by_role("button", name="Check this net")
+        playing = page.get_by_role("button", name="▶ Play deadlock-free")
+        asking.or_(playing).first.click()  # the server knows the verdicts once somebody has asked
+        playing.click()
+        slider = page.get_by_role("slider", name="Steps of deadlock-free")
+        expect(slider).to_be_focused()
+        page.keyboard.press("ArrowRight")
+        expect(slider).to_have_attribute("aria-valuetext", "1 of 15: G1 fires, start of carrying in.")
+        assert "system.carrying_in" in tokens(page)
+        page.keyboard.press("End")
+        expect(page.locator(".playback")).to_contain_text("A deadlock: nothing can fire any more.")
+        assert {"robot.put_mc", "mc.release"} <= tokens(page)
+        page.keyboard.press("Home")
+        assert "robot.free" in tokens(page)
+        slider.fill("15")
+        expect(page.locator(".playback")).to_contain_text("G4 waits for a token on mc.free")
+        page.get_by_role("button", name="Go on from here").click()
+        expect(page.locator(".status")).to_have_text("A deadlock: no transition can fire any more.")
+        page.get_by_role("button", name="Undo").click()
+        assert "robot.free" in tokens(page)
+
+
+@needs_browser
+def test_all_is_done_by_the_keyboard_alone(chromium: Browser, late: str) -> None:
+    with page_at(chromium, late) as page:
+        page.get_by_role("switch", name="Gates free").focus()
+        page.keyboard.press("Space")
+        page.locator('[id="transition:G1"]').focus()
+        page.keyboard.press("Enter")
+        expect(page.locator("#said")).to_contain_text("G1 has fired")
+        page.locator("[data-transition=G2]").focus()
+        page.keyboard.press("Enter")
+        expect(page.locator("[data-transition=t1-a]")).to_be_focused()
+        page.keyboard.press("Enter")
+        expect(page.locator("#said")).to_contain_text("t1-a has fired")
+        page.keyboard.press("Control+z")
+        expect(page.locator("#said")).to_contain_text("Undone")
+
+
+@needs_browser
+def test_every_control_has_a_name_and_nothing_moves_for_who_wants_no_motion(chromium: Browser, late: str) -> None:
+    with page_at(chromium, late, reduced_motion="reduce", color_scheme="dark") as page:
+        page.get_by_role("switch", name="Gates free").click()
+        page.locator("[data-transition=G1]").click()
+        assert page.locator(".flying").count() == 0
+        expect(page.locator("#said")).to_contain_text("G1 has fired")
+        nameless = page.locator("button, input, [role=button], [role=switch]").evaluate_all(
+            "all => all.filter(one => !(one.ariaLabel || one.textContent || '').trim()).length"
+        )
+        assert nameless == 0
+        assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(17, 22, 29)"
+        assert page.locator(".place").first.evaluate("one => getComputedStyle(one).fill") == "rgb(15, 20, 27)"
+
+
+@needs_browser
+def test_a_narrow_window_scrolls_down_and_not_sideways(chromium: Browser, late: str) -> None:
+    with page_at(chromium, late, viewport={"width": 380, "height": 800}) as page:
+        expect(page.locator(".picture")).to_be_visible()
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+@needs_browser
+def test_a_lost_connection_is_shown(chromium: Browser) -> None:
+    with (
+        command("view", "catalogue:one_robot", "--no-browser") as (address, process),
+        page_at(chromium, address) as page,
+    ):
+        expect(page.locator("h1")).to_have_text("one-robot")
+        process.kill()
+        process.wait()
+        page.get_by_role("switch", name="Gates free").click()
+        expect(page.get_by_role("alert")).to_contain_text("The connection is lost")
+
+
+@needs_browser
+def test_who_has_no_token_is_asked_for_it(chromium: Browser, late: str) -> None:
+    base, _, token = late.partition("#token=")
+    with page_at(chromium, base) as page:
+        expect(page.locator("h1")).to_have_text("Who are you?")
+        page.get_by_label("Token").fill(token)
+        page.keyboard.press("Enter")
+        expect(page.locator("h1")).to_have_text("one-robot-mc-late")
+
+
+def test_nothing_of_the_net_is_told_without_the_token(late: str) -> None:
+    for path in ("api/page", "api/moment", "api/fire", "api/check", "api/run", "no/such/path"):
+        for token in ("", "another token of 20 characters"):
+            assert asked(late, path, token=token)[0] == 401
+    with urllib.request.urlopen(late.partition("#")[0], timeout=60) as answer:
+        assert b"one-robot" not in answer.read()
+        assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+
+
+BEGIN: dict[str, object] = {"marking": ["robot.free"], "signals": [], "free": True}
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("api/moment", {}),
+        ("api/moment", [1]),
+        ("api/moment", {**BEGIN, "marking": ["no.place"]}),
+        ("api/moment", {**BEGIN, "marking": [[]]}),
+        ("api/moment", {**BEGIN, "signals": ["no.signal"]}),
+        ("api/fire", {**BEGIN, "transition": "G1"}),
+        ("api/fire", {**BEGIN, "transition": ["G1"]}),
+        ("api/run", {"name": "no such run"}),
+    ],
+)
+def test_a_request_that_makes_no_sense_is_refused_with_a_code(late: str, path: str, body: object) -> None:
+    status, answer = asked(late, path, body)
+    assert status == 422
+    assert answer["errors"][0]["code"] == "F5070"
+
+
+def test_a_firing_is_one_of_the_reference_player_and_clears_what_is_stale() -> None:
+    net = catalogue_net("one_robot")
+    player = Player(net)
+    now = Moment(net.marking(["robot.to_cv1"]), frozenset({"robot.at_cv1", "robot.touch"}))
+    assert told(player, now)["transitions"]["t1-a"] == {"may": "fire"}
+    after, done = fired(player, now, "t1-a")
+    assert net.names(after.marking) == ("robot.grasp_cv1",)
+    assert after.signals == {"robot.at_cv1"}, "the completion of the grasp is cleared when it is commanded"
+    assert done == {"fired": ["t1-a"], "sent": ["R GRASP at=CV1"]}
+
+
+def test_a_transition_that_never_fires_says_why() -> None:
+    net = Net("n", (Place("p", marked=True),), (Transition("t", ("p",), ("p",)),))
+    shown = told(Player(net), Moment(net.initial_marking))
+    assert shown["transitions"]["t"] == {"may": "not", "why": "t can never fire: p is both its input and its output"}
+    assert shown["deadlock"]
+
+
+def test_a_trace_that_is_none_of_the_net_is_refused_before_anything_is_served(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", "catalogue:one_robot_mc_late", "--trace-dir", str(tmp_path)]) == 1
+    trace = tmp_path / "deadlock-free.trace.jsonl"
+    assert main(["view", "catalogue:one_robot", "--trace", str(trace), "--no-browser"]) == 2
+    assert "error[F5004]" in capsys.readouterr().err
+
+
+@needs_browser
+def test_the_trace_of_a_run_is_played(chromium: Browser, tmp_path: Path) -> None:
+    bundle, trace = tmp_path / "cell.bundle", tmp_path / "run.jsonl"
+    done("bundle", "catalogue:one_robot", "-o", bundle)
+    done("run", bundle, "--workpieces", "1", "--trace", trace)
+    with command("view", bundle, "--trace", trace, "--no-browser") as (address, _), page_at(chromium, address) as page:
+        page.get_by_role("button", name="▶ Play").click()
+        expect(page.get_by_role("slider")).to_be_focused()
+        page.keyboard.press("End")
+        expect(page.locator(".what")).to_contain_text("G9 fires end of carrying out")
+        assert tokens(page) == {"robot.free", "mc.free", "conveyor.cv1", "conveyor.cv2"}

@@ -1,0 +1,70 @@
+// The frame of the page: its head, the picture with its tools, and the panels beside it; the same when one plays and
+// when a cell runs.
+
+import { h } from "./dom";
+import { Picture } from "./picture";
+
+export interface Frame {
+  tools: HTMLElement;
+  below: HTMLElement;
+  side: HTMLElement;
+  status: HTMLElement;
+  banner: HTMLElement;
+  /** A sentence that stands over the picture. */
+  hint: HTMLElement;
+}
+
+export function frame(title: string, says: string, kind: string, picture: Picture): Frame {
+  const tools = h("div", { class: "tools", role: "toolbar", "aria-label": kind });
+  const below = h("div", { class: "below" });
+  const side = h("aside", { "aria-label": "Details" });
+  const status = h("p", { class: "status" });
+  const banner = h("div", { class: "banners" });
+  const hint = h("p", { class: "hint" });
+  const zoom = h(
+    "div",
+    { class: "zoom", role: "group", "aria-label": "Size of the picture" },
+    h("button", { type: "button", "aria-label": "Smaller", click: () => picture.zoom(1 / 1.25) }, "−"),
+    h("button", { type: "button", click: () => picture.fit() }, "Fit"),
+    h("button", { type: "button", "aria-label": "Larger", click: () => picture.zoom(1.25) }, "+"),
+  );
+  document.title = `${title} – firable`;
+  document.getElementById("page")!.replaceChildren(
+    h(
+      "header",
+      {},
+      h("div", { class: "names" }, h("h1", {}, title), says ? h("p", {}, says) : null),
+      status,
+    ),
+    banner,
+    h(
+      "main",
+      {},
+      h("section", { class: "stage", "aria-label": "The net" }, h("div", { class: "bar-above" }, tools, zoom), picture.element, hint, below),
+      side,
+    ),
+    h("p", { id: "said", class: "unseen", role: "status", "aria-live": "polite" }),
+  );
+  picture.element.tabIndex = 0;
+  picture.element.setAttribute("role", "region");
+  picture.element.setAttribute("aria-label", "Picture of the net; scrolls");
+  requestAnimationFrame(() => picture.fit());
+  let width = innerWidth;
+  addEventListener("resize", () => {
+    if (innerWidth !== width) picture.fit();
+    width = innerWidth;
+  });
+  return { tools, below, side, status, banner, hint };
+}
+
+/** A panel with a heading, which folds. */
+export function panel(title: string, ...children: (Node | null)[]): HTMLDetailsElement {
+  return h("details", { class: "panel", open: true }, h("summary", {}, h("h2", {}, title)), h("div", { class: "inside" }, ...children));
+}
+
+/** A banner across the page; an alarm is said at once. */
+export function banner(where: HTMLElement, kind: "bad" | "open" | "good", words: string, ...more: (Node | string)[]): HTMLElement {
+  const made = h("div", { class: `banner ${kind}`, role: kind === "bad" ? "alert" : "status" }, h("span", {}, words), ...more);
+  where.replaceChildren(made);
+  return made;
+}

@@ -1,0 +1,342 @@
+// Playing with a net. The page holds where it is and where it was; what may fire, and what comes of it, it asks.
+
+import { announce, counted, h } from "./dom";
+import { banner, frame, panel, type Frame } from "./frame";
+import { Picture } from "./picture";
+import { Playback } from "./playback";
+import { ask, Refused, type Fired, type Moment, type PlayPage, type Run, type RunSummary, type Verdict } from "./server";
+
+interface Step {
+  what: string;
+  moment: Moment;
+}
+
+const KEPT = "firable-at";
+const STEPS_SHOWN = 200;
+
+export class Play {
+  private readonly picture: Picture;
+  private readonly frame: Frame;
+  private steps: Step[];
+  private undone: Step[] = [];
+  private queue: Promise<void> = Promise.resolve();
+  private explained: string | null = null;
+  private readonly undoButton = this.button("Undo", "Undo (Ctrl+Z)", () => this.undo());
+  private readonly redoButton = this.button("Redo", "Redo (Ctrl+Shift+Z)", () => this.redo());
+  private readonly resetButton = this.button("Reset", "Back to the initial marking", () => this.reset());
+  private readonly gatesSwitch = h("button", { type: "button", role: "switch", class: "switch", click: () => this.setFree(!this.now.free) }, "Gates free");
+  private readonly mayFire = h("ul", { class: "list" });
+  private readonly mayWait = h("ul", { class: "list" });
+  private readonly mayNot = h("ul", { class: "list" });
+  private readonly waitPanel = panel("Ready, but a gate is closed", this.mayWait);
+  private readonly notPanel = panel("Not now", this.mayNot);
+  private readonly switches = h("div", { class: "switches" });
+  private readonly log = h("ol", { class: "log" });
+  private readonly checks = h("div", { class: "checks" });
+  private readonly words = new Map<string, string>();
+  private playback: Playback | null = null;
+
+  constructor(private readonly page: PlayPage) {
+    for (const { name, says } of page.net.transitions) this.words.set(name, says);
+    this.picture = new Picture(page.net, page.picture, {
+      transition: (name) => void this.fire(name),
+      signal: (name) => void this.toggle(name),
+      pointed: (name) => this.picture.mark(name ?? this.explained),
+    });
+    this.frame = frame(page.net.name || "the net", page.net.description, "Playing", this.picture);
+    this.steps = [{ what: "the initial marking", moment: page.moment }];
+    this.frame.tools.append(this.undoButton, this.redoButton, this.resetButton, this.gatesSwitch);
+    this.gatesSwitch.title = "Free: external gates are open, as the analysis has them. Else they are as the signals say.";
+    this.frame.side.append(
+      h("div", { class: "own" }, panel("May fire", this.mayFire), this.waitPanel),
+      panel("Checks", this.checks),
+      h("div", { class: "own" }, ...(page.net.signals.length > 0 ? [panel("Signals", this.switches)] : []), panel("Steps", this.log), this.notPanel),
+    );
+    this.makeSwitches();
+    this.showChecks(page.verdicts, page.runs);
+    addEventListener("keydown", (event) => this.key(event));
+    const kept = sessionStorage.getItem(KEPT);
+    this.show();
+    void this.goOn(kept ?? "{}");
+  }
+
+  private get now(): Moment {
+    return this.steps[this.steps.length - 1]!.moment;
+  }
+
+  private button(words: string, title: string, click: () => void): HTMLButtonElement {
+    return h("button", { type: "button", title, click }, words);
+  }
+
+  /** After a reload of this window go on where one was. */
+  private async goOn(kept: string): Promise<void> {
+    try {
+      const { net, ...at } = JSON.parse(kept) as Moment & { net?: string };
+      if (net !== this.page.net.name) return;
+      const moment = await ask<Moment>("api/moment", at);
+      if (moment.marking.join() === this.now.marking.join() && moment.signals.length === 0 && !moment.free) return;
+      this.add("as before the reload", moment);
+    } catch (error) {
+      // The net is another one now: it is played from its beginning.
+      sessionStorage.removeItem(KEPT);
+      if (!(error instanceof Refused)) throw error;
+    }
+  }
+
+  private at(moment: Moment): Pick<Moment, "marking" | "signals" | "free"> {
+    return { marking: moment.marking, signals: moment.signals, free: moment.free };
+  }
+
+  private add(what: string, moment: Moment): void {
+    this.steps.push({ what, moment });
+    this.undone = [];
+    this.show();
+  }
+
+  /** Do something after all that was asked for before it. */
+  private doing(work: () => Promise<void>, whilePlaying = false): Promise<void> {
+    this.queue = this.queue.then(() => this.done(work, whilePlaying));
+    return this.queue;
+  }
+
+  private async done(work: () => Promise<void>, whilePlaying: boolean): Promise<void> {
+    if (this.playback !== null && !whilePlaying) return;
+    this.explained = null;
+    this.picture.mark(null);
+    this.frame.hint.textContent = "";
+    this.frame.banner.replaceChildren();
+    try {
+      await work();
+    } catch (error) {
+      const lost = !(error instanceof Refused);
+      const words = lost ? "The connection is lost: is `firable view` still running?" : error.message;
+      banner(this.frame.banner, "bad", words);
+    }
+  }
+
+  private fire(name: string): Promise<void> {
+    return this.doing(async () => {
+      const wait = this.now.transitions[name];
+      if (wait?.may !== "fire") {
+        this.explain(name, wait?.why ?? "");
+        return;
+      }
+      const after = await ask<Fired>("api/fire", { ...this.at(this.now), transition: name });
+      this.picture.fly([name]);
+      const says = this.words.get(name);
+      this.add(`${name} fires${says ? `: ${says}` : ""}`, after);
+      const sent = after.sent.length > 0 ? ` Sent: ${after.sent.join(", ")}.` : "";
+      announce(`${name} has fired.${sent} ${this.summary(after)}`);
+    });
+  }
+
+  private toggle(signal: string): Promise<void> {
+    return this.doing(async () => {
+      const on = !this.now.signals.includes(signal);
+      const signals = on ? [...this.now.signals, signal] : this.now.signals.filter((name) => name !== signal);
+      const after = await ask<Moment>("api/moment", { ...this.at(this.now), signals });
+      this.add(`${signal} becomes ${on ? 1 : 0}`, after);
+      announce(`${signal} is ${on ? 1 : 0}. ${this.summary(after)}`);
+    });
+  }
+
+  private setFree(free: boolean): Promise<void> {
+    return this.doing(async () => {
+      this.add(free ? "gates are free" : "gates as the signals say", await ask<Moment>("api/moment", { ...this.at(this.now), free }));
+      announce(`${free ? "Gates are free." : "Gates are as the signals say."} ${this.summary(this.now)}`);
+    });
+  }
+
+  private summary(moment: Moment): string {
+    if (moment.deadlock) return "A deadlock: no transition can fire any more.";
+    const may = Object.values(moment.transitions).filter((wait) => wait.may === "fire").length;
+    return may > 0 ? `${counted(may, "transition")} may fire.` : "Nothing may fire; some transition waits for its gate.";
+  }
+
+  private undo(): void {
+    if (this.steps.length < 2 || this.playback !== null) return;
+    this.undone.push(this.steps.pop()!);
+    this.show();
+    announce(`Undone. ${this.summary(this.now)}`);
+  }
+
+  private redo(): void {
+    const step = this.undone.pop();
+    if (step === undefined || this.playback !== null) return;
+    this.steps.push(step);
+    this.show();
+    announce(`Done again: ${step.what}. ${this.summary(this.now)}`);
+  }
+
+  private reset(): void {
+    if (this.steps.length < 2 || this.playback !== null) return;
+    const first = this.steps[0]!;
+    this.undone = this.steps.slice(1).reverse();
+    this.steps = [first];
+    this.show();
+    announce(`The initial marking. ${this.summary(this.now)}`);
+  }
+
+  private backTo(step: number): void {
+    while (this.steps.length > step + 1) this.undone.push(this.steps.pop()!);
+    this.show();
+  }
+
+  private key(event: KeyboardEvent): void {
+    if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
+    if (event.target instanceof HTMLInputElement || event.target instanceof HTMLTextAreaElement) return;
+    event.preventDefault();
+    if (event.shiftKey) this.redo();
+    else this.undo();
+  }
+
+  /** Say why a transition may not fire, until something else is done. */
+  private explain(name: string, why: string): void {
+    announce(why);
+    this.explained = name;
+    this.picture.mark(name);
+    this.frame.hint.textContent = why;
+  }
+
+  // What is shown
+
+  private makeSwitches(): void {
+    const { signals, controllers } = this.page.net;
+    for (const owner of [...controllers, null]) {
+      const own = signals.filter((signal) => signal.owner === owner);
+      if (own.length === 0) continue;
+      const group = h("div", { role: "group", "aria-label": owner ?? "signals" }, owner ? h("h3", {}, owner) : null);
+      for (const signal of own) {
+        const short = owner && signal.name.startsWith(`${owner}.`) ? signal.name.slice(owner.length + 1) : signal.name;
+        const made = h("button", {
+          type: "button", role: "switch", class: "switch", "data-signal": signal.name, "aria-label": signal.name,
+          title: `${signal.kind}; gates ${signal.gates.join(", ") || "nothing"}`, click: () => void this.toggle(signal.name),
+        }, short);
+        group.append(made);
+      }
+      this.switches.append(group);
+    }
+  }
+
+  private show(): void {
+    const moment = this.now;
+    this.picture.show(moment);
+    sessionStorage.setItem(KEPT, JSON.stringify({ net: this.page.net.name, ...this.at(moment) }));
+    this.undoButton.disabled = this.steps.length < 2;
+    this.redoButton.disabled = this.undone.length === 0;
+    this.resetButton.disabled = this.steps.length < 2;
+    this.gatesSwitch.setAttribute("aria-checked", String(moment.free));
+    for (const one of this.switches.querySelectorAll<HTMLElement>("[data-signal]")) {
+      one.setAttribute("aria-checked", String(moment.signals.includes(one.dataset.signal!)));
+      one.toggleAttribute("data-moot", moment.free);
+    }
+    this.frame.status.className = `status ${moment.deadlock ? "bad" : ""}`;
+    this.frame.status.textContent = this.summary(moment);
+    this.showTransitions(moment);
+    const from = Math.max(0, this.steps.length - STEPS_SHOWN);
+    this.log.start = from;
+    this.log.replaceChildren(
+      ...this.steps.slice(from).map((step, i) =>
+        h("li", { "aria-current": from + i === this.steps.length - 1 ? "step" : null },
+          h("button", { type: "button", class: "plain", title: "Go back to here", click: () => this.backTo(from + i) }, step.what)),
+      ),
+    );
+    this.log.scrollTop = this.log.scrollHeight;
+  }
+
+  private showTransitions(moment: Moment): void {
+    const active = document.activeElement instanceof HTMLElement ? document.activeElement : null;
+    const focused = active?.dataset.transition ?? active?.dataset.opens;
+    const may: HTMLElement[] = [];
+    const waiting: HTMLElement[] = [];
+    const not: HTMLElement[] = [];
+    for (const { name, says } of this.page.net.transitions) {
+      const wait = moment.transitions[name]!;
+      const over = { pointerenter: () => this.picture.mark(name), pointerleave: () => this.picture.mark(this.explained) };
+      if (wait.may === "fire")
+        may.push(h("li", {}, h("button", { type: "button", class: "go", "data-transition": name, click: () => void this.fire(name) }, h("b", {}, name), says ? h("span", {}, says) : null)));
+      else if (wait.may === "not") not.push(h("li", { class: "not", ...over }, wait.why ?? ""));
+      else waiting.push(h("li", { class: "wait", ...over }, h("span", {}, wait.why ?? ""), ...(wait.closed ?? []).map((signal) => this.opener(signal))));
+    }
+    if (may.length === 0) may.push(h("li", { class: "none" }, moment.deadlock ? "Nothing ever again: this is a deadlock." : "Nothing: open a gate."));
+    this.mayFire.replaceChildren(...may);
+    this.mayWait.replaceChildren(...waiting);
+    this.mayNot.replaceChildren(...not);
+    this.waitPanel.hidden = waiting.length === 0;
+    this.notPanel.hidden = not.length === 0;
+    // Who fires by the keyboard stays among what may fire.
+    if (focused !== undefined) {
+      const again = [...this.mayFire.querySelectorAll<HTMLElement>("button"), ...this.mayWait.querySelectorAll<HTMLElement>("button")];
+      (again.find((one) => one.dataset.transition === focused) ?? again[0])?.focus();
+    }
+  }
+
+  /** A button that opens a gate which somebody waits for. */
+  private opener(signal: string): HTMLElement {
+    const to = this.now.signals.includes(signal) ? 0 : 1;
+    return h("button", { type: "button", class: "small", "data-opens": signal, click: () => void this.toggle(signal) }, `${signal} = ${to}`);
+  }
+
+  // Checks and counterexamples
+
+  private showChecks(verdicts: Verdict[] | null, runs: RunSummary[]): void {
+    const check = h("button", { type: "button", class: "wide", click: () => void this.check(check) }, "Check this net");
+    const played = (name: string): HTMLElement =>
+      h("button", { type: "button", class: "go small", click: () => void this.playRun(name) }, h("b", {}, "▶ Play"), h("span", { class: "unseen" }, ` ${name}`));
+    const known = new Set(runs.map((run) => run.name));
+    const rows = (verdicts ?? []).filter((one) => one.weight !== "information" && (one.status !== "proved" || one.weight === "required"));
+    const sign = { proved: "✓", violated: "✗", unknown: "?" };
+    const bad = (one: Verdict): string => (one.status === "proved" ? "good" : one.status === "unknown" || one.weight === "warning" ? "open" : "bad");
+    const mine = new Set(rows.map((one) => one.name));
+    this.checks.replaceChildren(
+      verdicts === null ? check : "",
+      h("ul", { class: "list verdicts" },
+        ...runs.filter((run) => !mine.has(run.name)).map((run) => h("li", {}, h("div", {}, h("b", {}, run.name), h("span", {}, `${run.says}, ${counted(run.firings, "firing")}`)), played(run.name))),
+        ...rows.sort((a, b) => Number(a.status === "proved") - Number(b.status === "proved")).map((one) =>
+          h("li", { class: bad(one) },
+            h("div", {}, h("b", {}, h("i", { "aria-hidden": "true" }, sign[one.status]), ` ${one.name}`), h("span", {}, `${one.status}: ${one.says}`), one.hint && one.status !== "proved" ? h("span", { class: "soft" }, one.hint) : null),
+            known.has(one.name) ? played(one.name) : null)),
+      ),
+    );
+  }
+
+  private check(button: HTMLButtonElement): Promise<void> {
+    button.disabled = true;
+    button.textContent = "Checking…";
+    return this.doing(async () => {
+      try {
+        const { verdicts, runs } = await ask<{ verdicts: Verdict[]; runs: RunSummary[] }>("api/check", {});
+        this.showChecks(verdicts, runs);
+        const violated = verdicts.filter((one) => one.status === "violated" && one.weight === "required").length;
+        announce(violated > 0 ? `${counted(violated, "property")} violated.` : "Nothing that is required is violated.");
+      } finally {
+        button.disabled = false;
+        button.textContent = "Check this net";
+      }
+    });
+  }
+
+  private async playRun(name: string): Promise<void> {
+    await this.doing(async () => {
+      const run = await ask<Run>("api/run", { name });
+      this.playback?.stop();
+      this.playback = new Playback(run, this.picture, (at) => ask<Moment>("api/moment", at), (here) => this.ended(here));
+      this.frame.below.replaceChildren(this.playback.element);
+      document.body.classList.add("playing");
+      this.frame.status.className = "status";
+      this.frame.status.textContent = `Playing ${name}`;
+      for (const button of this.frame.tools.querySelectorAll("button")) button.disabled = true;
+      this.playback.begin();
+    }, true);
+  }
+
+  private ended(here: Moment | null): void {
+    this.playback = null;
+    this.frame.below.replaceChildren();
+    document.body.classList.remove("playing");
+    this.gatesSwitch.disabled = false;
+    if (here !== null) this.add("where the run was left", here);
+    else this.show();
+    this.mayFire.querySelector<HTMLElement>("button")?.focus();
+  }
+}

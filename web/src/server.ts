@@ -1,0 +1,153 @@
+// What the server is asked, and how it knows who asks: by the token in the fragment of the address that the command
+// printed. The fragment is sent to nobody; it is taken out of the address bar, and kept for a reload of this window.
+
+export interface Wait {
+  may: "fire" | "wait" | "not";
+  why?: string;
+  empty?: string[];
+  full?: string[];
+  closed?: string[];
+  /** Whether a token that it would take is there. */
+  near?: boolean;
+}
+
+export interface Moment {
+  marking: string[];
+  signals: string[];
+  free: boolean;
+  transitions: Record<string, Wait>;
+  deadlock: boolean;
+}
+
+export interface Fired extends Moment {
+  fired: string[];
+  sent: string[];
+}
+
+export interface Place {
+  name: string;
+  says: string;
+  owner: string | null;
+  machine: string | null;
+  command: string | null;
+  completion: string | null;
+}
+
+export interface Signal {
+  name: string;
+  owner: string | null;
+  kind: "completion" | "sensor" | "timer";
+  gates: string[];
+}
+
+export interface Net {
+  name: string;
+  description: string;
+  controllers: string[];
+  places: Place[];
+  transitions: { name: string; says: string }[];
+  signals: Signal[];
+}
+
+export interface RunSummary {
+  name: string;
+  says: string;
+  firings: number;
+}
+
+export interface Frame {
+  at?: number | null;
+  marking: string[];
+  signals: string[];
+  what: string;
+  says?: string;
+  fired?: string[];
+  turn?: boolean;
+}
+
+export interface Run extends RunSummary {
+  note: string;
+  free: boolean;
+  frames: Frame[];
+  left_out: number;
+}
+
+export interface Verdict {
+  name: string;
+  status: "proved" | "violated" | "unknown";
+  weight: "required" | "warning" | "information";
+  says: string;
+  hint: string;
+}
+
+export interface PlayPage {
+  mode: "play";
+  file: string;
+  net: Net;
+  picture: string;
+  moment: Moment;
+  runs: RunSummary[];
+  verdicts: Verdict[] | null;
+}
+
+export interface Problem {
+  code: string;
+  message: string;
+  hint: string;
+  line: number | null;
+  column: number | null;
+}
+
+/** An answer that is a refusal, in the server's words. */
+export class Refused extends Error {
+  constructor(
+    readonly status: number,
+    readonly problems: Problem[],
+  ) {
+    super(problems.map((one) => one.message).join("; ") || `the server answers ${status}`);
+  }
+}
+
+const KEPT = "firable-token";
+
+export function token(): string {
+  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  if (given !== null) {
+    sessionStorage.setItem(KEPT, given);
+    history.replaceState(null, "", location.pathname);
+  }
+  return given ?? sessionStorage.getItem(KEPT) ?? "";
+}
+
+export function keepToken(given: string): void {
+  sessionStorage.setItem(KEPT, given);
+}
+
+function headers(): HeadersInit {
+  const shown = token();
+  return shown === "" ? {} : { Authorization: `Bearer ${shown}` };
+}
+
+export async function ask<T>(path: string, body?: unknown): Promise<T> {
+  const asked: RequestInit = { headers: headers(), cache: "no-store" };
+  if (body !== undefined) Object.assign(asked, { method: "POST", body: JSON.stringify(body) });
+  const answer = await fetch(path, asked);
+  const data: unknown = await answer.json().catch(() => ({}));
+  if (!answer.ok) throw new Refused(answer.status, (data as { errors?: Problem[] }).errors ?? []);
+  return data as T;
+}
+
+/** The lines of JSON that the server tells as they come; ends when the server ends, throws when the connection does. */
+export async function* follow<T>(path: string, stop: AbortSignal): AsyncGenerator<T> {
+  const answer = await fetch(path, { headers: headers(), cache: "no-store", signal: stop });
+  if (!answer.ok || answer.body === null) throw new Refused(answer.status, []);
+  const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+  let rest = "";
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) return;
+    const lines = (rest + value).split("\n");
+    rest = lines.pop() ?? "";
+    for (const line of lines) if (line !== "") yield JSON.parse(line) as T;
+  }
+}
