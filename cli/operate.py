@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import ssl
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 if TYPE_CHECKING:
+    from firable.executor import Host
+    from firable.executor.operating.control import Page
     from firable.executor.operating.service import Service
     from firable.nets.diagnostics import InputError
 
@@ -20,6 +23,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 _READING: Final = ("situation", "metrics")
 _COMMANDS: Final = (*_READING, "pause", "resume", "step", "stop", "stop-at-end", "emergency-stop")
 _SECONDS: Final = 10.0
+NO_BROWSER: Final = "FIRABLE_NO_BROWSER"
+"""The variable of the environment by which an address is told and no browser opened."""
 
 
 @dataclass(frozen=True)
@@ -30,13 +35,15 @@ class ServeOptions:
     token_file: str | None = None
     serve_tls: tuple[str, str] | None = None
     operators: str | None = None
+    open: bool = False
+    """Whether the page of the run is opened in a browser."""
 
     def service(self) -> Service | None:
         """The endpoint, whose address and token are told when it is there, or None.
 
         Raises `InputError` F5060, F5062, and F1017 for a token that cannot be kept.
         """
-        if self.serve is None:
+        if self.serve is None and not self.open:
             if self.token_file or self.serve_tls or self.operators:
                 raise click.UsageError("say with --serve where an operator may act from elsewhere")
             return None
@@ -45,12 +52,27 @@ class ServeOptions:
         from firable.executor.operating.control import Endpoint, new_token, tls_context
         from firable.executor.operating.service import Service
 
-        host, _, port = self.serve.rpartition(":")
+        serve = self.serve or "127.0.0.1:0"
+        host, _, port = serve.rpartition(":")
         if not host or not port.isdecimal() or int(port) > 65535:
-            raise click.UsageError(f"--serve {self.serve}: write ADDRESS:PORT, such as 127.0.0.1:8080")
+            raise click.UsageError(f"--serve {serve}: write ADDRESS:PORT, such as 127.0.0.1:8080")
         tls = None if self.serve_tls is None else tls_context(*self.serve_tls, self.operators)
         token = new_token() if self.token_file is None else _token_kept(Path(self.token_file))
-        return Service(Endpoint(host.strip("[]"), int(port), token, tls), partial(_tell_served, token, self.token_file))
+        endpoint = Endpoint(host.strip("[]"), int(port), token, tls)
+        return Service(endpoint, partial(self._served, token), _page)
+
+    def _served(self, token: str, address: str) -> None:
+        _tell_served(token, self.token_file, address)
+        if self.open:
+            from firable.cli.view.command import show
+
+            show(f"{address}/#token={token}", open_it=not os.environ.get(NO_BROWSER))
+
+
+def _page(host: Host) -> Page:
+    from firable.cli.view.live import LivePage
+
+    return LivePage(host)
 
 
 def serve_options(command: F) -> F:
@@ -58,6 +80,7 @@ def serve_options(command: F) -> F:
     for option in (
         click.option("--operators", metavar="CA", help="Let in whoever has a certificate of this authority instead."),
         click.option("--serve-tls", metavar="CERT KEY", nargs=2, help="The certificate and key of that endpoint."),
+        click.option("--open", "open_", is_flag=True, help="Open the page of the run in a browser; see docs/view.md."),
         click.option("--token-file", metavar="FILE", help="Its token; made, for you alone to read, if there is none."),
         click.option(
             "--serve",
@@ -131,8 +154,6 @@ def _tell_served(token: str, token_file: str | None, address: str) -> None:
 
 def _token_kept(path: Path) -> str:
     """The token in a file, which is made with a new one if there is none."""
-    import os
-
     from firable.executor.operating.control import new_token
 
     if path.exists():

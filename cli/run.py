@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from firable.cli import text
 from firable.cli.bound_run import run_bound_of, show_bound
@@ -75,6 +76,7 @@ def run(
     token_file: str | None,
     serve_tls: tuple[str, str] | None,
     operators: str | None,
+    open_: bool,
     step: bool,
     format_: str,
     **host: Any,
@@ -102,7 +104,8 @@ def run(
     operator commands, and how it ends.
 
     With --serve, in real time, `firable operate` pauses, steps and stops the run from elsewhere, and Prometheus reads
-    its figures; everybody is asked for a token or a certificate, and beyond this host nothing goes without TLS.
+    its figures; everybody is asked for a token or a certificate, and beyond this host nothing goes without TLS. At the
+    same address a browser is shown the run as it goes on; --open opens one, and in real time if no speed is named.
 
     With --controller, only these controllers run here, on machines that --bind names, and the others on hosts that are
     linked to this one by --listen and --join, or by --serial. A host that holds another bundle is refused. The run ends
@@ -114,9 +117,14 @@ def run(
     if not options.is_one_of_several:
         options.refuse_alone()
 
-    served = ServeOptions(serve, token_file, serve_tls, operators)
-    if serve is not None and _SPEEDS[speed] is None and options.bind is None and not options.is_one_of_several:
-        raise click.UsageError("in virtual time a run is over before anybody acts: with --serve, name --speed 1 or 10")
+    served = ServeOptions(serve, token_file, serve_tls, operators, open_)
+    if open_ and click.get_current_context().get_parameter_source("speed") is ParameterSource.DEFAULT:
+        speed = "1"
+    is_simulated = options.bind is None and not options.is_one_of_several
+    if (serve is not None or open_) and _SPEEDS[speed] is None and is_simulated:
+        raise click.UsageError(
+            "in virtual time a run is over before anybody acts: with --serve or --open, name --speed 1 or 10"
+        )
     if options.is_one_of_several and step:
         raise click.UsageError("--step is of a whole run: on one host of several, `firable operate` steps (--serve)")
     if options.is_one_of_several and (plant is not None or watch == "stop") and options.bind is None:

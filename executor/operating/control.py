@@ -32,14 +32,12 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from aiohttp import web
+from aiohttp.typedefs import Handler, Middleware
 
 from firable.executor.operating.situation import Situation
 from firable.nets.diagnostics import Diagnostic, InputError
 
 METRICS_CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
-Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
-Middleware = Callable[[web.Request, Handler], Awaitable[web.StreamResponse]]
-
 SHUTDOWN_SECONDS: Final = 1.0
 """So long what is being answered may take once the run is over; then the process ends, whatever a client does."""
 

@@ -69,7 +69,7 @@ def ended(run: Host) -> Situation | None:
     if run.at_rest and run.is_complete() and not (run.paused and run.operated):
         return replace(situation(run), state=State.DONE, blocked=())
     # With an operator present, a cell at rest is waited for: it may be paused, or be given work.
-    is_stuck = run.at_rest and not run.operated
+    is_stuck = run.at_rest and not run.operated and not (run.paused and run.served)
     return situation(run) if is_stuck or run.recorder.is_deadlock else None
 
 

@@ -92,6 +92,7 @@ class Host:
         patience: Patience | None = None,
         log: Log | None = None,
     ) -> None:
+        self.decomposition = decomposition
         self.net = decomposition.net
         self.driver = driver
         self.recorder = recorder
@@ -109,6 +110,8 @@ class Host:
         self.is_complete = is_complete
         self.operator = operator
         self.operated = operator is not None
+        self.served = False
+        """Whether an operator may act from elsewhere."""
         self.tell = tell
         self.divergence: Divergence | None = None
         self.stop_at_divergence = stop_at_divergence

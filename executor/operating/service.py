@@ -23,16 +23,18 @@ from firable.executor.operating.uncut import STOP_SECONDS, Guard, Patience, ende
 from firable.nets.net import Net
 
 if TYPE_CHECKING:  # these need the extra `serve`
-    from firable.executor.operating.control import Endpoint
+    from firable.executor.operating.control import Endpoint, Page
     from firable.executor.operating.metrics import Metrics
 
 
 @dataclass(frozen=True)
 class Service:
-    """An operator's endpoint, and who is told its address."""
+    """An operator's endpoint, who is told its address, and the page that it serves besides."""
 
     endpoint: Endpoint
     served: Callable[[str], None] = lambda _: None
+    page: Callable[[Host], Page] | None = None
+    """What makes the page of a run, where it has one."""
 
 
 def figures_for(net: Net, service: Service | None, machines: Collection[str] = ()) -> Metrics | None:
@@ -105,6 +107,8 @@ async def _serving(host: Host, service: Service, figures: Metrics) -> Situation:
                 counted[signal] = reading.coalesced
         return figures.text()
 
-    async with serving(host, service.endpoint, text) as address:
+    page = None if service.page is None else service.page(host)
+    host.served = True
+    async with serving(host, service.endpoint, text, page) as address:
         service.served(address)
         return await terminable(host)

@@ -78,6 +78,40 @@ def test_an_operator_pauses_steps_resumes_and_stops_a_run_at_once(
     assert main(["replay", str(folder / "run.trace"), "--net", str(bundle)]) == 0
 
 
+def test_a_run_that_is_paused_from_elsewhere_waits_though_its_machines_have_come_to_rest(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # One workpiece: once it is in and the command under way is done, nothing more happens by itself.
+    arguments = [
+        "--speed",
+        "10",
+        "--workpieces",
+        "1",
+        "--serve",
+        "127.0.0.1:0",
+        "--token-file",
+        str(tmp_path / "token"),
+    ]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "firable.cli", "run", str(bundle), *arguments], stderr=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stderr is not None
+        told = re.search(r"http://\S+", process.stderr.readline())
+        assert told is not None
+        while "conveyor.cv1_run" not in operate(told.group(), "situation", tmp_path, capsys):
+            assert process.poll() is None
+        operate(told.group(), "pause", tmp_path, capsys)
+        for _ in range(40):
+            time.sleep(0.05)
+            assert operate(told.group(), "situation", tmp_path, capsys).startswith("paused")
+        operate(told.group(), "resume", tmp_path, capsys)
+        assert process.wait(timeout=SECONDS_MAX) == 0
+    finally:
+        process.kill()
+        process.communicate()
+
+
 def test_the_token_is_for_its_owner_alone_and_no_other_gets_in(
     served: tuple[subprocess.Popen[str], str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:

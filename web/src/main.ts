@@ -1,14 +1,16 @@
 // The beginning: who are we, and what is it that is shown here?
 
 import { h } from "./dom";
+import { Live, type LiveStart } from "./live";
 import { Play } from "./play";
 import { ask, keepToken, Refused, type PlayPage } from "./server";
 import "./style.css";
 
 async function begin(): Promise<void> {
   try {
-    const page = await ask<PlayPage>("api/page");
-    new Play(page);
+    const page = await ask<PlayPage | LiveStart>("api/page");
+    if (page.mode === "live") new Live(page);
+    else new Play(page);
   } catch (error) {
     if (error instanceof Refused && error.status === 401) return askForToken();
     const words = error instanceof Refused ? error.message : "The server does not answer: has the command ended?";

@@ -1,0 +1,233 @@
+"""The page of a running cell, or of one host of it: what it shows, as the run goes on.
+
+The page follows a stream of frames, JSON a line. A frame is what is so *now* (the marking, the signals, what may fire
+and what waits for what, the votes) with what has happened since the frame before; so a slow browser gets fewer frames,
+and never old ones, and the run waits for nobody. Frames come at most `FRAMES_PER_SECOND` times a second, however fast
+the cell is, and at least once in `HEARTBEAT_SECONDS`, by whose absence the page sees that the connection is lost.
+
+A host among others shows what is of its controllers: their places and signals, and their parts of the transitions that
+they take part in, under the names that these have in the cell. Nothing is commanded here: stop, pause and the others
+are those of the operator's endpoint, by its rules (`executor/operating/control.py`).
+
+What may fire is judged by the executor's own token player, since that is what runs. It looks again only at a
+transition that reads something that has changed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections import deque
+from collections.abc import Collection, Iterable
+from dataclasses import replace
+from typing import Any, Final
+
+from aiohttp import web
+
+from firable.cli.view import moment
+from firable.cli.view.lanes import Lanes
+from firable.cli.view.moment import Moment
+from firable.cli.view.site import PUBLIC, answering, file_routes
+from firable.cli.view.votes import votes
+from firable.executor import Host
+from firable.executor.protocol.token_player import TokenPlayer, Word
+from firable.nets.drawing import draw_net
+from firable.nets.net import Net
+from firable.semantics.joining import APPLIED, STANDS, VOTED
+from firable.semantics.trace import CommandSent, Event, Fired, Noted
+
+FRAMES_PER_SECOND: Final = 20.0
+HEARTBEAT_SECONDS: Final = 0.5
+HAPPENED_MAX: Final = 300
+"""So many events a frame tells at most, the newest."""
+
+
+class LivePage:
+    """The page of a host, or of a whole run."""
+
+    def __init__(self, host: Host) -> None:
+        self.host = host
+        self.owners = None if host.is_whole else frozenset(host.controllers)
+        self.net = host.net if self.owners is None else own_part(host.net, self.owners)
+        self.player = TokenPlayer.of(self.net)
+        self.lanes = Lanes(self.net)
+        self.followers: set[_Follower] = set()
+        self.word: Word = -1
+        self.states: dict[str, dict[str, Any]] = {}
+        host.recorder.observers.append(self.seen)
+
+    @property
+    def public(self) -> Collection[str]:
+        """The paths that anybody may read."""
+        return PUBLIC
+
+    def routes(self) -> Iterable[web.AbstractRouteDef]:
+        """The files of the page, what it shows at first, and the stream that it follows."""
+        yield from file_routes()
+        yield web.get("/api/page", answering(self.page))
+        yield web.get("/api/events", self.stream)
+
+    async def page(self, _: dict[str, Any]) -> dict[str, Any]:
+        """What is shown at first."""
+        here = "" if self.owners is None else ", ".join(self.host.controllers)
+        return {
+            "mode": "live",
+            "here": here,
+            "coordinators": [name or "the coordinator" for name in self.host.coordinators],
+            "net": moment.structure(self.net),
+            "picture": draw_net(self.net, marking=0),
+        }
+
+    def seen(self, event: Event) -> None:
+        """An event of the run, for all who follow it."""
+        self.lanes.seen(event)
+        for follower in self.followers:
+            follower.take(event)
+
+    async def stream(self, request: web.Request) -> web.StreamResponse:
+        """Frames, until the run or the browser is gone."""
+        response = web.StreamResponse(headers={"Content-Type": "application/x-ndjson", "Cache-Control": "no-store"})
+        await response.prepare(request)
+        follower = _Follower()
+        self.followers.add(follower)
+        try:
+            ended = False
+            while not ended:
+                ended = self.host.is_over
+                frame = self.frame(follower, ended=ended)
+                await response.write(json.dumps(frame, separators=(",", ":")).encode() + b"\n")
+                if not ended:
+                    await asyncio.sleep(1 / FRAMES_PER_SECOND)
+                    await follower.something(HEARTBEAT_SECONDS - 1 / FRAMES_PER_SECOND)
+        finally:
+            self.followers.discard(follower)
+        return response
+
+    def frame(self, follower: _Follower, *, ended: bool = False) -> dict[str, Any]:
+        """What is so now, and what has happened since this follower was told."""
+        host, net = self.host, self.net
+        situation = host.situation()
+        if ended and host.outcome is not None and not host.outcome.cancelled() and host.outcome.exception() is None:
+            situation = host.outcome.result()
+        now = self.now()
+        self._judge(now)
+        lanes = self.lanes.told()
+        return {
+            "at": host.now_seconds(),
+            "speed": host.speed,
+            "state": situation.state.value,
+            "message": situation.message,
+            "marking": list(net.names(now.marking)),
+            "signals": sorted(now.signals),
+            "transitions": follower.news("transition", self.states),
+            "waits": [str(one) for one in situation.blocked],
+            "lanes": list(follower.news("lane", {lane["machine"]: lane for lane in lanes}).values()),
+            "votes": list(follower.news("votes", {row["name"]: row for row in votes(host)}).values()),
+            "unreached": sorted(host.peers.names - host.peers.connected_to),
+            "paused": host.paused,
+            "ended": ended,
+            **follower.happened(),
+        }
+
+    def now(self) -> Moment:
+        """The marking and the signals, of the whole or of this host."""
+        host = self.host
+        if self.owners is None:
+            word, player = host.recorder.word, host.recorder.player
+            on = [name for name in self.net.signal_index if word & player.signal_bit(name)]
+            return Moment(word & player.places, frozenset(on))
+        on = [
+            signal.name
+            for controller in host.controllers.values()
+            for signal in controller.subnet.signals
+            if controller.word & controller.player.signal_bit(signal.name)
+        ]
+        return Moment(self.net.marking(host.marking), frozenset(on))
+
+    def _judge(self, now: Moment) -> None:
+        word = now.marking | sum(self.player.signal_bit(name) for name in now.signals)
+        changed = word ^ self.word
+        for t, compiled in enumerate(self.player.transitions.values()):
+            if compiled.name in self.states and not changed & compiled.reads:
+                continue
+            if compiled.openable and compiled.enabled(word):
+                self.states[compiled.name] = {"may": "fire"}
+            else:
+                may = "wait" if compiled.openable and compiled.firable(word, self.player.places) else "not"
+                self.states[compiled.name] = {"may": may, **moment.waits(self.net, t, now)}
+        self.word = word
+
+
+class _Follower:
+    """A browser that follows a run: what it was told, and what happened since."""
+
+    def __init__(self) -> None:
+        self.told: dict[tuple[str, str], Any] = {}
+        self.events: deque[dict[str, Any]] = deque(maxlen=HAPPENED_MAX)
+        self.fired: deque[str] = deque(maxlen=HAPPENED_MAX)
+        self.is_new = asyncio.Event()
+
+    def take(self, event: Event) -> None:
+        """Something happened."""
+        match event:
+            case Fired(_, names):
+                self.fired.extend(names)
+                self.events.append({"at": event.at_seconds, "kind": "fired", "what": f"{', '.join(names)} fired"})
+            case CommandSent(_, place):
+                self.events.append({"at": event.at_seconds, "kind": "sent", "what": f"{place} sent its command"})
+            case Noted(_, note, data) if note not in (VOTED, STANDS):
+                if note == APPLIED:
+                    self.fired.extend([str(data["transition"])] if "transition" in data else [])
+                else:
+                    words = data.get("message") or " ".join(map(str, data.values()))
+                    self.events.append(
+                        {"at": event.at_seconds, "kind": "note", "what": f"{note}: {words}".rstrip(": ")}
+                    )
+        self.is_new.set()
+
+    def news(self, kind: str, of: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        """Those that are others than this follower was told."""
+        found = {}
+        for name, value in of.items():
+            text = json.dumps(value)
+            if self.told.get((kind, name)) != text:
+                self.told[kind, name] = text
+                found[name] = value
+        return found
+
+    def happened(self) -> dict[str, Any]:
+        """What happened since it was asked, and how."""
+        events, fired = list(self.events), list(self.fired)
+        self.events.clear()
+        self.fired.clear()
+        self.is_new.clear()
+        return {"events": events, "fired": fired}
+
+    async def something(self, seconds: float) -> None:
+        """Wait until something happens, or so long."""
+        try:
+            async with asyncio.timeout(seconds):
+                await self.is_new.wait()
+        except TimeoutError:
+            return
+
+
+def own_part(net: Net, owners: Collection[str]) -> Net:
+    """What of a net is of some controllers: their places and signals, and their parts of its transitions."""
+    places = tuple(place for place in net.places if place.owner in owners)
+    signals = tuple(signal for signal in net.signals if signal.owner in owners)
+    here, read = {place.name for place in places}, {signal.name for signal in signals}
+    parts = []
+    for transition in net.transitions:
+        part = replace(
+            transition,
+            inputs=tuple(name for name in transition.inputs if name in here),
+            outputs=tuple(name for name in transition.outputs if name in here),
+            permissive=tuple(name for name in transition.permissive if name in here),
+            inhibitive=tuple(name for name in transition.inhibitive if name in here),
+            external=tuple(gate for gate in transition.external if gate.signal in read),
+        )
+        if part.inputs or part.outputs or part.permissive or part.inhibitive or part.external:
+            parts.append(part)
+    controllers = tuple(replace(c, under=None) for c in net.controllers if c.name in owners)
+    return Net(net.name, places, tuple(parts), signals, controllers, description=net.description)

@@ -1,0 +1,248 @@
+// A running cell: what the server tells of it is shown as it comes, and what the operator may do is asked of it. When
+// nothing comes any more, that is said, and what is shown is marked as old: a page that looks alive and is not is the
+// one thing that must never be here.
+
+import { announce, counted, h } from "./dom";
+import { banner, frame, panel, type Frame } from "./frame";
+import { Lanes, type Lane } from "./lanes";
+import { Picture } from "./picture";
+import { ask, follow, Refused, type Net, type Wait } from "./server";
+
+export interface LiveStart {
+  mode: "live";
+  here: string;
+  coordinators: string[];
+  net: Net;
+  picture: string;
+}
+
+interface Votes {
+  name: string;
+  says: string;
+  round: "" | "asking" | "applying";
+  parts: { controller: string; vote: string }[];
+}
+
+interface Now {
+  at: number;
+  speed: number;
+  state: string;
+  message: string;
+  marking: string[];
+  signals: string[];
+  transitions: Record<string, Wait>;
+  waits: string[];
+  lanes: Lane[];
+  votes: Votes[];
+  unreached: string[];
+  paused: boolean;
+  ended: boolean;
+  events: { at: number; kind: string; what: string }[];
+  fired: string[];
+}
+
+const SILENT_MS = 2500;
+const RETRY_MS = 1000;
+const EVENTS_SHOWN = 200;
+const BAD = new Set(["fault", "deadlock"]);
+const SIGNS: Record<string, [string, string]> = {
+  ready: ["●", "ready"], yes: ["✓", "votes yes"], promised: ["◐", "has promised"], no: ["○", "not ready"], ordered: ["…", "has its order"],
+  applied: ["✓", "has applied"], lost: ["✗", "not connected"], unknown: ["?", "not known here"],
+};
+
+export class Live {
+  private readonly picture: Picture;
+  private readonly frame: Frame;
+  private readonly lanes = new Lanes();
+  private readonly waits = h("ul", { class: "list" });
+  private readonly votes = h("table", { class: "votes" });
+  private readonly rows = new Map<string, Votes>();
+  private readonly signals = h("ul", { class: "signals" });
+  private readonly events = h("ol", { class: "log events", "aria-label": "What happened" });
+  private readonly buttons: HTMLButtonElement[] = [];
+  private readonly pauseButton: HTMLButtonElement;
+  private readonly stepButton: HTMLButtonElement;
+  private heard = performance.now();
+  private now: Now | null = null;
+  private lost = false;
+  private said = "";
+
+  constructor(start: LiveStart) {
+    this.picture = new Picture(start.net, start.picture, { pointed: (name) => this.picture.mark(name) });
+    const says = start.here ? `on this host: ${start.here}` : start.net.description;
+    this.frame = frame(start.net.name || "the cell", says, "Operating", this.picture);
+    const button = (words: string, path: string, title: string, kind = ""): HTMLButtonElement => {
+      const made = h("button", { type: "button", class: kind, title, click: () => void this.command(made.dataset.path ?? path, words) }, words);
+      this.frame.tools.append(made);
+      this.buttons.push(made);
+      return made;
+    };
+    this.pauseButton = button("Pause", "pause", "Let nothing fire; machines end what they are at");
+    this.stepButton = button("Step", "step", "While paused, fire one transition");
+    button("Stop at end of cycle", "stop-at-end", "Let no new work in, and end when the cell is empty");
+    button("Stop", "stop", "Stop every machine where it is, and end the run");
+    button("Emergency stop", "emergency-stop", "Drive the safe outputs at once. This is no safety function: the wired one is", "emergency");
+    const lanes = h("section", { class: "machines", "aria-label": "Machines" }, this.lanes.element);
+    if (start.net.places.some((place) => place.machine !== null)) this.frame.below.append(lanes);
+    this.frame.side.append(
+      panel("Waits for", this.waits),
+      panel("Votes", this.votes),
+      panel("Signals", this.signals),
+      panel("What happened", this.events),
+    );
+    for (const { name } of start.net.signals) this.signals.append(h("li", { "data-signal": name }, h("i", { "aria-hidden": "true" }, "○"), ` ${name} `, h("b", {}, "0")));
+    setInterval(() => this.watch(), 250);
+    void this.listen();
+  }
+
+  private async listen(): Promise<void> {
+    for (;;) {
+      const stop = new AbortController();
+      const watch = setInterval(() => {
+        if (performance.now() - this.heard > SILENT_MS) stop.abort();
+      }, 250);
+      try {
+        this.heard = performance.now();
+        for await (const now of follow<Now>("api/events", stop.signal)) {
+          this.heard = performance.now();
+          this.show(now);
+          if (now.ended) return this.end(now);
+        }
+      } catch (error) {
+        if (error instanceof Refused) return void banner(this.frame.banner, "bad", `The run does not let this page in any more: ${error.message}.`);
+      } finally {
+        clearInterval(watch);
+      }
+      this.lose();
+      await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
+    }
+  }
+
+  private lose(): void {
+    if (this.lost) return;
+    this.lost = true;
+    const at = new Date().toLocaleTimeString();
+    document.body.classList.add("old");
+    banner(this.frame.banner, "bad", `The connection is lost since ${at}. What is shown is old, and nothing here reaches the cell: use the controls at the machines.`);
+    for (const one of this.buttons) one.disabled = true;
+    this.frame.status.textContent = "no connection";
+    this.frame.status.className = "status bad";
+  }
+
+  private watch(): void {
+    if (this.now === null || this.now.ended || this.lost) return;
+    // Between two frames time goes on; it is shown only as long as the connection lives.
+    const since = Math.min(performance.now() - this.heard, 700) / 1000;
+    this.lanes.draw(this.now.at + since * this.now.speed);
+  }
+
+  private show(now: Now): void {
+    if (this.lost) {
+      this.lost = false;
+      document.body.classList.remove("old");
+      this.frame.banner.replaceChildren();
+      announce("The connection is back.");
+    }
+    const flying = now.fired.filter((name, i) => now.fired.indexOf(name) === i);
+    this.now = now;
+    this.picture.show(now);
+    this.picture.fly(flying);
+    this.lanes.take(now.lanes);
+    this.lanes.draw(now.at);
+    this.showState(now);
+    this.showVotes(now);
+    this.showWaits(now);
+    this.showEvents(now);
+    const on = new Set(now.signals);
+    for (const one of this.signals.children as HTMLCollectionOf<HTMLElement>) {
+      const value = on.has(one.dataset.signal!);
+      if (one.classList.toggle("on", value) !== (one.lastElementChild!.textContent === "1")) {
+        one.firstElementChild!.textContent = value ? "●" : "○";
+        one.lastElementChild!.textContent = value ? "1" : "0";
+      }
+    }
+  }
+
+  private showState(now: Now): void {
+    const { state, message } = now;
+    const words = message ? `${state}: ${message}` : state;
+    const kind = BAD.has(state) ? "bad" : state === "paused" || state === "held" ? "open" : "good";
+    this.frame.status.className = `status ${kind}`;
+    const clock = `${now.at.toFixed(1)} s`;
+    this.frame.status.replaceChildren(h("b", { class: `state ${kind}` }, state), h("span", { class: "soft clock" }, clock));
+    if (words !== this.said) {
+      this.said = words;
+      if (state !== "running" && state !== "waiting") announce(words);
+      if (message || kind !== "good") banner(this.frame.banner, kind, words);
+      else this.frame.banner.replaceChildren();
+    }
+    const held = now.paused || state === "held";
+    const path = held ? "resume" : "pause";
+    if (this.pauseButton.dataset.path !== path) {
+      this.pauseButton.dataset.path = path;
+      this.pauseButton.textContent = held ? "Resume" : "Pause";
+    }
+    const over = now.ended || state === "stopped" || state === "done" || state === "fault";
+    for (const one of this.buttons) one.disabled = over && !one.classList.contains("emergency");
+    if (!over) this.stepButton.disabled = !now.paused;
+  }
+
+  private showWaits(now: Now): void {
+    const away = now.unreached.map((name) => `${name === "" ? "the coordinator" : name} is not connected`);
+    const lines = [...away, ...now.waits];
+    const key = lines.join("\n");
+    if (this.waits.dataset.key === key) return;
+    this.waits.dataset.key = key;
+    const none = now.state === "running" ? "Nothing: the cell is at work." : "Nothing.";
+    this.waits.replaceChildren(...(lines.length > 0 ? lines.map((line, i) => h("li", { class: i < away.length ? "wait lost" : "wait" }, line)) : [h("li", { class: "none" }, none)]));
+  }
+
+  private showVotes(now: Now): void {
+    if (now.votes.length === 0) return;
+    for (const row of now.votes) this.rows.set(row.name, row);
+    const marked = (vote: string): HTMLElement => {
+      const [sign, words] = SIGNS[vote] ?? ["?", vote];
+      return h("span", { class: `vote ${vote}`, title: words }, h("i", { "aria-hidden": "true" }, sign), h("span", { class: "unseen" }, words));
+    };
+    const controllers = [...new Set([...this.rows.values()].flatMap((row) => row.parts.map((part) => part.controller)))];
+    this.votes.replaceChildren(
+      h("caption", { class: "unseen" }, "For each global transition, how each controller stands to it"),
+      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, ""), ...controllers.map((name) => h("th", { scope: "col" }, name)))),
+      h("tbody", {}, ...[...this.rows.values()].map((row) => {
+        const of = new Map(row.parts.map((part) => [part.controller, part.vote]));
+        const all = row.parts.every((part) => ["ready", "yes", "promised", "applied", "ordered"].includes(part.vote));
+        return h("tr", { class: row.round || (all ? "all" : "") }, h("th", { scope: "row", title: row.says }, row.name, row.round ? h("span", { class: "soft" }, ` ${row.round}`) : null),
+          ...controllers.map((name) => h("td", {}, of.has(name) ? marked(of.get(name)!) : null)));
+      })),
+    );
+  }
+
+  private showEvents(now: Now): void {
+    if (now.events.length === 0) return;
+    const atEnd = this.events.scrollTop + this.events.clientHeight >= this.events.scrollHeight - 8;
+    this.events.append(...now.events.map((event) => h("li", { class: event.kind }, h("span", { class: "soft" }, `${event.at.toFixed(1)} `), event.what)));
+    while (this.events.children.length > EVENTS_SHOWN) this.events.firstElementChild!.remove();
+    if (atEnd) this.events.scrollTop = this.events.scrollHeight;
+  }
+
+  private async command(path: string, words: string): Promise<void> {
+    try {
+      const answer = await ask<{ fired?: string | null }>(path, {});
+      if (path === "step") announce(answer.fired ? `${answer.fired} has fired.` : "Nothing is enabled.");
+      else announce(`${words}: done.`);
+      if (path === "step" && !answer.fired) this.frame.hint.textContent = "Nothing is enabled: no step was done.";
+      else this.frame.hint.textContent = "";
+    } catch (error) {
+      const why = error instanceof Refused ? error.message : "the connection is lost";
+      banner(this.frame.banner, "bad", `“${words}” did not reach the cell: ${why}. Use the controls at the machines.`);
+    }
+  }
+
+  private end(now: Now): void {
+    for (const one of this.buttons) one.disabled = true;
+    document.body.classList.add("ended");
+    const kind = BAD.has(now.state) ? "bad" : now.state === "done" ? "good" : "open";
+    banner(this.frame.banner, kind, `The run has ended after ${counted(Math.round(now.at), "second")}: ${now.message ? `${now.state}, ${now.message}` : now.state}.`);
+    announce(`The run has ended: ${now.state}.`);
+  }
+}
