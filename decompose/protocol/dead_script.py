@@ -6,6 +6,7 @@ promises, as one that is free of promise locks nothing. Its invariant is kept (`
 configuration of that it is asked, once for all:
 
 - `home.GROUP`: while a round is open, and its coordinator and those who take part live, it can be brought to its end;
+- `homeward.STEP`: of what is still to be done, the step leaves less;
 - `way.T`: where the round of T is at rest, no promise disturbs its parts and those who take part in it live, T fires by
   the steps of its way if the central net can fire it;
 
@@ -16,12 +17,12 @@ and of each who can be dead:
   nothing keeps T from its way;
 - `promised.WHO.PART`: a promise that the dead leave is one that the net that is left may hold at this marking.
 
-So, by hand: the rounds in which the dead have no hand come to rest by steps of the others alone (`home`; that these end
-is argued as for `homeward` of `faults.smt2`). What the protocol has then is a marking of the net that is left, with the
-promises that stand (`promised`; `astray` is empty by the invariant), and each of its firings is one of the protocol
-(`undisturbed`, `way`), after which the same holds again. What can fire again there can fire again here. What the
-executor does beyond the protocol's net, the signals that a promise holds still and the rounds that a coordinator does
-not open, is argued in docs/protocol.md.
+So, by hand: the rounds in which the dead have no hand come to rest by steps of the others alone (`home`), and these end
+(`homeward`; asked here, as the `faults.smt2` of a bundle is of the protocol with its free parts). What the protocol has
+then is a marking of the net that is left, with the promises that stand (`promised`; `astray` is empty by the
+invariant), and each of its firings is one of the protocol (`undisturbed`, `way`), after which the same holds again.
+What can fire again there can fire again here. What the executor does beyond the protocol's net, the signals that a
+promise holds still and the rounds that a coordinator does not open, is argued in docs/protocol.md.
 
 The invariant is that of `faults.smt2`, and one sentence more: *a promise stands*, whether its round was given up or
 not.
@@ -51,7 +52,15 @@ from firable.decompose.protocol.inductive import (
     negated,
     touched,
 )
-from firable.decompose.protocol.inductive_script import INVARIANT, after, all_of, any_of, literal, sentence
+from firable.decompose.protocol.inductive_script import (
+    INVARIANT,
+    Obligations,
+    after,
+    all_of,
+    any_of,
+    literal,
+    sentence,
+)
 from firable.decompose.protocol.rounds import asked, committed, decided
 from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL
 from firable.nets.decomposition import Decomposition
@@ -69,6 +78,7 @@ SAYS: Final = {
     "starts": "at the start, the invariant holds, and promises stand",
     "keeps": "after the step, they still do",
     "home": "a round of the living can be brought to its end",
+    "homeward": "the step leaves less to be done",
     "way": "what the central net can fire, and no promise disturbs, is fired by these steps",
     "at-once": "nobody but the dead fires what stands still at once",
     "undisturbed": "what goes on in the net that is left finds nothing in its way",
@@ -90,6 +100,11 @@ class DeadObligations:
         """The protocol in which every part promises, under any number of faults."""
         return protocol_net(replace(self.decomposition, free=()), PROTOCOL, ANY_FAULTS)
 
+    @cached_property
+    def _rounds(self) -> Obligations:
+        """What `faults.smt2` says where every part promises."""
+        return Obligations(self.protocol)
+
     def beginning(self) -> str:
         """The head of the file, up to the first obligation."""
         protocol = self.protocol
@@ -101,6 +116,7 @@ class DeadObligations:
             INVARIANT: all_of(map(sentence, invariant(protocol))),
             STANDING: all_of(map(sentence, self._standing)),
         }
+        defined |= {name: sentence(fact) for fact, name in self._rounds.facts.items()}
         defined |= {self._open(group): any_of(map(symbol, self._memory(group))) for group in self._groups}
         lines += [f"(define-fun {name} () Bool {text})" for name, text in defined.items()]
         return "\n".join(lines) + "\n"
@@ -110,7 +126,7 @@ class DeadObligations:
         marked = all_of(literal((place.name, place.marked)) for place in self.protocol.net.places)
         name, block = _block("starts", "starts", [marked, f"(not (and {INVARIANT} {STANDING}))"])
         yield name, f"{block}\n(assert {INVARIANT})\n(assert {STANDING})\n"
-        for made in (self._keeping(), self._home(), self._ways()):
+        for made in (self._keeping(), self._home(), self._leading(), self._ways()):
             yield from made
         for bereft in self.deaths:
             yield from self._of_one(bereft)
@@ -183,6 +199,10 @@ class DeadObligations:
             alive = all_of(literal((place, False)) for t in group for place in self._downs(t))
             yield _block(f"home.{'+'.join(group)}", "home", [self._open(group), alive, f"(not {any_of(ends)})"])
 
+    def _leading(self) -> Iterator[tuple[str, str]]:
+        for name, asserted in self._rounds.leading():
+            yield _block(name, "homeward", asserted)
+
     def _ways(self) -> Iterator[tuple[str, str]]:
         parts = self.protocol.parts
         for t in sorted(parts.transitions, key=lambda t: t.name):
@@ -244,7 +264,7 @@ class DeadProof:
         """Why the verdict on who is dead is not shown; empty where all that it rests on is."""
         for name in self.open_:
             kind, _, rest = name.partition(".")
-            common = kind in {"starts", "keeps", "home", "way"}
+            common = kind in {"starts", "keeps", "home", "homeward", "way"}
             if common or rest == bereft.verdict or (kind == "promised" and rest.startswith(f"{bereft.verdict}.")):
                 return f"z3 does not show '{name}' of {FILE}"
         return ""

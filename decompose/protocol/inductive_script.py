@@ -256,18 +256,23 @@ class Obligations:
 
     def _home(self) -> Iterator[str]:
         ceased = list(map(literal, may_go_on(self.protocol)))
-        steps = sorted(homeward(self.protocol), key=lambda one: one.step.name)
-        possible = [all_of(map(literal, (*demands(one.step), *one.where))) for one in steps]
+        possible = [all_of(map(literal, (*demands(one.step), *one.where))) for one in homeward(self.protocol)]
         yield _block("home", "home", [*ceased, OPEN, f"(not {any_of(possible)})"])
+        for name, asked in self.leading():
+            yield _block(name, "homeward", asked)
+
+    def leading(self) -> Iterator[tuple[str, list[str]]]:
+        """Of each step homeward that it leaves less to be done: the name, and what is asserted, over `facts`."""
         before, now, at = self.facts, {fact: sentence(fact) for fact in self.facts}, touched(self.facts)
-        for one, text in zip(steps, possible, strict=True):
+        for one in sorted(homeward(self.protocol), key=lambda one: one.step.name):
+            possible = all_of(map(literal, (*demands(one.step), *one.where)))
             changes = effect(one.step)
             risen = (fact for of in changes.items() for fact in at[of])
             fallen = (fact for of in changes.items() for fact in at[negated(of)])
             none_more = [f"(or {before[fact]} (not {now[fact]}))" for fact in risen]
             one_less = any_of(f"(and {before[fact]} (not {now[fact]}))" for fact in fallen)
             less = after(changes, all_of([*none_more, one_less]))
-            yield _block(f"homeward.{one.step.name}", "homeward", [text, f"(not {less})"])
+            yield f"homeward.{one.step.name}", [possible, f"(not {less})"]
 
     def _ways(self) -> Iterator[str]:
         ceased = list(map(literal, may_go_on(self.protocol)))

@@ -23,6 +23,7 @@ KINDS: Final = {
     "starts": "at the start, the invariant holds, and promises stand",
     "keeps": "after the step, they still do",
     "home": "a round of the living can be brought to its end",
+    "homeward": "the step leaves less to be done",
     "way": "what the central net can fire, and no promise disturbs, is fired by these steps",
     "at-once": "nobody but the dead fires what stands still at once",
     "undisturbed": "what goes on in the net that is left finds nothing in its way",
@@ -106,6 +107,7 @@ class OutageObligations(Obligations):
         lines = [*(f"; {printable(comment)}" for comment in comments), "(set-logic QF_UF)"]
         lines += [f"(declare-const |{spelled(place)}| Bool)" for place in sorted(self.voting.places)]
         defined = {INVARIANT: _all_of(map(self._sentence, self._invariant)), _STANDS: _all_of(self._standing)}
+        defined |= {symbol: self._sentence(fact) for fact, symbol in self._facts.items()}
         for group in self._groups:
             defined[self._open_round(group)] = _one_of(f"|{spelled(place)}|" for place in self._memory(group))
         lines += [f"(define-fun {name} () Bool {text})" for name, text in defined.items()]
@@ -117,6 +119,7 @@ class OutageObligations(Obligations):
             ("starts", [_text(self.voting.places.items()), f"(not (and {INVARIANT} {_STANDS}))"]),
             *self._kept(),
             *self._rounds(),
+            *self._leading(),
             *self._all_ways(),
             *(block for wake in self.wakes for block in self._of(wake)),
         )

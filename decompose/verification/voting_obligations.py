@@ -342,17 +342,26 @@ class Obligations:
         return [f"(not {_symbol(GO_ON)})"] if self.voting.faults else []
 
     def _home(self) -> Iterator[tuple[str, list[str]]]:
+        yield "home", [*self._ceased, OPEN, f"(not {_disjunction(self._ways_home.values())})"]
+        yield from self._leading()
+
+    @cached_property
+    def _ways_home(self) -> dict[str, str]:
+        """Where each step leads home."""
         ways = {}
         for name, step in self.voting.steps.items():
             if HOME in step.kind:
                 orders = (p.split("/", 1) for p in step.puts if p.startswith(("commit-order/", "abort-order/")))
                 ways[name] = _all([*_demanded(step), *((f"acknowledgement/{part}", False) for _, part in orders)])
-        yield "home", [*self._ceased, OPEN, f"(not {_disjunction(ways.values())})"]
+        return ways
+
+    def _leading(self) -> Iterator[tuple[str, list[str]]]:
+        """Each step homeward leaves less to be done."""
         at: dict[tuple[str, bool], set[Sentence]] = {}
         for fact in self._facts:
             for literal in {literal for term in fact for literal in term}:
                 at.setdefault(literal, set()).add(fact)
-        for name, way in ways.items():
+        for name, way in self._ways_home.items():
             changes = _changes(self.voting.steps[name])
             up = {fact for place, full in changes.items() for fact in at.get((place, full), ())}
             down = {fact for place, full in changes.items() for fact in at.get((place, not full), ())}

@@ -18,11 +18,13 @@ from support.owned_nets import owned_net
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
 from firable.analysis.evidence.document import Document, document_from_text
 from firable.decompose.protocol.bereft import Bereft, deaths
+from firable.decompose.protocol.building import protocol_net
 from firable.decompose.protocol.dead_script import DeadProof, prove_of_the_dead
+from firable.decompose.protocol.inductive import homeward
 from firable.decompose.protocol.outages import inquests, outages, sealed_outages
 from firable.decompose.protocol.parts import Part, Parts
 from firable.decompose.protocol.shown import proved_without_exploring
-from firable.decompose.protocol.variant import PROTOCOL
+from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL
 from firable.decompose.protocol.wrong import example
 from firable.decompose.splitting.cut import split
 from firable.decompose.verification import documents
@@ -340,6 +342,41 @@ def test_a_net_that_is_left_and_says_too_much_is_not_tied_to_the_protocol(
     unsound(how, monkeypatch)
     open_ = prove_of_the_dead(split(overtaken()), TIMEOUT_MS).open_
     assert {name.partition(".")[0] for name in open_} == {how.partition(":")[0]}
+
+
+def test_what_ties_them_leans_on_no_file_of_a_protocol_in_which_parts_are_free() -> None:
+    # A bundle's `faults.smt2` is of the protocol with its free parts, and not of steps that only promises have.
+    decomposition = freed(split(overtaken()))
+    assert decomposition.free
+    steps = {one.step.name for one in homeward(protocol_net(replace(decomposition, free=()), PROTOCOL, ANY_FAULTS))}
+    of_free = {one.step.name for one in homeward(protocol_net(decomposition, PROTOCOL, ANY_FAULTS))}
+    text = prove_of_the_dead(decomposition, TIMEOUT_MS).text
+    stated = set(OutageObligations(Voting(Cut(decomposition.net), faults=True), frozenset(decomposition.free)).names)
+    for step in steps:
+        assert f'(echo "homeward.{step}")' in text
+        assert f"homeward.{step}" in stated
+    assert steps - of_free
+
+
+def test_steps_that_leave_no_less_to_be_done_leave_nobody_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.decompose.protocol.inductive_script.still_to_be_done", lambda _: ())
+    decomposition = split(overtaken())
+    assert {name.partition(".")[0] for name in prove_of_the_dead(decomposition, TIMEOUT_MS).open_} == {"homeward"}
+    assert {verdict.status for verdict in sealed_outages(decomposition)[0]} == {Status.UNKNOWN}
+
+
+def test_a_step_that_the_solver_gives_up_leaves_nobody_shown() -> None:
+    def tired(text: str, timeout_ms: int) -> tuple[str, ...]:
+        said = list(asked(text, timeout_ms))
+        if "at-once.dead.a" in said:
+            said[said.index("homeward.restart/a") + 1] = "unknown"
+        return tuple(said)
+
+    examination, cut = Examination(bundled(gated)), Cut(bundled(gated).net)
+    check_explored(examination, cut, "cvc5", asked, TIMEOUT_MS)
+    check_outages(examination, cut, tired, TIMEOUT_MS)
+    dead = {one.name for one in bundled(gated).verdicts if one.name.startswith(PREFIX)}
+    assert {name for name, one in examination.checked.items() if not one.shown} == dead
 
 
 def test_every_change_of_a_line_that_ties_them_is_refused() -> None:
