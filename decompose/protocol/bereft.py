@@ -201,7 +201,9 @@ class Bereft:
         yield Transition(f"hold/{name}", (), here, _sorted({DYING, *full}), _sorted(empty | others))
         full, empty = {*part.outputs}, {*part.inputs}
         if not free:
-            full, empty = full.union(part.permissive), empty.union(part.inhibitive)
+            # What its own firing has moved is as that leaves it, whatever a gate of it wanted there before.
+            full = full.union(set(part.permissive) - part.writes)
+            empty = empty.union(set(part.inhibitive) - part.writes)
         yield Transition(f"behind/{name}", (), here, _sorted({DYING, *full}), _sorted(empty | others))
 
     def _is_free(self, part: Part) -> bool:

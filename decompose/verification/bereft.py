@@ -157,7 +157,8 @@ class Wake:
         own = part.own
         if self._is_free(part):
             return set(own.outputs), set(own.inputs)
-        return {*own.outputs, *own.permissive}, {*own.inputs, *own.inhibitive}
+        seen, shut = {*own.permissive} - part.writes, {*own.inhibitive} - part.writes  # gates on what it has moved
+        return {*own.outputs, *seen}, {*own.inputs, *shut}
 
     def _is_free(self, part: Part) -> bool:
         return (part.whole, part.controller) in self.free
