@@ -7,8 +7,8 @@ import io
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 import pytest
 
@@ -257,6 +257,16 @@ def test_whoever_cancels_again_does_not_cut_off_the_safe_outputs() -> None:
 ASKING = [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT]
 
 
+@contextmanager
+def heard(number: signal.Signals) -> Iterator[None]:
+    """Whoever runs the tests in the background has SIGINT ignored, and by `nohup` SIGHUP: here they are not."""
+    earlier = signal.signal(number, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        signal.signal(number, earlier)
+
+
 @pytest.mark.parametrize("number", ASKING)
 def test_a_second_signal_does_not_cut_off_the_safe_outputs(number: signal.Signals) -> None:
     run, machine = slow()
@@ -267,11 +277,8 @@ def test_a_second_signal_does_not_cut_off_the_safe_outputs(number: signal.Signal
             loop.call_later(at, signal.raise_signal, number)
         return (await terminable(run)).state
 
-    earlier = signal.signal(number, signal.SIG_DFL)  # whoever runs the tests by `nohup` has SIGHUP ignored
-    try:
+    with heard(number):
         assert run_in_virtual_time(ended()) is State.STOPPED
-    finally:
-        signal.signal(number, earlier)
     assert machine.is_off
 
 
@@ -414,7 +421,8 @@ def test_a_second_ctrl_c_leaves_a_driver_that_hangs_no_more_than_a_moment() -> N
             loop.call_later(at, signal.raise_signal, signal.SIGINT)
         return (await terminable(hanging())).state, loop.time()
 
-    state, seconds = run_in_virtual_time(ended())
+    with heard(signal.SIGINT):
+        state, seconds = run_in_virtual_time(ended())
     assert state is State.FAULT
     assert seconds == pytest.approx(3.0 + HURRY_SECONDS, abs=0.2)
 
@@ -422,6 +430,7 @@ def test_a_second_ctrl_c_leaves_a_driver_that_hangs_no_more_than_a_moment() -> N
 BLOCKED = """
 import asyncio, signal, sys, threading, time
 from firable.executor.operating.uncut import ended_by_signals
+signal.signal(signal.SIGINT, signal.SIG_DFL)
 async def main():
     with ended_by_signals():
         for after in (0.1, 0.3):

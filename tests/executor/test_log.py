@@ -72,10 +72,11 @@ def test_a_log_that_breaks_is_told_once_and_ends_nothing(tmp_path: Path, capsys:
     folder.mkdir()
     log = log_to(str(folder / "run.log"))
     assert log is not None
+    log.began("cell", ["robot"])
     (folder / "run.log").unlink()
     folder.rmdir()
     for _ in range(3):
-        log.began("cell", ["robot"])
+        log.ended(Situation(State.STOPPED, ()))
     assert capsys.readouterr().err.count("cannot be written any more") == 1
 
 
