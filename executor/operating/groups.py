@@ -12,7 +12,8 @@ What a driver says of a command while it is handed over, that its machine has it
 and not a turn of the loop later in front of the next signal. That once: a net that fires on it must not keep the loop.
 
 The journal and the trace are written for these callbacks alone, so what fails there ends the run with the machines
-stopped, whoever called, and nothing leaves any more.
+stopped, whoever called, and nothing leaves any more. A disk that never answers fails when a stop has waited for it as
+long as for anything that hangs: what it was given is as open as after a failed sync.
 
 Rejected: to wait for the disk in the callback. It is the shortest text and, on a disk that answers at once, the
 quickest; but one that stands still for a second would keep a stop from the machines for that second.
@@ -24,6 +25,7 @@ import asyncio
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.operating.uncut import Patience, uncut
+from firable.nets.diagnostics import Diagnostic, InputError
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
@@ -43,6 +45,8 @@ class Groups:
         """In which a group is due."""
         self.storing: asyncio.Future[None] | None = None
         """The sync that is under way on a thread."""
+        self.is_given_up = False
+        """Whether nobody waits for it any more."""
 
     @property
     def are_over(self) -> bool:
@@ -82,8 +86,19 @@ class Groups:
 
     async def end(self, patience: Patience) -> list[str]:
         """Wait for the sync that is under way; returns what had to be given up."""
-        hangs = self.storing is not None and await uncut([self.storing], patience)
+        if self.storing is None:
+            return []
+        hangs = self.is_given_up or await uncut([self.storing], patience)
         return ["the journal"] if hangs else []
+
+    def give_up(self) -> None:
+        """Somebody has wanted the run to end, and has waited long enough for the disk."""
+        if self.storing is not None and not self.is_given_up:
+            self.is_given_up = True
+            message = "the journal cannot be written: its disk does not answer"
+            hint = "look at the machines, then at the disk; what the journal holds, the same command takes up"
+            self.run.told("fault", f"{message}; {hint}")
+            self.run.broken(InputError([Diagnostic("F5034", message, hint)]))
 
     def _work(self) -> None:
         """One group, and its sync; at quiescence, whether the run has ended."""

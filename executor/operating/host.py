@@ -259,6 +259,8 @@ class Host:
                 self.acts.forgo(ending.beginnings(self.net))
                 self.ends_at_home = True
         elif not self.stopping:
+            if self.is_whole and self.groups.storing is not None:
+                self.make_safe()  # at the end of the run otherwise, which follows at once
             self.ended_by = self.ended_by or ("stopped by the operator" if self.is_whole else "")
             self._end_soon("stopped by the operator")
 
@@ -422,11 +424,15 @@ class Host:
         self._halt(note, **data)
         if not self.is_whole:
             self.acts.leave()
-        if self.clock is not None and not self.is_whole:
-            self.clock.loop.call_later(SETTLE_SECONDS, self._wait_no_longer)
+        if self.clock is not None:
+            if not self.is_whole:
+                self.clock.loop.call_later(SETTLE_SECONDS, self._wait_no_longer)
+            self.clock.loop.call_later(self.patience.seconds, self.groups.give_up)
 
     def _wait_no_longer(self) -> None:
         self.has_waited = True
+        if self.groups.storing is not None:
+            self.make_safe()
         self.groups.wake()
 
     def _task_ended(self, task: asyncio.Task[None]) -> None:

@@ -67,8 +67,10 @@ def run_to_the_end(
     guard = Guard(host.patience.seconds)
     try:
         with _short_collections(), asyncio.Runner() as runner:
-            ended = runner.run(work)
-            guard.begin()  # a thread of a driver that hangs keeps the event loop from being closed
+            try:
+                ended = runner.run(work)
+            finally:
+                guard.begin()  # a thread of a driver or a disk that hangs keeps the event loop from being closed
     finally:
         guard.end()
     return ended

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import io
 import json
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from threading import Semaphore, Thread
@@ -20,9 +20,11 @@ from firable.executor.journal.journal import MemoryJournal, Storing
 from firable.executor.journal.outbox import Outbox
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.operating import acts
+from firable.executor.operating import host as host_module
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import Situation, State
+from firable.executor.operating.uncut import Patience
 from firable.executor.protocol.messages import Keep, Stored
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
@@ -210,6 +212,67 @@ def test_an_emergency_stop_reaches_the_machines_while_the_disk_takes_its_time_an
             situation = await asyncio.wait_for(ending, 10)
             assert situation.state is State.STOPPED
             assert situation.is_emergency
+
+    asyncio.run(main())
+
+
+def test_a_stop_of_a_whole_cell_reaches_the_machines_while_the_disk_takes_its_time() -> None:
+    async def main() -> None:
+        rig = Rig()
+        async with rig.running() as ending:
+            await rig.slow_from_now_on()
+            rig.host.stop()
+            assert rig.machines.is_stopped
+            assert not ending.done()
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize(
+    "end",
+    [Host.stop, lambda host: host.emergency_stop("a person"), lambda host: host.fail("a fault")],
+    ids=["stop", "emergency stop", "fault"],
+)
+def test_a_disk_that_never_answers_ends_a_stop_as_an_error_and_what_it_was_given_never_leaves(
+    end: Callable[[Host], object],
+) -> None:
+    async def main() -> None:
+        rig = Rig()
+        rig.host.patience = Patience(0.1)
+        async with rig.running() as ending:
+            await rig.slow_from_now_on()
+            storing = rig.host.groups.storing
+            assert storing is not None
+            end(rig.host)
+            with pytest.raises(InputError, match="its disk does not answer"):
+                await asyncio.wait_for(ending, 10)
+            assert rig.machines.is_stopped
+            rig.journal.answers.release()  # after all
+            await asyncio.wait([storing], timeout=10)
+            await turns()
+            assert rig.machines.sent == rig.fired == []
+
+    asyncio.run(main())
+
+
+def test_a_host_among_others_stops_its_machines_when_its_stop_has_waited_and_its_disk_has_not_answered(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(host_module, "SETTLE_SECONDS", 0.05)
+
+    async def main() -> None:
+        rig = Rig()
+        rig.host.is_whole = False
+        async with rig.running() as ending:
+            await rig.slow_from_now_on()
+            rig.host.stop()
+            assert not rig.machines.is_stopped, "others may wait for a word of it"
+            for _ in range(1000):
+                if rig.machines.is_stopped:
+                    break
+                await asyncio.sleep(0.005)
+            assert rig.machines.is_stopped
+            assert not ending.done()
 
     asyncio.run(main())
 
