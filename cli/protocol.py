@@ -115,8 +115,8 @@ def ask(
             files = {**shown_votes, **found.evidence()} if evidence else {}
         if asked.faults:
             begins("asking what goes on while somebody is dead")
-            tie = prove_of_the_dead(decomposition, timeout_ms)
-            for inquest in inquests(decomposition, limits, tie):
+            tie = prove_of_the_dead(running, timeout_ms)
+            for inquest in inquests(running, limits, tie):
                 verdict, shown = inquest.sealed() if evidence else (outage_verdict(inquest.outage), {})
                 dead.append((inquest.outage, verdict))
                 files |= dict(_packed(file, document) for file, document in shown.items())

@@ -2,8 +2,8 @@
 
 What goes on while somebody is dead is found in a net of the size of the central one (`bereft`). Here it is tied to the
 protocol's net under faults, in one SMT-LIB 2 file for all who can be dead: of the protocol in which every part
-promises, as one that is free of promise locks nothing. Its invariant is kept (`starts`, `keeps`), and of each
-configuration of that it is asked, once for all:
+promises. That one that is free of promise keeps back no more is argued (docs/protocol.md). The invariant is kept
+(`starts`, `keeps`), and of each configuration of that it is asked, once for all:
 
 - `home.GROUP`: while a round is open, and its coordinator and those who take part live, it can be brought to its end;
 - `homeward.STEP`: of what is still to be done, the step leaves less;

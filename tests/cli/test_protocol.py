@@ -7,12 +7,16 @@ from pathlib import Path
 from time import sleep
 
 import pytest
+from support.free_parts import freed
 
 from firable.analysis._engine import BudgetExceeded
 from firable.cli.main import main
 from firable.cli.prove import show_obligations
 from firable.decompose.protocol import exploring, verdicts
 from firable.decompose.protocol.inductive_script import Proof
+from firable.decompose.protocol.outages import sealed_outages
+from firable.decompose.splitting.cut import split
+from firable.nets import read_net
 from firable.nets.verdict import Status, Verdict
 
 NET = """\
@@ -107,6 +111,38 @@ def test_faults_tell_what_stands_still(capsys: pytest.CaptureFixture[str], net: 
     told = capsys.readouterr().out
     assert "✓ proved    faults.resumes" in told
     assert "  robot dead\n    stands still at once     fetch\n    may stand still          hand_over, unload\n" in told
+
+
+CHUTE = """\
+firable: 1
+cell: chute
+controllers:
+  feeder:
+    start: [part]
+    places: {part: {}, gone: {}}
+  chute:
+    start: [full]
+    places: {full: {}, empty: {}, open: {}}
+transitions:
+  drop: {from: feeder.part, to: [feeder.gone, chute.full], if: chute.open}
+  clear: {from: chute.full, to: chute.empty}
+"""
+"""The part of `drop` at the chute is free of promise: behind a dead coordinator its gate does not matter any more."""
+
+
+def test_faults_are_told_of_the_free_parts_that_a_bundle_has(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    path, folder = tmp_path / "chute.firable.yaml", tmp_path / "smt"
+    path.write_text(CHUTE)
+    assert main(["prove", str(path), "--faults", "--smt-dir", str(folder), "--format", "json"]) == 0
+    told = {one["name"]: one for one in json.loads(capsys.readouterr().out)["reports"][0]["verdicts"]}
+    decomposition = split(read_net(path))
+    sealed, files = sealed_outages(freed(decomposition))
+    assert [told[one.name].get("subjects", []) for one in sealed] == [list(one.subjects) for one in sealed]
+    assert {name: (folder / name).read_text("utf-8") for name in files} == files
+    without, _ = sealed_outages(decomposition)
+    assert [one.subjects for one in without] != [one.subjects for one in sealed]
 
 
 def test_wrong_protocols_are_told_by_their_events_and_fail_nothing(
