@@ -62,6 +62,7 @@ COMMANDS = {
     "sim": "sim.sim",
     "split": "split.split",
     "takeover": "takeover.takeover",
+    "timeline": "timeline.command.timeline",
     "verify": "verify.verify",
     "view": "view.command.view",
 }

@@ -124,6 +124,7 @@ CODES: Final[dict[str, str]] = {
     "F5003": "the plant file does not fit the bundle",
     "F5004": "the trace is not a trace of the net",
     "F5005": "the trace file is malformed",
+    "F5006": "a trace in which no machine is seen at work",
     "F5020": "a host that may not take part",
     "F5021": "a link that cannot be opened",
     "F5022": "a link that is open to the network",

@@ -14,8 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
-from urllib.parse import quote
-from xml.sax.saxutils import escape
 
 from firable.nets.drawing.layout import label_lines, layout, transition_lines
 from firable.nets.drawing.shapes import (
@@ -32,6 +30,7 @@ from firable.nets.drawing.shapes import (
     Stub,
 )
 from firable.nets.drawing.text import COMMAND, NAME, NOTE, width_of
+from firable.nets.drawing.xml import esc, ident, px
 from firable.nets.net import Marking, Net
 
 _TINTS: Final = ("#eef3fb", "#eef8f1", "#fdf4e7", "#f6effa", "#e9f6f8", "#fbeff0", "#f4f5ea", "#f1f1f5")
@@ -104,18 +103,18 @@ class _Writer:
         self.height = where.bottom + 12 + 26 * len(self.legend_rows) + 14
 
     def lines(self) -> Iterator[str]:
-        width, height = _n(self.width), _n(self.height)
+        width, height = px(self.width), px(self.height)
         yield (
             f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
             f'viewBox="0 0 {width} {height}" role="img">'
         )
-        yield f"<title>{_x(self.net.name)}</title>"
+        yield f"<title>{esc(self.net.name)}</title>"
         if self.net.description:
-            yield f"<desc>{_x(self.net.description)}</desc>"
+            yield f"<desc>{esc(self.net.description)}</desc>"
         yield f"<style>{_STYLE}</style>"
         yield f'<rect width="{width}" height="{height}" fill="#fff"/>'
-        yield f'<text class="title" x="24" y="34">{_x(self.net.name)}</text>'
-        yield f'<text class="subtitle" x="24" y="53">{_x(self.caption)}</text>'
+        yield f'<text class="title" x="24" y="34">{esc(self.net.name)}</text>'
+        yield f'<text class="subtitle" x="24" y="53">{esc(self.caption)}</text>'
         for i, lane in enumerate(self.where.lanes):
             yield from self._lane(i, lane)
         for bar in self.where.bars:
@@ -146,9 +145,9 @@ class _Writer:
     def _lane(self, i: int, lane: Lane) -> Iterator[str]:
         fill, stroke = self._colours(i)
         top, bottom = self.where.top, self.where.bottom
-        name = "" if lane.owner is None else f"{_id('lane', lane.owner)} "
+        name = "" if lane.owner is None else f"{ident('lane', lane.owner)} "
         yield (
-            f'<rect {name}x="{_n(lane.x)}" y="{_n(top)}" width="{_n(lane.width)}" height="{_n(bottom - top)}" rx="10" '
+            f'<rect {name}x="{px(lane.x)}" y="{px(top)}" width="{px(lane.width)}" height="{px(bottom - top)}" rx="10" '
             f'fill="{fill}" stroke="{stroke}"/>'
         )
         if lane.owner is None:
@@ -156,17 +155,17 @@ class _Writer:
         controller = next(c for c in self.net.controllers if c.name == lane.owner)
         role = "coordinator" if controller.coordinator else ""
         yield (
-            f'<text class="lane" x="{_n(lane.x + 14)}" y="{_n(top + 24)}">{_x(lane.owner)}'
+            f'<text class="lane" x="{px(lane.x + 14)}" y="{px(top + 24)}">{esc(lane.owner)}'
             f'<tspan class="note" dx="4" font-weight="400">{role}</tspan></text>'
         )
-        yield f'<text class="note" x="{_n(lane.x + 14)}" y="{_n(top + 40)}">{_x(controller.description)}</text>'
+        yield f'<text class="note" x="{px(lane.x + 14)}" y="{px(top + 40)}">{esc(controller.description)}</text>'
 
     def _tie(self, bar: Bar) -> Iterator[str]:
-        y = _n(bar.y)
+        y = px(bar.y)
         if bar.is_global:
-            yield f'<path class="leader" d="M{_n(24 + self.where.margin_labels + 8)} {y}H{_n(bar.segments[0][0])}"/>'
+            yield f'<path class="leader" d="M{px(24 + self.where.margin_labels + 8)} {y}H{px(bar.segments[0][0])}"/>'
         if len(bar.segments) > 1:
-            yield f'<path class="tie" d="M{_n(bar.segments[0][1])} {y}H{_n(bar.segments[-1][0])}"/>'
+            yield f'<path class="tie" d="M{px(bar.segments[0][1])} {y}H{px(bar.segments[-1][0])}"/>'
 
     def _path(self, edge: Edge) -> str:
         """The line of an edge from the circle to the bar."""
@@ -175,12 +174,12 @@ class _Writer:
         sign = -1.0 if up else 1.0
         end = bar.y - sign * (BAR_HALF_HEIGHT + (0 if edge.kind is Kind.OUTPUT else 1))
         if not edge.bypass:
-            return f"M{_n(spot.x)} {_n(spot.y + sign * RADIUS)}V{_n(end)}"
+            return f"M{px(spot.x)} {px(spot.y + sign * RADIUS)}V{px(end)}"
         start_x, start_y = spot.x - RADIUS * 0.85, spot.y + sign * RADIUS * 0.53
         bend = spot.y + sign * (RADIUS + 14)
         return (
-            f"M{_n(start_x)} {_n(start_y)}C{_n(start_x - 9)} {_n(start_y + sign * 5)} {_n(edge.x)} "
-            f"{_n(start_y + sign * 6)} {_n(edge.x)} {_n(bend)}V{_n(end)}"
+            f"M{px(start_x)} {px(start_y)}C{px(start_x - 9)} {px(start_y + sign * 5)} {px(edge.x)} "
+            f"{px(start_y + sign * 6)} {px(edge.x)} {px(bend)}V{px(end)}"
         )
 
     def _halo(self, edge: Edge) -> Iterator[str]:
@@ -191,7 +190,7 @@ class _Writer:
     def _edge(self, edge: Edge) -> Iterator[str]:
         gate = edge.kind in {Kind.PERMISSIVE, Kind.INHIBITIVE}
         ends = (self.net.transitions[edge.transition].name, self.net.places[edge.place].name)
-        yield f'<path {_id(edge.kind, *ends)} class="{"gate" if gate else "arc"}" d="{self._path(edge)}"/>'
+        yield f'<path {ident(edge.kind, *ends)} class="{"gate" if gate else "arc"}" d="{self._path(edge)}"/>'
         spot, bar = self.where.places[edge.place], self.where.bars[edge.transition]
         sign = -1.0 if bar.y < spot.y else 1.0
         if edge.kind is Kind.INPUT:
@@ -213,11 +212,11 @@ class _Writer:
     def _bar(self, t: int, bar: Bar) -> Iterator[str]:
         transition = self.net.transitions[t]
         steps = self.steps.get(transition.name, ())
-        yield f"<g {_id('transition', transition.name)}><title>{_x(self._told(t))}</title>"
+        yield f"<g {ident('transition', transition.name)}><title>{esc(self._told(t))}</title>"
         for start, end in bar.segments:
             yield (
-                f'<rect class="{"fired" if steps else "bar"}" x="{_n(start)}" y="{_n(bar.y - BAR_HALF_HEIGHT)}" '
-                f'width="{_n(end - start)}" height="{_n(2 * BAR_HALF_HEIGHT)}" rx="1.5"/>'
+                f'<rect class="{"fired" if steps else "bar"}" x="{px(start)}" y="{px(bar.y - BAR_HALF_HEIGHT)}" '
+                f'width="{px(end - start)}" height="{px(2 * BAR_HALF_HEIGHT)}" rx="1.5"/>'
             )
         lines = transition_lines(self.net, t, is_global=bar.is_global)
         if bar.is_global:
@@ -225,11 +224,11 @@ class _Writer:
         else:
             x, y = bar.segments[-1][1] + 8, bar.y + 4.5
         for k, (text, style) in enumerate(lines):
-            yield f'<text class="{style.css}" x="{_n(x)}" y="{_n(y + k * _LINE)}">{_x(text)}</text>'
+            yield f'<text class="{style.css}" x="{px(x)}" y="{px(y + k * _LINE)}">{esc(text)}</text>'
         if steps:
             shown = ", ".join(map(str, steps[:4])) + (", …" if len(steps) > 4 else "")
             yield (
-                f'<text class="step" x="{_n(bar.segments[0][0])}" y="{_n(bar.y - 7)}" text-anchor="end">{shown}</text>'
+                f'<text class="step" x="{px(bar.segments[0][0])}" y="{px(bar.y - 7)}" text-anchor="end">{shown}</text>'
             )
         yield "</g>"
 
@@ -238,26 +237,26 @@ class _Writer:
         x = stub.x + BAR_HALF_WIDTH - 7 - 9 * (stub.slot % 4)  # each its own end: one may be a dot, the other a circle
         far_x, far_y = stub.x + BAR_HALF_WIDTH + 6, y - 7 - 12 * stub.slot
         not_wanted = () if stub.gate.wanted else ("0",)  # a signal may be wanted both 1 and 0
-        yield f"<g {_id('gate', self.net.transitions[stub.transition].name, stub.gate.signal, *not_wanted)}>"
-        yield f'<path class="stub" d="M{_n(far_x)} {_n(far_y)}L{_n(x)} {_n(y)}"/>'
+        yield f"<g {ident('gate', self.net.transitions[stub.transition].name, stub.gate.signal, *not_wanted)}>"
+        yield f'<path class="stub" d="M{px(far_x)} {px(far_y)}L{px(x)} {px(y)}"/>'
         yield _end(x, y, permissive=stub.gate.wanted)
-        yield f'<text class="signal" x="{_n(far_x + 3)}" y="{_n(far_y + 2.5)}">{_x(stub.label)}</text></g>'
+        yield f'<text class="signal" x="{px(far_x + 3)}" y="{px(far_y + 2.5)}">{esc(stub.label)}</text></g>'
 
     def _place(self, p: int, spot: Spot) -> Iterator[str]:
         place = self.net.places[p]
         lines = label_lines(place)
         hint = " — ".join(text for text in (place.name, place.description) if text)
-        yield f"<g {_id('place', place.name)}><title>{_x(hint)}</title>"
-        yield f'<circle class="place" cx="{_n(spot.x)}" cy="{_n(spot.y)}" r="{_n(RADIUS)}"/>'
+        yield f"<g {ident('place', place.name)}><title>{esc(hint)}</title>"
+        yield f'<circle class="place" cx="{px(spot.x)}" cy="{px(spot.y)}" r="{px(RADIUS)}"/>'
         if self.marking >> p & 1:
-            yield f'<circle class="token" cx="{_n(spot.x)}" cy="{_n(spot.y)}" r="5.5"/>'
+            yield f'<circle class="token" cx="{px(spot.x)}" cy="{px(spot.y)}" r="5.5"/>'
         y = spot.y - (len(lines) - 1) * _LINE / 2 + 4.5
         for k, (text, style) in enumerate(lines):
             x, line_y = spot.x + LABEL_LEFT, y + k * _LINE
             if style is COMMAND:
                 yield from _send(spot, line_y - 3.5)
                 x += 12
-            yield f'<text class="{style.css}" x="{_n(x)}" y="{_n(line_y)}">{_x(text)}</text>'
+            yield f'<text class="{style.css}" x="{px(x)}" y="{px(line_y)}">{esc(text)}</text>'
         yield "</g>"
 
     def _told(self, t: int) -> str:
@@ -305,7 +304,7 @@ class _Writer:
             y = self.where.bottom + 26 + 26 * i
             for x, sign, words in row:
                 yield from _sign(sign, x, y)
-                yield f'<text class="note" x="{_n(x + 46)}" y="{_n(y + 3.5)}">{_x(words)}</text>'
+                yield f'<text class="note" x="{px(x + 46)}" y="{px(y + 3.5)}">{esc(words)}</text>'
 
 
 def _sign(sign: str, x: float, y: float) -> Iterator[str]:
@@ -313,24 +312,24 @@ def _sign(sign: str, x: float, y: float) -> Iterator[str]:
     middle = x + 20
     match sign:
         case "place":
-            yield f'<circle class="place" cx="{_n(middle)}" cy="{_n(y)}" r="9"/>'
-            yield f'<circle class="token" cx="{_n(middle)}" cy="{_n(y)}" r="3.5"/>'
+            yield f'<circle class="place" cx="{px(middle)}" cy="{px(y)}" r="9"/>'
+            yield f'<circle class="token" cx="{px(middle)}" cy="{px(y)}" r="3.5"/>'
         case "local" | "fired":
             css = "bar" if sign == "local" else "fired"
-            yield f'<rect class="{css}" x="{_n(x + 6)}" y="{_n(y - 3)}" width="28" height="6" rx="1.5"/>'
+            yield f'<rect class="{css}" x="{px(x + 6)}" y="{px(y - 3)}" width="28" height="6" rx="1.5"/>'
         case "global":
-            yield f'<path class="tie" d="M{_n(x)} {_n(y)}H{_n(x + 40)}"/>'
+            yield f'<path class="tie" d="M{px(x)} {px(y)}H{px(x + 40)}"/>'
             for start in (x, x + 26):
-                yield f'<rect class="bar" x="{_n(start)}" y="{_n(y - 3)}" width="14" height="6" rx="1.5"/>'
+                yield f'<rect class="bar" x="{px(start)}" y="{px(y - 3)}" width="14" height="6" rx="1.5"/>'
         case "permissive" | "inhibitive":
-            yield f'<path class="gate" d="M{_n(x + 2)} {_n(y)}H{_n(x + 33)}"/>'
+            yield f'<path class="gate" d="M{px(x + 2)} {px(y)}H{px(x + 33)}"/>'
             yield _end(x + 34, y, permissive=sign == "permissive")
         case "external" | "external-inhibitive":
-            yield f'<path class="stub" d="M{_n(x + 36)} {_n(y - 6)}L{_n(x + 20)} {_n(y + 2)}"/>'
+            yield f'<path class="stub" d="M{px(x + 36)} {px(y - 6)}L{px(x + 20)} {px(y + 2)}"/>'
             yield _end(x + 20, y + 2, permissive=sign == "external")
         case "command":
-            yield f'<path class="send" d="M{_n(x + 12)} {_n(y)}H{_n(x + 28)}"/>'
-            yield f'<path class="sendhead" d="M{_n(x + 34)} {_n(y)}l-7 -3.2v6.4z"/>'
+            yield f'<path class="send" d="M{px(x + 12)} {px(y)}H{px(x + 28)}"/>'
+            yield f'<path class="sendhead" d="M{px(x + 34)} {px(y)}l-7 -3.2v6.4z"/>'
 
 
 def _send(spot: Spot, y: float) -> Iterator[str]:
@@ -338,35 +337,20 @@ def _send(spot: Spot, y: float) -> Iterator[str]:
     dy = y - spot.y
     x = spot.x + (RADIUS**2 - dy**2) ** 0.5
     end = spot.x + LABEL_LEFT + 9
-    yield f'<path class="send" d="M{_n(x)} {_n(y)}H{_n(end - 5)}"/>'
-    yield f'<path class="sendhead" d="M{_n(end)} {_n(y)}l-6 -2.8v5.6z"/>'
+    yield f'<path class="send" d="M{px(x)} {px(y)}H{px(end - 5)}"/>'
+    yield f'<path class="sendhead" d="M{px(end)} {px(y)}l-6 -2.8v5.6z"/>'
 
 
 def _head(x: float, y: float, dx: float, dy: float) -> str:
     """An arrowhead whose tip is at (x, y), pointing in the direction (dx, dy) of length one."""
     back_x, back_y = x - 8 * dx, y - 8 * dy
     return (
-        f'<path class="head" d="M{_n(x)} {_n(y)}L{_n(back_x - 3.6 * dy)} {_n(back_y + 3.6 * dx)}'
-        f'L{_n(back_x + 3.6 * dy)} {_n(back_y - 3.6 * dx)}z"/>'
+        f'<path class="head" d="M{px(x)} {px(y)}L{px(back_x - 3.6 * dy)} {px(back_y + 3.6 * dx)}'
+        f'L{px(back_x + 3.6 * dy)} {px(back_y - 3.6 * dx)}z"/>'
     )
 
 
 def _end(x: float, y: float, *, permissive: bool) -> str:
     """The end of a gate at the transition: a black dot or a hollow circle."""
     css, radius = ("dot", "3.2") if permissive else ("hollow", "3.6")
-    return f'<circle class="{css}" cx="{_n(x)}" cy="{_n(y)}" r="{radius}"/>'
-
-
-def _id(kind: str, *names: str) -> str:
-    """The attribute by which a part of the net is found; what XML forbids in names is percent-encoded."""
-    return f'id="{":".join((kind, *(quote(name) for name in names)))}"'
-
-
-def _n(value: float) -> str:
-    """A number to a tenth of a pixel, as short as can be."""
-    return f"{round(value, 1) + 0.0:g}"
-
-
-def _x(text: str) -> str:
-    """Text for XML, without the control characters that XML forbids."""
-    return escape("".join(c if c.isprintable() or c == "\n" else "�" for c in text))
+    return f'<circle class="{css}" cx="{px(x)}" cy="{px(y)}" r="{radius}"/>'
