@@ -61,7 +61,8 @@ def _needs(step: Step) -> list[tuple[str, bool]]:
 
 def _then(step: Step, text: str) -> str:
     moved = {**dict.fromkeys(step.takes, "false"), **dict.fromkeys(step.puts, "true")}
-    return f"(let ({' '.join(sorted(f'(|{spelled(p)}| {value})' for p, value in moved.items()))}) {text})"
+    changes = " ".join(sorted(f"(|{spelled(p)}| {value})" for p, value in moved.items()))
+    return f"(let ({changes}) {text})" if changes else text
 
 
 def _eq1(t: Transition) -> list[tuple[str, bool]]:

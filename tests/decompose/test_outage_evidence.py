@@ -324,6 +324,13 @@ def test_what_ties_the_nets_that_are_left_to_the_protocol_is_proved_and_both_tex
         assert OutageObligations(Voting(Cut(net), faults=True)).text == proof.text
 
 
+def test_both_texts_state_what_a_step_without_arcs_changes() -> None:
+    net = replace(gated(), transitions=(*gated().transitions, Transition("idle", permissive=("a.up",))))
+    proof = prove_of_the_dead(split(net), TIMEOUT_MS)
+    assert proof.open_ == ()
+    assert OutageObligations(Voting(Cut(net), faults=True)).text == proof.text
+
+
 def unsound(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Make the net that is left say more than it may."""
     if how == "undisturbed: nothing is held up":
