@@ -90,6 +90,8 @@ class Channel:
         """Whether the device has shown the number of the newest order."""
         self.is_withdrawn = False
         """Whether the newest order is not to be written again, should its connection fail before the device has it."""
+        self.failed_before: int | None = None
+        """The number that was shown as failed when a restart asked, as long as it is: somebody was asked what to do."""
 
     @property
     def is_writing(self) -> bool:
@@ -159,10 +161,14 @@ class Channel:
         number = self.shown[key] = as_number(value)
         if self.current is not None and number == self.current.number:
             self.is_taken |= self.phase in {_Phase.WRITING, _Phase.WRITTEN}
+        if key == "failed" and number != self.failed_before:
+            self.failed_before = None
         if number is None:
             return ()
         has = self._has(number)
-        if key == "taken" or (order := self.outstanding.pop(number, None)) is None:
+        if key == "taken" or (key == "failed" and number == self.failed_before):
+            return has
+        if (order := self.outstanding.pop(number, None)) is None:
             return has
         return (*has, Outcome(order, Said.DONE if key == "done" else Said.FAILED))
 
@@ -208,6 +214,7 @@ class Channel:
             return Answer.DONE
         self.expect(place, entry)
         if self.shown.get("failed") == number:
+            self.failed_before = number
             return Answer.UNKNOWN
         if number in self.shown.values():
             if place not in self.answered:

@@ -188,6 +188,8 @@ def test_command_that_a_device_has_had_since_before_a_restart_is_not_told_as_tak
     one = channel("a", taken=True)
     one.shows("failed", one.number("a", 3))
     assert one.answer("a", 3, stopped=False) is Answer.UNKNOWN  # a person is asked, and no poll may answer instead
+    assert one.shows("failed", one.number("a", 3)) == ()  # nor end what that person resumes
+    one.shows("failed", 0)
     assert one.shows("failed", one.number("a", 3)) == (Outcome(Order("a", 3, one.number("a", 3), ""), Said.FAILED),)
 
 
