@@ -65,20 +65,37 @@ class Level:
 
 
 @dataclass(frozen=True, slots=True)
+class Moment:
+    """What one event of the trace did; stays are told by their index in `Course.stays`."""
+
+    at_seconds: float
+    fired: tuple[Firing, ...] = ()
+    left: tuple[int, ...] = ()
+    entered: tuple[int, ...] = ()
+    sent: tuple[int, ...] = ()
+    done: tuple[int, ...] = ()
+    levels: tuple[Level, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Course:
     """All that happened in a run, in the order in which it took effect; stays in the order in which they began.
 
-    `end_seconds` is the time of the last line, and `complete` whether the run ended, rather than was cut off. `notes`
-    are those that are not of the voting protocol: faults, and what an operator did.
+    `moments` tell the same event by event, so that what happened in one instant keeps its order. `end_seconds` is
+    the time of the last line, `complete` whether the run ended, rather than was cut off, and `has_signals` whether the
+    trace records them. `notes` are those that are not of the voting protocol: faults, and what an operator did. `began`
+    is when, in seconds since 1970, or 0 where the trace does not say.
     """
 
     net: Net
     stays: tuple[Stay, ...]
     firings: tuple[Firing, ...]
     levels: tuple[Level, ...]
+    moments: tuple[Moment, ...]
     notes: tuple[Noted, ...]
     end_seconds: float
     complete: bool
+    has_signals: bool
     began: float = 0.0
 
 
@@ -110,6 +127,7 @@ class _Player:
         self.counts: dict[str, int] = {}
         self.firings: list[Firing] = []
         self.levels: list[Level] = []
+        self.moments: list[Moment] = []
         self.notes: list[Noted] = []
         self.awaiting: dict[str, list[str]] = {}
         for place in net.places:
@@ -122,27 +140,35 @@ class _Player:
         before, levels = self.replayer.marking, dict(self.replayer.signals)
         self.replayer.take(event)
         now = event.at_seconds
+        fired: list[Firing] = []
+        left: list[int] = []
+        entered: list[int] = []
+        sent: list[int] = []
+        done: list[int] = []
         match event:
             case Fired():
-                self.firings += [Firing(now, name, self._next(f"transition {name}")) for name in event.transitions]
+                fired = [Firing(now, name, self._next(f"transition {name}")) for name in event.transitions]
                 after = self.replayer.marking
-                for name in self.net.names(before & ~after):
-                    k = self.open.pop(name)
+                left = [self.open.pop(name) for name in self.net.names(before & ~after)]
+                for k in left:
                     self.stays[k] = replace(self.stays[k], left_seconds=now)
-                for name in self.net.names(after & ~before):
-                    self._enter(name, now)
+                entered = [self._enter(name, now) for name in self.net.names(after & ~before)]
             case CommandSent():
-                k = self.open[event.place]
-                self.stays[k] = replace(self.stays[k], sent_seconds=now)
+                sent = [self.open[event.place]]
+                self.stays[sent[0]] = replace(self.stays[sent[0]], sent_seconds=now)
             case SignalChanged(_, signal, True):
-                for name in self.awaiting.get(signal, ()):
-                    if name in self.open and self.stays[k := self.open[name]].done_seconds is None:
-                        self.stays[k] = replace(self.stays[k], done_seconds=now)
+                waiting = [self.open[name] for name in self.awaiting.get(signal, ()) if name in self.open]
+                done = [k for k in waiting if self.stays[k].done_seconds is None]
+                for k in done:
+                    self.stays[k] = replace(self.stays[k], done_seconds=now)
             case Noted() if event.note not in _OF_THE_PROTOCOL:
                 self.notes.append(event)
-        for signal, value in self.replayer.signals.items():
-            if levels.get(signal, False) != value:
-                self.levels.append(Level(now, signal, value))
+        new = [Level(now, s, value) for s, value in self.replayer.signals.items() if levels.get(s, False) != value]
+        self.firings += fired
+        self.levels += new
+        self.moments.append(
+            Moment(now, tuple(fired), tuple(left), tuple(entered), tuple(sent), tuple(done), tuple(new))
+        )
 
     def course(self) -> Course:
         return Course(
@@ -150,9 +176,11 @@ class _Player:
             tuple(self.stays),
             tuple(self.firings),
             tuple(self.levels),
+            tuple(self.moments),
             tuple(self.notes),
             self.replayer.now_seconds,
             self.trace.end is not None,
+            self.trace.header.signals,
             self.trace.header.began,
         )
 
@@ -160,6 +188,7 @@ class _Player:
         self.counts[what] = self.counts.get(what, 0) + 1
         return self.counts[what]
 
-    def _enter(self, name: str, now: float) -> None:
+    def _enter(self, name: str, now: float) -> int:
         self.open[name] = len(self.stays)
         self.stays.append(Stay(self.net.place(name), self._next(f"place {name}"), now))
+        return self.open[name]

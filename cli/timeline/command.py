@@ -1,7 +1,11 @@
-"""`firable timeline`: what a run did from when to when, as a picture and for other tools."""
+"""`firable timeline`: what a run did from when to when, as a picture and for other tools.
+
+The extension of the file says which. What a format cannot carry is said, never dropped in silence.
+"""
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -18,11 +22,20 @@ if TYPE_CHECKING:
 STAYS_MAX: Final = 20_000
 """How many stays of tokens are drawn: a browser takes seconds to show more."""
 
+_WRITERS: Final = {".vcd": ("vcd", "vcd"), ".perfetto.json": ("perfetto", "perfetto"), ".xes": ("xes", "xes")}
+"""The formats for other tools: their modules in `firable.cli.timeline`, and what writes them there."""
+
 
 @click.command(short_help="Draw what the machines did in a run, from when to when.")
 @click.argument("traces", metavar="TRACE...", nargs=-1, required=True)
 @click.option("--net", "of", metavar="NET", required=True, help="The net, or the bundle, that the trace is of.")
-@click.option("-o", "--output", metavar="FILE", required=True, help="*.svg: a picture; - is standard output.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    required=True,
+    help="*.svg, *.vcd, *.perfetto.json or *.xes: the extension says which; - is an SVG on standard output.",
+)
 @click.option("--from", "since", type=click.FloatRange(min=0.0), metavar="SECONDS", help="Draw from this time on.")
 @click.option("--to", "until", type=click.FloatRange(min=0.0), metavar="SECONDS", help="Draw up to this time.")
 def timeline(traces: tuple[str, ...], of: str, output: str, since: float | None, until: float | None) -> int:
@@ -30,11 +43,28 @@ def timeline(traces: tuple[str, ...], of: str, output: str, since: float | None,
 
     A bar goes from a command to its completion, and is hatched while the machine then waits for others; ticks are
     transitions. Long runs are wrapped like lines of text. Where a cell ran on several hosts, name the traces of all.
+
+    The same course is written as VCD for waveform viewers, as JSON for Perfetto, and as XES for process mining; what a
+    format cannot carry is said.
     """
     from firable.cli.timeline.svg import draw_timeline
 
+    suffix = next((end for end in (*_WRITERS, ".svg") if output.lower().endswith(end)), "")
+    if not suffix and output != "-":
+        raise click.UsageError(
+            f"cannot tell the format of '{output}': name a file *.svg, *.vcd, *.perfetto.json or *.xes"
+        )
+    if suffix in _WRITERS and (since is not None or until is not None):
+        raise click.UsageError("--from and --to are of the picture: other formats carry the whole run")
     net = load_net(of).net
     done = _course(net, traces)
+    if suffix in _WRITERS:
+        module, function = _WRITERS[suffix]
+        writer = import_module(f"firable.cli.timeline.{module}")
+        write_text(output, getattr(writer, function)(done))
+        for lost in writer.NOT_CARRIED:
+            click.echo(f"note: not carried: {lost}", err=True)
+        return 0
     start, end = since or 0.0, done.end_seconds if until is None else until
     if start >= done.end_seconds > 0 or end <= start < done.end_seconds:
         raise click.UsageError(f"nothing is between {start:g} s and {end:g} s: the run ends at {done.end_seconds:g} s")

@@ -30,7 +30,7 @@ class Lane:
 
 def lanes(course: Course) -> tuple[Lane, ...]:
     """The lanes of a run."""
-    of = {place.name: _lane(place) for place in course.net.places if place.command is not None}
+    of = {place.name: lane_of(place) for place in course.net.places if place.command is not None}
     names = sorted(dict.fromkeys(of.values()), key=lambda lane: _rank(course.net, lane[0]))
     sent: dict[tuple[str, str], list[Stay]] = {name: [] for name in names}
     idle: dict[str, list[Stay]] = {}
@@ -46,6 +46,15 @@ def lanes(course: Course) -> tuple[Lane, ...]:
     )
 
 
+def participants(net: Net) -> dict[str, frozenset[str]]:
+    """The controllers that each transition is of: the owners of its places and signals."""
+    found = {}
+    for t in net.transitions:
+        owners = {net.place(name).owner or "" for name in (*t.inputs, *t.outputs, *t.permissive, *t.inhibitive)}
+        found[t.name] = frozenset(owners | {net.signal(gate.signal).owner or "" for gate in t.external})
+    return found
+
+
 def taking_part(net: Net, shown: Sequence[Lane]) -> dict[str, tuple[int, ...]]:
     """The lanes that each transition is of, by their numbers.
 
@@ -53,18 +62,21 @@ def taking_part(net: Net, shown: Sequence[Lane]) -> dict[str, tuple[int, ...]]:
     where it touches no command, and which machine it is about is not known.
     """
     found = {}
+    of = participants(net)
     for t in net.transitions:
         places = [net.place(name) for name in (*t.inputs, *t.outputs, *t.permissive, *t.inhibitive)]
-        owners = {place.owner or "" for place in places} | {net.signal(gate.signal).owner or "" for gate in t.external}
-        commanded = {_lane(place) for place in places if place.command is not None}
+        commanded = {lane_of(place) for place in places if place.command is not None}
         exact = {owner for owner, _ in commanded}
         found[t.name] = tuple(
-            i for i, lane in enumerate(shown) if (lane.owner, lane.machine) in commanded or lane.owner in owners - exact
+            i
+            for i, lane in enumerate(shown)
+            if (lane.owner, lane.machine) in commanded or lane.owner in of[t.name] - exact
         )
     return found
 
 
-def _lane(place: Place) -> tuple[str, str]:
+def lane_of(place: Place) -> tuple[str, str]:
+    """The controller and the machine of the command of a place."""
     return place.owner or "", place.command.machine if place.command is not None else ""
 
 
