@@ -1,8 +1,11 @@
 """Drawing a net in the field's conventions, as SVG text: no picture is stored, each is drawn from the net.
 
 `draw_net` is the way in. `rows` orders the transitions, `layout` gives everything its place, `svg` writes it down.
+`draw_markings` draws a `MarkingGraph` of markings and `Step`s, placed by `layered` or another layouter.
 """
 
+from firable.nets.drawing.layered import layered
+from firable.nets.drawing.marking_graph import MarkingGraph, Step, draw_markings
 from firable.nets.drawing.svg import draw_net
 
-__all__ = ["draw_net"]
+__all__ = ["MarkingGraph", "Step", "draw_markings", "draw_net", "layered"]

@@ -30,7 +30,7 @@ from firable.nets.drawing.shapes import (
     Stub,
 )
 from firable.nets.drawing.text import COMMAND, NAME, NOTE, width_of
-from firable.nets.drawing.xml import esc, ident, px
+from firable.nets.drawing.xml import esc, head, ident, px
 from firable.nets.net import Marking, Net
 
 _TINTS: Final = ("#eef3fb", "#eef8f1", "#fdf4e7", "#f6effa", "#e9f6f8", "#fbeff0", "#f4f5ea", "#f1f1f5")
@@ -194,12 +194,12 @@ class _Writer:
         spot, bar = self.where.places[edge.place], self.where.bars[edge.transition]
         sign = -1.0 if bar.y < spot.y else 1.0
         if edge.kind is Kind.INPUT:
-            yield _head(edge.x, bar.y - sign * (BAR_HALF_HEIGHT + 0.5), 0, sign)
+            yield head(edge.x, bar.y - sign * (BAR_HALF_HEIGHT + 0.5), 0, sign)
         elif edge.kind is Kind.OUTPUT:
             if edge.bypass:
-                yield _head(spot.x - RADIUS * 0.85, spot.y + sign * RADIUS * 0.53, 0.85, -sign * 0.53)
+                yield head(spot.x - RADIUS * 0.85, spot.y + sign * RADIUS * 0.53, 0.85, -sign * 0.53)
             else:
-                yield _head(spot.x, spot.y + sign * RADIUS, 0, -sign)
+                yield head(spot.x, spot.y + sign * RADIUS, 0, -sign)
 
     def _gate_end(self, edge: Edge) -> Iterator[str]:
         if edge.kind in {Kind.INPUT, Kind.OUTPUT}:
@@ -339,15 +339,6 @@ def _send(spot: Spot, y: float) -> Iterator[str]:
     end = spot.x + LABEL_LEFT + 9
     yield f'<path class="send" d="M{px(x)} {px(y)}H{px(end - 5)}"/>'
     yield f'<path class="sendhead" d="M{px(end)} {px(y)}l-6 -2.8v5.6z"/>'
-
-
-def _head(x: float, y: float, dx: float, dy: float) -> str:
-    """An arrowhead whose tip is at (x, y), pointing in the direction (dx, dy) of length one."""
-    back_x, back_y = x - 8 * dx, y - 8 * dy
-    return (
-        f'<path class="head" d="M{px(x)} {px(y)}L{px(back_x - 3.6 * dy)} {px(back_y + 3.6 * dx)}'
-        f'L{px(back_x + 3.6 * dy)} {px(back_y - 3.6 * dx)}z"/>'
-    )
 
 
 def _end(x: float, y: float, *, permissive: bool) -> str:

@@ -23,3 +23,12 @@ def px(value: float) -> str:
 def esc(text: str) -> str:
     """Text for XML, without the control characters that XML forbids."""
     return escape("".join(c if c.isprintable() or c == "\n" else "�" for c in text))
+
+
+def head(x: float, y: float, dx: float, dy: float, css: str = "head") -> str:
+    """An arrowhead whose tip is at (x, y), pointing in the direction (dx, dy) of length one."""
+    back_x, back_y = x - 8 * dx, y - 8 * dy
+    return (
+        f'<path class="{css}" d="M{px(x)} {px(y)}L{px(back_x - 3.6 * dy)} {px(back_y + 3.6 * dx)}'
+        f'L{px(back_x + 3.6 * dy)} {px(back_y - 3.6 * dx)}z"/>'
+    )

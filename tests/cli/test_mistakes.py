@@ -126,6 +126,8 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
         (["view", "catalogue:machines-5000"], "20,000 places and transitions make no picture"),
         (["draw", "catalogue:one_robot", "--marking", "robot.fre"], "no place 'robot.fre'"),
         (["draw", "catalogue:one_robot", "--marking", "robot.free", "--trace", "x"], "leave one out"),
+        (["draw", "catalogue:one_robot", "--layout", "dot"], "are of the graph: add --what graph"),
+        (["draw", "catalogue:one_robot", "--what", "graph", "--marking", "robot.free"], "leave out --what graph"),
         (["refine", "catalogue:conceptual_one_robot", "-o", "-"], "cannot go to standard output"),
         (["convert", "catalogue:one_robot", "-o", "net.docx"], "cannot tell the format"),
         (["schema", "everything"], "is not one of"),
