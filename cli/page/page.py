@@ -11,6 +11,7 @@ from typing import Final
 
 from firable.cli.page.markup import Markup, raw, tag, together
 from firable.cli.page.pieces import TONES, classes
+from firable.cli.page.protocol import wrong_told
 from firable.cli.page.sections import refuted, sections
 from firable.cli.page.style import STYLE
 from firable.cli.report import Report
@@ -59,6 +60,7 @@ def _masthead(report: Report) -> Markup:
     net = report.net
     sizes = [(len(net.places), "place"), (len(net.transitions), "transition"), (len(net.controllers), "controller")]
     counts = [tag("li", tag("b", f"{n:,}"), f" {word}") for n, word in _counts_of(report.verdicts)]
+    counts += [tag("li", told)] if (told := wrong_told(report)) else []
     return tag(
         "header",
         tag(

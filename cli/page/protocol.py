@@ -13,7 +13,7 @@ from firable.cli.page.markup import Content, Markup, tag, together
 from firable.cli.page.pieces import classes, names, table
 from firable.cli.page.swimlanes import swimlanes
 from firable.cli.report import Report
-from firable.nets.verdict import Verdict
+from firable.nets.verdict import Status, Verdict
 
 if TYPE_CHECKING:
     from firable.decompose.protocol.refuting import Refutation
@@ -63,6 +63,18 @@ def lives_on(report: Report) -> Markup | None:
         "here, the cell lives on the obligation that it leaves out."
     )
     return together(tag("p", lead, cls="lead"), *map(_refutation, report.refutations))
+
+
+def wrong_told(report: Report) -> str:
+    """What the verdict on the whole is about where wrong protocols were tried: the one that runs, none of these."""
+    some = report.refutations
+    if not some:
+        return ""
+    refuted = sum(one.status is Status.VIOLATED for one in some)
+    return (
+        f"this is of the protocol that runs; of the {len(some)} known to be wrong, {refuted} go wrong on this net, as "
+        "they must where it needs what they leave out"
+    )
 
 
 def _refutation(refutation: Refutation) -> Markup:

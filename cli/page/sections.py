@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from firable.cli.page.listed import family_line, listed
 from firable.cli.page.markup import Content, Markup, raw, tag, together
 from firable.cli.page.pieces import ROWS_MAX, badge, classes, names, status_badge, table
 from firable.cli.page.protocol import is_of_protocol, lives_on, while_dead
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from firable.decompose.proofs.family import Family
     from firable.nets.net import Net
 
-LISTED_MAX: Final = 300
-"""How many verdicts of one family are listed; of more, those that are not proved come first."""
 COUNTEREXAMPLES_MAX: Final = 24
 _DRAWN_TRANSITIONS_MAX: Final = 80
 _COLUMNS_MAX: Final = 9
@@ -73,7 +72,7 @@ def _obligations(report: Report) -> Markup | None:
     rows = []
     for family in _families(report):
         if some := proved_of(family, report.verdicts):
-            rows.append(_family(family.title, family.says, some))
+            rows.append(family_line(family.title, family.says, some))
     if not rows:
         return None
     lead = "Each obligation compares the central net with its parts, and a solver finds no case in which they differ."
@@ -85,29 +84,6 @@ def _families(report: Report) -> Sequence[Family]:
     from firable.decompose.proofs.families import REPORTED
 
     return REPORTED if report.decomposition is not None else ()
-
-
-def _family(title: str, says: str, some: Sequence[Verdict]) -> Markup:
-    proved = sum(verdict.holds for verdict in some)
-    # A line for each, those that are not proved first: whoever opens it looks for them.
-    ordered = sorted(some, key=lambda verdict: verdict.holds)
-    share = f"width:{100 * proved // len(some)}%"
-    bar = tag("i", tag("b", style=share), aria_hidden="true")
-    line = tag(
-        "span",
-        tag("b", title),
-        tag("span", bar, f"{proved:,} of {len(some):,}", cls="share"),
-        tag("span", says, cls="says"),
-        cls="family",
-    )
-    more = len(some) - LISTED_MAX
-    rest = (
-        tag("p", f"and {more:,} more, all {'proved' if ordered[LISTED_MAX].holds else 'like these'}")
-        if more > 0
-        else None
-    )
-    inside = tag("div", *map(_verdict, ordered[:LISTED_MAX]), rest, cls="inside")
-    return tag("details", tag("summary", line), inside, open=proved < len(some))
 
 
 def _assumptions(report: Report) -> Markup | None:
@@ -134,28 +110,6 @@ def _assumptions(report: Report) -> Markup | None:
 # --- Verdicts
 
 
-def _verdict(verdict: Verdict) -> Markup:
-    cost = [counted(n, word) for n, word in ((verdict.cost.markings, "marking"), (verdict.cost.edges, "edge")) if n]
-    how = ", ".join(["by " + verdict.method, *cost])
-    about = verdict.subjects if verdict.status is not Status.PROVED else ()
-    listed = ", ".join(about[:40]) + (f" and {len(about) - 40:,} more" if len(about) > 40 else "")
-    code = f"[{verdict.code}] " if verdict.code else ""
-    return tag(
-        "div",
-        tag("div", badge(verdict)),
-        tag(
-            "div",
-            tag("p", verdict.statement, cls="what"),
-            tag("p", f"{verdict.name}; {how}", cls="code"),
-            tag("p", "about: ", listed) if listed else None,
-            tag("p", "reached: ", verdict.bound) if verdict.bound and verdict.status is Status.UNKNOWN else None,
-            tag("p", code, verdict.hint, cls="hint") if verdict.hint and not verdict.holds else None,
-            tag("p", "evidence: ", ", ".join(verdict.evidence), cls="code") if verdict.evidence else None,
-        ),
-        cls="verdict",
-    )
-
-
 def _others(report: Report) -> Markup | None:
     """The verdicts that no section above shows."""
     shown = _shown_above(report)
@@ -165,9 +119,7 @@ def _others(report: Report) -> Markup | None:
         some = [verdict for verdict in rest if verdict.weight is weight]
         if some:
             parts.append(tag("h3", title))
-            parts += map(_verdict, some[:LISTED_MAX])
-            if len(some) > LISTED_MAX:
-                parts.append(tag("p", f"and {len(some) - LISTED_MAX:,} more", cls="soft"))
+            parts.append(listed(some))
     return together(*parts) if parts else None
 
 
@@ -285,20 +237,28 @@ def _picture(report: Report) -> Markup | None:
 
 
 def _coordinator_table(report: Report) -> Markup | None:
+    from firable.nets.layers import Layers
+
     if not report.table:
         return None
     controllers = [c.name for c in report.net.controllers]
     apart = len(controllers) <= _COLUMNS_MAX
     reasons = dict(_reasons(report.decomposition))
+    top, layered = Layers(report.net).root, any(row.at for row in report.table)
     rows: list[Sequence[Content]] = []
     for row in report.table[:ROWS_MAX]:
         parts = {part.controller: part.name for part in row.parts}
-        cells = [tag("span", parts[name], cls="code") if name in parts else "" for name in controllers] if apart else []
+        cells = (
+            [tag("span", parts[name], cls="part-name") if name in parts else "" for name in controllers]
+            if apart
+            else []
+        )
         if not apart:
             cells = [names(f"{name} at {controller}" for controller, name in parts.items())]
-        rows.append((row.name, row.description, *cells, reasons.get(row.name, "")))
+        decided = [row.at or top] if layered else []
+        rows.append((row.name, row.description, *cells, *decided, reasons.get(row.name, "")))
     lead = f"{_globals(report)}: each fires when every controller that has a part in it has voted yes."
-    heads = ("", "transition", *(controllers if apart else ["parts"]), "global because of")
+    heads = ("", "transition", *(controllers if apart else ["parts"]), *["decided by"] * layered, "global because of")
     return together(
         tag("p", lead, cls="lead"), table(heads, rows, caption="Coordinator table", count=len(report.table))
     )

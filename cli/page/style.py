@@ -51,9 +51,9 @@ th:first-child{padding-left:.1rem}
 .strip td>.fact{font-size:.83rem;padding-left:1.1em;text-indent:-1.1em}
 .fact>span{font-size:.8em}
 .wide{overflow-x:auto;margin:0 -.3rem;padding:0 .3rem}
-.code,.part,.comes,.leaves,.held,.sends{font-family:ui-monospace,Menlo,Consolas,'DejaVu Sans Mono',monospace;
+.code,.part-name,.part,.comes,.leaves,.held,.sends{font-family:ui-monospace,Menlo,Consolas,'DejaVu Sans Mono',monospace;
 font-size:.83rem}
-.code{overflow-wrap:anywhere}
+.code{overflow-wrap:anywhere}.part-name{white-space:nowrap}
 .soft,.says{color:var(--soft)}
 .fit{width:1%;white-space:nowrap}
 .badge{display:inline-block;border-radius:99px;padding:.08rem .65rem;font-size:.83rem;font-weight:600;
@@ -89,7 +89,8 @@ border-bottom:1px solid var(--line)}
 .strip th b,.strip th .says{display:block;overflow-wrap:anywhere}
 .strip thead th:first-child{position:sticky;left:0;background:var(--paper)}
 .strip td:last-child{min-width:11rem}
-.lanes th[scope=row]{min-width:2.6rem;width:2.6rem}.lanes{table-layout:fixed}
+.lanes th[scope=row]{min-width:5rem;width:5rem;white-space:nowrap}
+.lanes thead th:first-child{width:5rem}.lanes{table-layout:fixed}
 .lanes td>span{margin-bottom:.15rem}
 details.head{margin:.6rem 0}details.head>summary{color:var(--soft)}
 .strip td{min-width:8.2rem;border-left:1px solid var(--line)}

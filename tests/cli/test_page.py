@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 from firable.cli.main import main
+from firable.cli.page.listed import LISTED_MAX
 from firable.cli.page.markup import Markup, raw, tag, together
 from firable.cli.page.page import page_of
 from firable.cli.page.runs import STEPS_SHOWN_MAX, strip
-from firable.cli.page.sections import LISTED_MAX, SECTIONS
+from firable.cli.page.sections import SECTIONS
 from firable.cli.report import Report
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.net import Controller, Net, Place, Transition
@@ -297,3 +298,36 @@ def test_the_page_of_a_split_tells_first_who_decides_what(tmp_path: Path) -> Non
     ids = [attributes["id"] for name, attributes in page.tags if name == "section"]
     assert ids == ["table", "groups", "verdicts", "controllers", "counterexamples", "cell"]
     assert "by the order of the file system" in page.words, "as the terminal says it"
+
+
+def page_written(tmp_path: Path, *command: str) -> Reading:
+    path = tmp_path / "page.html"
+    assert main([*command, "--report", str(path)]) == 0
+    return Reading(path.read_text("utf-8"))
+
+
+def test_the_page_of_a_layered_net_says_of_each_row_who_decides_it(tmp_path: Path) -> None:
+    words = page_written(tmp_path, "split", "catalogue:two_cells").words
+    assert "t1-11 t2-12 t3-13 t4-14 line its arcs" in words
+    assert "t2-32 t3-33 t4-34 cell_a its arcs" in words
+
+
+def test_verdicts_that_are_alike_are_one_line_that_unfolds(tmp_path: Path) -> None:
+    votes = page_written(tmp_path, "split", "catalogue:one_robot").words
+    assert "persistent 22 of 24 votes of which no other transition takes the yes back" in votes
+    tasks = page_written(tmp_path, "refine", "catalogue:conceptual_one_robot").words
+    assert "load 4 of 4 ends, ends-clean, contact-free, complete" in tasks
+    assert "opens 5 of 5" in tasks
+
+
+def test_the_head_says_that_the_protocol_that_runs_holds_and_wrong_ones_do_not(tmp_path: Path) -> None:
+    path = tmp_path / "n.firable.yaml"
+    path.write_text(
+        "firable: 1\ncell: n\ncontrollers:\n  a: {start: [p], places: {p: {}, q: {}}}\n"
+        "  b: {start: [r], places: {r: {}, s: {}}}\n"
+        "transitions:\n  g: {from: [a.p, b.r], to: [a.q, b.s]}\n  back: {from: [a.q, b.s], to: [a.p, b.r]}\n"
+    )
+    words = page_written(tmp_path, "prove", str(path), "--wrong").words
+    assert re.search(
+        r"all hold \d+ proved this is of the protocol that runs; of the \d+ known to be wrong, \d+ go wrong", words
+    )
