@@ -62,8 +62,11 @@ class Options(BaseModel):
 def files_of(options: BaseModel) -> Iterator[tuple[tuple[str, ...], Beside]]:
     """The files that options name, with the keys that name them.
 
-    >>> class Tls(Options): ...     ca: File >>> [(keys, str(file)) for keys, file in
-    files_of(Tls.model_validate({"ca": "a.pem"}, context={"folder": Path("d")}))] [(('ca',), 'd/a.pem')]
+    >>> class Tls(Options):
+    ...     ca: File
+    >>> tls = Tls.model_validate({"ca": "a.pem"}, context={"folder": Path("d")})
+    >>> [(keys, str(file)) for keys, file in files_of(tls)]
+    [(('ca',), 'd/a.pem')]
     """
     for name in type(options).model_fields:
         value = getattr(options, name)
