@@ -206,6 +206,9 @@ class World:
             return
         torn = 0.05 * self.faults["torn"]
         for i, effect in enumerate(leaving):
+            if process.machine is None:  # its disk has failed at what came before, which a machine had taken
+                self._happened(leaving[i:])
+                return
             if torn and self.draw.random() < torn:
                 self.note("killed between commit and sending", process.name)
                 self._happened(leaving[i:])

@@ -151,6 +151,13 @@ def test_a_coordinator_that_restarts_after_its_word_may_forget_what_was_acknowle
     assert not isinstance(rehearse(Subject(freed(split(DRAWN[family](run.seed // 10)))), run), Failed)
 
 
+def test_what_a_process_still_had_to_say_when_its_disk_failed_is_not_said() -> None:
+    """It was said by the dead, and what its driver kept then was there after the restart."""
+    kinds = ("loss", "reordering", "crash", "torn", "disk", "drift", "slow", "queued", "forgetful", "pause", "step")
+    run = Run(1010336, kinds, 2700)
+    assert not isinstance(rehearse(Subject(freed(split(DRAWN["drawn-timed"](run.seed // 10)))), run), Failed)
+
+
 WRONG: list[tuple[Machines, tuple[str, ...]]] = [
     (Machines(coordinator=planted.DismissesAtOnce), ("leave", "delay", "reordering")),
     (Machines(controller=planted.EndsWithoutAsking), ("leave", "delay")),
