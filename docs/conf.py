@@ -8,7 +8,7 @@ from firable import __version__
 sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
 
 project = "firable"
-author = "the founding engineers of firable"
+author = "the authors of firable"
 copyright = author  # noqa: A001 - the name that Sphinx reads
 version = release = __version__
 
