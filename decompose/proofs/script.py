@@ -59,21 +59,32 @@ def block(name: str, statement: str, assertions: tuple[Term, ...]) -> str:
 
 
 class Reader:
-    """z3, reading a file from its beginning, up to its first block; `timeout_ms` is for each answer."""
+    """z3, reading a file from its beginning, up to its first block; `timeout_ms` is for each answer.
+
+    Time may end in the midst of any command, a `push` or a `pop` too. What the context holds then is not what the file
+    says, so nothing more is believed of it: the block is unknown, and a new context reads the beginning again.
+    """
 
     def __init__(self, timeout_ms: int, beginning: str = f"{LOGIC}\n") -> None:
-        self._context = z3.Context()
-        said = self._read(f"(set-option :timeout {timeout_ms})\n(set-option :smt.random_seed {SEED})\n{beginning}")
-        if said:
-            raise ScriptError(f"z3 said {said} to\n{beginning}")
+        self._beginning = f"(set-option :smt.random_seed {SEED})\n{beginning}\n(set-option :timeout {timeout_ms})\n"
+        self._context = self._begun()
 
-    def _read(self, text: str) -> list[str]:
-        said: str = z3.Z3_eval_smtlib2_string(self._context.ref(), text)
-        return said.splitlines()
+    def _begun(self) -> z3.Context:
+        context = z3.Context()
+        if said := z3.Z3_eval_smtlib2_string(context.ref(), self._beginning):
+            raise ScriptError(f"z3 said {said} to\n{self._beginning}")
+        return context
 
     def answer(self, text: str) -> Answer:
         """The answer to a block."""
-        said = self._read(text)
-        if len(said) != 2 or said[1] not in set(Answer):
+        try:
+            told: str = z3.Z3_eval_smtlib2_string(self._context.ref(), text)
+        except z3.Z3Exception as error:
+            told = str(error)
+        said = told.splitlines()
+        if len(said) == 2 and said[1] in set(Answer):
+            return Answer(said[1])
+        if "canceled" not in told:
             raise ScriptError(f"z3 said {said} to\n{text}")
-        return Answer(said[1])
+        self._context = self._begun()
+        return Answer.UNKNOWN

@@ -6,6 +6,7 @@ from itertools import combinations, product
 from typing import Any
 
 import pytest
+import z3
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
@@ -23,7 +24,7 @@ from firable.decompose.proofs.arbitration import Competition, Steps, arbitration
 from firable.decompose.proofs.families import FAMILIES
 from firable.decompose.proofs.family import Task
 from firable.decompose.proofs.proving import ProofReport, prove
-from firable.decompose.proofs.script import Reader, ScriptError
+from firable.decompose.proofs.script import Reader, ScriptError, block
 from firable.decompose.proofs.standing import ASSUMED_BY_THE_PROTOCOL, standing
 from firable.decompose.protocol.parametric.side_conditions import side_conditions
 from firable.decompose.splitting.cut import split
@@ -338,6 +339,33 @@ def test_no_model_in_time_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_z3_does_not_answer_is_no_proof() -> None:
     with pytest.raises(ScriptError):
         Reader(1000).answer('(echo "a")\n(echo "unsat")\n(assert false)\n(check-sat)\n')
+
+
+@pytest.mark.parametrize("ended", [z3.Z3Exception('(error "line 6 column 7: push canceled")\nb\nunsat'), "b\nunsat"])
+def test_nothing_is_believed_of_z3_once_time_ended_within_a_command(
+    monkeypatch: pytest.MonkeyPatch, ended: z3.Z3Exception | str
+) -> None:
+    reader = Reader(1000, "(set-logic QF_UF)\n(declare-const p Bool)\n")
+    read = z3.Z3_eval_smtlib2_string
+
+    def out_of_time(context: object, text: str) -> str:
+        if isinstance(ended, str):
+            return f'(error "line 7 column 6: pop canceled")\n{ended}\n'
+        read(context, "(assert (and p (not p)))")  # what a block that was not taken back leaves
+        raise ended
+
+    with monkeypatch.context() as patched:
+        patched.setattr(
+            z3, "Z3_eval_smtlib2_string", lambda context, text: _once(patched, read, out_of_time, context, text)
+        )
+        assert reader.answer(block("b", "so", ())) is Answer.UNKNOWN
+    assert reader.answer('(push 1)\n(echo "c")\n(assert p)\n(check-sat)\n(pop 1)\n') is Answer.SAT
+
+
+def _once(patched: pytest.MonkeyPatch, read: Any, first: Any, context: object, text: str) -> str:
+    """What the first call answers; z3 answers the others."""
+    patched.setattr(z3, "Z3_eval_smtlib2_string", read)
+    return str(first(context, text))
 
 
 # --------------------------------------------------------------------------------------------------------------------
