@@ -3,6 +3,7 @@
 import json
 import xml.etree.ElementTree as ET
 from collections import Counter
+from collections.abc import Iterator
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
@@ -68,6 +69,29 @@ def test_vcd_read_back_tells_how_long_each_token_stayed(folder: Path, run: Cours
     assert (told - stays).total() == initial
     fired = Counter(name.rpartition(".")[2] for _, name, _ in changes if ".transitions." in name)
     assert fired == Counter(firing.transition for firing in run.firings)
+    last = {(name, at): value for at, name, value in changes if ".machines." in name}  # of one instant, as viewers do
+    told_work = [(name, at, value) for (name, at), value in last.items() if at and value != _before(last, name, at)]
+    assert sorted(told_work) == sorted((name, at, value) for at, name, value in _at_work(run))
+    assert all(value == 0 for (_, at), value in last.items() if at == 0)
+
+
+def _before(last: dict[tuple[str, int], int], name: str, at: int) -> int:
+    """The value of a wire before an instant."""
+    return last[max(of for of in last if of[0] == name and of[1] < at)]
+
+
+def _at_work(run: Course) -> Iterator[tuple[int, str, int]]:
+    """When each machine begins to work and ceases, by its commands: one that follows at once leaves it at work."""
+    spans: dict[str, list[tuple[int, int]]] = {}
+    for stay in run.stays:
+        if stay.sent_seconds is not None and stay.done_seconds is not None and stay.place.command is not None:
+            name = f"one-robot.{stay.place.owner}.machines.{stay.place.command.machine}"
+            spans.setdefault(name, []).append((round(stay.sent_seconds * 1e9), round(stay.done_seconds * 1e9)))
+    for name, those in spans.items():
+        those.sort()
+        begins, ends = {start for start, _ in those}, {end for _, end in those}
+        yield from ((at, name, 1) for at in begins - ends)
+        yield from ((at, name, 0) for at in ends - begins)
 
 
 def test_perfetto_read_back_tells_each_command_and_nests_what_is_on_a_thread(folder: Path, run: Course) -> None:
@@ -106,7 +130,13 @@ def test_xes_read_back_tells_each_command_once_and_its_cases_are_cycles(folder: 
             times.append(datetime.fromisoformat(said["time:timestamp"]))
             started[said["concept:name"]] += said["lifecycle:transition"] == "start"
         assert times == sorted(times)
+    cases = Counter(_name(case).rpartition(" ")[0] for case in log.iter(f"{XES}trace"))
+    assert (cases["robot"], cases["mc"]) == (10, 5)  # of five workpieces, each loaded and unloaded, and machined once
     assert +started == Counter(stay.place.name for stay in run.stays if stay.sent_seconds is not None)
+
+
+def _name(case: ET.Element) -> str:
+    return next(part.attrib["value"] for part in case if part.attrib["key"] == "concept:name")
 
 
 def test_what_a_format_cannot_carry_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
