@@ -26,7 +26,6 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
 from typing import Final, assert_never
 
 from firable.executor.journal.journal import Journal, Storing
@@ -34,6 +33,7 @@ from firable.executor.journal.outbox import Outbox
 from firable.executor.links.link import called
 from firable.executor.operating.clock import RunClock
 from firable.executor.operating.figures import Figures
+from firable.executor.operating.items import CommandTaken, Item, SignalRead
 from firable.executor.operating.recorder import TRACE, Recorder
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
@@ -61,27 +61,6 @@ ACTS_AT_ONCE_MAX: Final = 250
 """So many acts are one group at most; then they become durable, and the driver, the link and the operator are heard."""
 AHEAD_MAX: Final = 10_000
 """So much may wait for a sync, things that leave and lines of the trace; then nothing is done before it is over."""
-
-
-@dataclass(frozen=True, slots=True)
-class SignalRead:
-    """A driver's word to a controller: a new value of one of its signals."""
-
-    signal: str
-    value: bool
-    entry: int | None
-
-
-@dataclass(frozen=True, slots=True)
-class CommandTaken:
-    """A driver's word to a controller: the machine has the command of one of its places."""
-
-    place: str
-    entry: int
-
-
-Item = Message | SignalRead | CommandTaken | None
-"""What a machine is given; None is a controller's turn to fire."""
 
 
 class Acts:

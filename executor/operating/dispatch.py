@@ -14,7 +14,7 @@ import asyncio
 from typing import TYPE_CHECKING
 
 from firable.executor.drivers.driver import withdraw
-from firable.executor.operating.acts import CommandTaken
+from firable.executor.operating.items import CommandTaken
 from firable.nets.net import Place
 
 if TYPE_CHECKING:

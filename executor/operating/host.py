@@ -2,22 +2,14 @@
 
 A run of a whole cell is a host with all machines and no link; a controller beside its machine is a host with one. What
 they do is the same: acts in groups (`acts.py`), which become durable before anything of them leaves (`groups.py`). This
-file is who may halt that, and how it ends.
+file is who may halt that, and what carries it.
 
 When nothing is posted any more the host is *quiescent*: that is when markings are shown (O7), situations are judged and
 an operator's step is over.
 
 *Operator*, on each host, for what is on it. *Pause*: no further firing; rounds that are not decided are aborted, and
 nothing more is promised to coordinators elsewhere; machines end the command they are at. *Step*: while paused, one
-firing. *Stop*: no further firing, ever, and no command; the controllers take their votes back, and the host waits, for
-a while, until what was decided is applied and acknowledged, and each coordinator that can be reached has said that no
-order is open, so that hosts may be stopped in any order; then the driver drives the safe outputs, which stop every
-machine where it is. Where all machines are here it takes no time. *Stop at the end of the cycle*: no new work comes
-in, and the run ends when the cell is at rest; a host among others takes its votes back when it is at rest, and goes on
-if an order comes before the word that none is open. *Emergency stop*: the safe outputs first, before anything is
-written or said, and whatever has become of coordinator and link; what was decided is applied all the same, so that
-nobody waits for it, and its commands are asked after at the restart. A *fault* of the driver, or a command that is
-overdue, does the same by itself.
+firing. The ways to stop are in `stopping.py`.
 
 A whole run ends by itself, too: when its work is done, or nothing can go on. A host among others does not: its machines
 rest because others work. Its trace has a last line only where nothing was open.
@@ -36,12 +28,13 @@ from typing import Final
 from firable.executor.drivers.driver import Driver
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.link import Link
-from firable.executor.operating import ending, restart
-from firable.executor.operating.acts import Acts, SignalRead
+from firable.executor.operating import ending, restart, stopping
+from firable.executor.operating.acts import Acts
 from firable.executor.operating.clock import RunClock
 from firable.executor.operating.dispatch import Dispatch
 from firable.executor.operating.figures import Figures
 from firable.executor.operating.groups import Groups
+from firable.executor.operating.items import SignalRead
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence, Monitor
@@ -55,9 +48,6 @@ from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Keep, Message, Sending
 from firable.nets.decomposition import Decomposition
-
-SETTLE_SECONDS: Final = 2.0
-"""So long a stop waits for what is open at the most."""
 
 _END: Final = "end"
 """Under which the journal keeps, beside the trace, that all the work of the run was done."""
@@ -229,7 +219,7 @@ class Host:
         if not self.paused:
             if self.acts.is_leaving:
                 self.acts.stay()
-            self._halt("paused")
+            stopping.halt(self, "paused")
 
     def resume(self) -> bool:
         """Let transitions fire again after a pause, or after a restart once nothing about it is uncertain.
@@ -252,23 +242,11 @@ class Host:
 
     def stop(self, *, at_end_of_cycle: bool = False) -> None:
         """End the run: now, with every machine stopped where it is, or when the work in the cell is done."""
-        if at_end_of_cycle:
-            self.draining = True
-            self.note("stopping at the end of the cycle")
-            if not self.driver.close():
-                self.acts.forgo(ending.beginnings(self.net))
-                self.ends_at_home = True
-        elif not self.stopping:
-            if self.is_whole and self.groups.storing is not None:
-                self.make_safe()  # at the end of the run otherwise, which follows at once
-            self.ended_by = self.ended_by or ("stopped by the operator" if self.is_whole else "")
-            self._end_soon("stopped by the operator")
+        stopping.stop(self, at_end_of_cycle=at_end_of_cycle)
 
     def emergency_stop(self, reason: str) -> None:
         """Drive the safe outputs at once, before anything is written or said; the run ends, and can be taken up."""
-        self.make_safe()
-        self.ended_by, self.is_emergency = f"emergency stop: {reason}", True
-        self._end_soon("emergency stop", reason=reason)
+        stopping.emergency_stop(self, reason)
 
     def commanded(self, command: str, by: str) -> None:
         """Who commanded what stands in the trace."""
@@ -342,7 +320,7 @@ class Host:
     def settle(self) -> None:
         """At quiescence, wake who waits for it, and end the run if nothing will happen."""
         self._release()
-        if self.ends_at_home and not self.stopping and not self.paused and self._ends_cycle():
+        if self.ends_at_home and not self.stopping and not self.paused and stopping.ends_cycle(self):
             return
         ended = ending.ended(self)
         if ended is not None and self.outcome is not None:
@@ -353,19 +331,6 @@ class Host:
             # What comes while the link is closed is not heard.
             self.left_nothing_open = self.acts.is_settled and self.peers.have_let_go
             self.groups.commit()
-
-    def _ends_cycle(self) -> bool:
-        """Whether there is more to be done before the cycle is at its end, and is begun."""
-        if not ending.is_home(self):
-            if self.acts.is_leaving:
-                self.acts.stay()  # an order has come on a vote that stood
-            return False
-        if not self.is_whole and not self.acts.is_leaving:
-            self.acts.leave()
-        elif self.is_whole or self.peers.have_let_go:
-            self.ended_by = ending.AT_THE_END if self.is_whole else ""
-            self._end_soon(ending.AT_THE_END, **({} if self.is_whole else {"message": ending.alone(self)}))
-        return True
 
     def _release(self) -> None:
         """Wake who waits for quiescence."""
@@ -398,11 +363,7 @@ class Host:
 
     def fail(self, message: str) -> None:
         """End the run by a fault, with the machines stopped where they are."""
-        if not self.fault:
-            self.fault = message
-            self.make_safe()
-            self._end_soon("fault", message=message)
-            self._tell("fault", message)
+        stopping.fail(self, message)
 
     def make_safe(self) -> None:
         """Stop the driver: what it is handed from now on it drops, so nothing is, and no command counts as sent."""
@@ -411,29 +372,6 @@ class Host:
             self.driver.stop()
         except Exception as error:  # a timer has no caller
             self.broken(error)
-
-    def _halt(self, note: str, **data: str) -> None:
-        """Let nothing fire by itself any more, and have the trace say why."""
-        self.paused = self.acts.halted = True  # first, so that nothing fires whatever happens to the trace
-        self.note(note, **data)
-        self.acts.permit(0)
-
-    def _end_soon(self, note: str, **data: str) -> None:
-        """End when nothing is open, or after a while."""
-        self.stopping = True
-        self._halt(note, **data)
-        if not self.is_whole:
-            self.acts.leave()
-        if self.clock is not None:
-            if not self.is_whole:
-                self.clock.loop.call_later(SETTLE_SECONDS, self._wait_no_longer)
-            self.clock.loop.call_later(self.patience.seconds, self.groups.give_up)
-
-    def _wait_no_longer(self) -> None:
-        self.has_waited = True
-        if self.groups.storing is not None:
-            self.make_safe()
-        self.groups.wake()
 
     def _task_ended(self, task: asyncio.Task[None]) -> None:
         if not task.cancelled() and (error := task.exception()) is not None:
@@ -456,9 +394,9 @@ class Host:
     def told(self, kind: str, sentence: str) -> None:
         """Have the trace tell something, and whoever follows the run."""
         self.note(kind, message=sentence)
-        self._tell(kind, sentence)
+        self.tell_operator(kind, sentence)
 
-    def _tell(self, kind: str, sentence: str) -> None:
+    def tell_operator(self, kind: str, sentence: str) -> None:
         """Tell who follows the run; one that cannot be told (a terminal that is gone) stops no stop on its way."""
         if self.tell is not None:
             try:

@@ -29,28 +29,7 @@ report asks each coordinator for the word that no open round needs it any more, 
 whatever arrives. Rejected: to end when all is quiet here. Of an order on a standing vote a controller knows nothing
 before it comes.
 
-What is kept in stable storage, and the fault that would show if it were not:
-
-- `word`, the marking and the completion signals in the image, in pieces (`stored_word`), whenever a firing, a promise
-  or a completion has changed it: a token would be back where it was, and fire its transition, and send its command, a
-  second time; or a completion that was told once would be awaited for ever.
-- `promise/<round>`, the parts promised in a round that is not decided: the commit may be under way, and what the part
-  needs would be gone when it comes. `word` holds the values of the signals that the promise reads, which stay in the
-  image until it ends. A vote that promises nothing is not kept: given again, it may be another, and an undecided round
-  takes the newer one, a decided one none.
-- `closed`, of each coordinator the rounds decided, and below which all are: a late copy of a request would be promised
-  once more, and a late copy of its commit then applied a second time.
-- `command/...`: see `commands`. A machine would be commanded twice, or never.
-- `turns` of the arbiter, if there are any: a rule "twice this, once that" would begin anew and break its own order.
-- `epoch`: reports would be numbered from 0 again, and ignored as old ones; then nobody asks for what is enabled here.
-
-Not kept: *sensors*, because nobody knows what they show after an outage: their gates are closed, wanted 1 or 0, until
-the driver has told them anew. *Timers*, because a time that ran while nobody looked says nothing (`timers`). *Latched*
-values, for the same reason; a completion among them is told again, because its command is asked after. What the
-coordinator was *told* and has *seen*, because a report of the new epoch is newer than all. Which local transition fired
-*last*, because it only shares out turns where no arbiter decides. The coordinator's epoch, because a message of an
-earlier one can only repeat what is true: rounds below `closed_below` are closed for ever, and what it has seen of
-reports is older than those of the new epoch here.
+What of all that a restart finds, and why, is in `restored.py`.
 
 After a restart a controller is *held*: nothing moves because a computer has started. It fires nothing, promises nothing
 more and sends no command, until an operator resumes it. What it promised before is still promised: its votes are
@@ -59,10 +38,10 @@ repeated, and their decisions applied, with the commands owed.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator, Mapping
 from typing import Self
 
+from firable.executor.protocol.above import Above, Promise, union
 from firable.executor.protocol.commands import Answer, Commands
 from firable.executor.protocol.deciders import closed_key, coordinator_at, coordinators
 from firable.executor.protocol.enabled import EnabledSet, bits
@@ -83,46 +62,12 @@ from firable.executor.protocol.messages import (
     Vote,
     VoteRequest,
 )
-from firable.executor.protocol.stored_word import changed_pieces, stored_word
+from firable.executor.protocol.restored import restore
+from firable.executor.protocol.stored_word import changed_pieces
 from firable.executor.protocol.timers import Timers
 from firable.executor.protocol.token_player import Arbiter, Compiled, TokenPlayer, Word
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Marking, SignalKind
-
-
-@dataclass(frozen=True, slots=True)
-class Promise:
-    """A vote given in a round that is not decided yet, and what its yes parts write and read."""
-
-    promised: frozenset[str]
-    writes: int
-    reads: int
-
-
-@dataclass(slots=True)
-class Above:
-    """What a controller knows of one coordinator that decides some of its parts."""
-
-    name: str
-    parts: frozenset[str]
-    """The transitions that it decides and that have a part here."""
-    mask: int
-    """These parts, by their indexes."""
-    readiness: Readiness = field(default_factory=lambda: Readiness(-1, frozenset()))
-    ready_mask: int = 0
-    """The parts that the readiness names."""
-    told: int = -1
-    """The sequence number of the newest report that was sent."""
-    seen: int = -1
-    """The sequence number of the newest report that is known to have arrived, in this epoch of the coordinator."""
-    epoch: int = 0
-    """The epoch of the coordinator."""
-    closed_below: int = 0
-    """Every round of the coordinator with a smaller number is closed."""
-    kept_below: int = 0
-    """What is kept of that."""
-    dismissed: int = -1
-    """The sequence number of the last report to which the coordinator has said that no round needs the controller."""
 
 
 class LocalController:
@@ -146,7 +91,7 @@ class LocalController:
         self.free = frozenset(row for row, controller in decomposition.free if controller == name)
         """The transitions of which the part here is free of promise."""
         self.free_mask = sum(1 << t for t, row in self.rows.items() if row in self.free)
-        self.lasting = _union(self.parts[row].needs for row in self.free) & ~self.player.places
+        self.lasting = union(self.parts[row].needs for row in self.free) & ~self.player.places
         """The completions that these wait for."""
         self.arbiter = Arbiter(self.subnet, (group for group in decomposition.groups if group.controller == name))
         self.kept_turns = self.arbiter.turns
@@ -344,22 +289,8 @@ class LocalController:
 
     def _restore(self, kept: Mapping[str, Stored]) -> None:
         self.held = True
-        self.epoch = _number(kept.get("epoch", 0)) + 1
-        for above in self.above.values():
-            above.readiness = Readiness((self.epoch << EPOCH_BITS) - 1, frozenset())
-            above.told = above.readiness.sequence
-        self.word = self.kept_word = stored_word(kept, self.word)
-        self.commands = Commands(self.subnet, kept)
+        restore(self, kept)
         self._mark_unsent()
-        for key, value in kept.items():
-            match key.partition("/"), value:
-                case ("promise", _, number), [*names]:
-                    self.promises[int(number)] = self._promise(map(str, names))
-                case ("closed", _, coordinator), [int(below), [*numbers]] if coordinator in self.above:
-                    self.above[coordinator].closed_below = self.above[coordinator].kept_below = below
-                    self.closed |= set(map(_number, numbers))
-                case ("turns", _, _), [*turns]:
-                    self.arbiter.turns = self.kept_turns = tuple(map(_number, turns))
         held = self._locked_reads()
         self.word &= ~sum(bit for name in self.timers.signals if not (bit := self.player.signal_bit(name)) & held)
         sensors = (s.name for s in self.subnet.signals if s.kind is SignalKind.SENSOR)
@@ -374,7 +305,7 @@ class LocalController:
             asked = [name for name in asked if not self.forgone >> self.index_of[name] & 1]
             # The parts of one round may disturb each other: one of them is chosen. Those of other rounds may not.
             yes = [n for n in asked if self._is_enabled(self.parts[n]) and not self._disturbs_promises(self.parts[n])]
-            self.promises[request.round] = self._promise(yes)
+            self.promises[request.round] = Promise.of(self.parts, yes)
             if yes:
                 yield Keep(f"promise/{request.round}", yes)
                 yield from self._keep_word()
@@ -473,11 +404,6 @@ class LocalController:
             effects += self.commands.completed(signal)
         return effects
 
-    def _promise(self, names: Iterable[str]) -> Promise:
-        promised = frozenset(names)
-        parts = [self.parts[name] for name in promised]
-        return Promise(promised, _union(part.writes for part in parts), _union(part.reads for part in parts))
-
     def _keep_word(self) -> list[Effect]:
         if self.word == self.kept_word:
             return []
@@ -521,7 +447,7 @@ class LocalController:
         return any(transition.disturbs(promise.writes, promise.reads) for promise in self.promises.values())
 
     def _locked_reads(self) -> int:
-        return _union(promise.reads | promise.writes for promise in self.promises.values())
+        return union(promise.reads | promise.writes for promise in self.promises.values())
 
     def _readiness(self, above: Above) -> Readiness:
         ready = 0 if self.held or self.leaving else self.enabled.at(self.word) & above.mask & ~self.forgone
@@ -541,16 +467,3 @@ class LocalController:
         readiness = self._readiness(above)
         above.told = max(above.told, readiness.sequence)
         return readiness
-
-
-def _union(masks: Iterable[int]) -> int:
-    union = 0
-    for mask in masks:
-        union |= mask
-    return union
-
-
-def _number(value: Stored) -> int:
-    if not isinstance(value, int):
-        raise TypeError(f"{value!r} was kept where a number belongs")
-    return value

@@ -14,8 +14,8 @@ from support.owned_nets import owned_net
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.plant import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.drivers.simulated import SimulatedDriver
-from firable.executor.operating.acts import Item
 from firable.executor.operating.host import Host
+from firable.executor.operating.items import Item
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.running import Operator, RunReport, execute
 from firable.executor.operating.situation import State, is_deadlock

@@ -11,7 +11,8 @@ from support.hosts import ALL_IN_ONE, ONE_EACH, TOGETHER, Cell
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.journal.journal import MemoryJournal
-from firable.executor.operating.acts import Acts, CommandTaken
+from firable.executor.operating.acts import Acts
+from firable.executor.operating.items import CommandTaken
 from firable.executor.operating.recorder import Recorder
 from firable.executor.protocol.messages import Acknowledgement, Decision, Report, Sending
 from firable.nets.decomposition import Decomposition

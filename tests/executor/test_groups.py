@@ -19,8 +19,7 @@ from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal, Storing
 from firable.executor.journal.outbox import Outbox
 from firable.executor.journal.sqlite_journal import SqliteJournal
-from firable.executor.operating import acts
-from firable.executor.operating import host as host_module
+from firable.executor.operating import acts, stopping
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import Situation, State
@@ -258,7 +257,7 @@ def test_a_disk_that_never_answers_ends_a_stop_as_an_error_and_what_it_was_given
 def test_a_host_among_others_stops_its_machines_when_its_stop_has_waited_and_its_disk_has_not_answered(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(host_module, "SETTLE_SECONDS", 0.05)
+    monkeypatch.setattr(stopping, "SETTLE_SECONDS", 0.05)
 
     async def main() -> None:
         rig = Rig()

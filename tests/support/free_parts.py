@@ -6,7 +6,8 @@ from dataclasses import replace
 from support.planted import without
 
 from firable.decompose.splitting.persistence import persistence
-from firable.executor.protocol.controller import Above, LocalController
+from firable.executor.protocol.above import Above
+from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator, Round
 from firable.executor.protocol.messages import Acknowledgement, Decision, Effect, Readiness, Report, ToController
 from firable.nets.decomposition import Decomposition

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Self
 
+from firable.executor.protocol.above import Promise
 from firable.executor.protocol.commands import Answer
-from firable.executor.protocol.controller import LocalController, Promise
+from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator, Round
 from firable.executor.protocol.messages import (
     Acknowledgement,

@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from firable.executor.protocol.controller import Above, LocalController
+from firable.executor.protocol.above import Above
+from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.deciders import TOP
 from firable.executor.protocol.messages import (

@@ -1,0 +1,258 @@
+"""One device of a bound driver: what its connection is for, and what follows from what it shows.
+
+Values come from the connection (`keeping.py`) in batches. The contacts of the emergency stop are looked at before
+anything else; then the process image of the device, the channels of its machines and its watchdog each take what is
+theirs, and what that means is told to the listener of the driver.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Final
+
+from firable.executor.drivers.binding import CommandDocument, SignalDocument, writes
+from firable.executor.drivers.channels import Channel, Outcome, Said
+from firable.executor.drivers.device import Point, Value, Writes, as_bit
+from firable.executor.drivers.driver import Quality
+from firable.executor.drivers.emergency import Contacts
+from firable.executor.drivers.handshake import Handshake
+from firable.executor.drivers.image import Change, Image
+from firable.executor.drivers.keeping import Kept
+from firable.nets.net import Place
+
+if TYPE_CHECKING:
+    from firable.executor.drivers.bound import BoundDriver
+
+_LOOK_SECONDS: Final = 0.01
+
+
+class BoundDevice:
+    """One device of a driver: what its connection is for (`keeping.Served`)."""
+
+    def __init__(self, driver: BoundDriver, name: str) -> None:
+        binding = driver.binding
+        self.driver = driver
+        self.name = name
+        self.document = binding.document.devices[name]
+        bound = {signal: one for signal, one in binding.document.signals.items() if one is not None}
+        signals: dict[str, SignalDocument] = {signal: one for signal, one in bound.items() if one.device == name}
+        contacts = {key: one for key, one in binding.document.emergency_stop.items() if one.device == name}
+        self.contacts = Contacts(contacts)
+        self.image = Image({**signals, **self.contacts.signals()})
+        self.told = signals.keys()
+        """What the image holds for the net; the rest is for the emergency stop."""
+        self.sensed = [signal for signal in signals if signal in driver.completions.shown]
+        """Signals from which completions are formed; the others are told as they are."""
+        commands = {place: one for place, one in binding.document.commands.items() if one.device == name}
+        self.channels: dict[str, Channel | Handshake] = {}
+        for channel_name, body in self.document.channels.items():
+            places = [place for place, one in commands.items() if one.channel == channel_name]
+            made = Channel if body.request is None else Handshake
+            self.channels[channel_name] = made(body, places, driver.answered)
+        self.replies: dict[Point, list[tuple[Channel | Handshake, str]]] = {}
+        for channel in self.channels.values():
+            for point, key in channel.points().items():
+                self.replies.setdefault(point, []).append((channel, key))
+        heartbeat, alive = self.document.heartbeat, self.document.alive
+        self.tripped = None if heartbeat is None else heartbeat.tripped
+        self.has_tripped: bool | None = None
+        self.forced: deque[Writes] = deque()
+        self.writing: Channel | Handshake | None = None
+        self.is_ready = asyncio.Event()
+        self.was_ready = False
+        self.alarm: asyncio.TimerHandle | None = None
+        self.noted = ""
+        self.garbage: dict[Point, Value] = {}
+        points = {*self.image.reads, *self.image.counters, *self.replies}
+        points |= {point for point in (self.tripped, None if alive is None else alive.read) if point is not None}
+        self.kept = Kept(self.document, binding.kinds[name], binding.options[name], frozenset(points), self)
+
+    async def run(self) -> None:
+        """Keep the device connected."""
+        self._alarm(self.document.start_s, "not reached since the start")
+        loop = asyncio.get_running_loop()
+        begun = loop.call_later(self.document.start_s, self._must_move) if self.contacts.contacts else None
+        try:
+            await self.kept.run()
+        finally:
+            for alarm in (self.alarm, begun):
+                if alarm is not None:
+                    alarm.cancel()
+
+    def send(self, command: CommandDocument, place: Place, entry: int) -> None:
+        """Send a command by its channel."""
+        self.channels[command.channel].send(place.name, entry, str(place.command), writes(command.write))
+        self.kept.awake.set()
+
+    async def settled(self, channel: Channel | Handshake, place: str, entry: int) -> None:
+        """Wait until the device shows what the safe outputs of the start have ended, or its time is over."""
+        if channel.document.failed is None:
+            return
+        with suppress(TimeoutError):
+            async with asyncio.timeout(self.document.timeout_s):
+                while channel.is_at(place, entry):
+                    await asyncio.sleep(_LOOK_SECONDS)
+
+    def force(self, point: Point, value: bool) -> None:
+        """Write a point beside all else."""
+        self.forced.append(((point, value),))
+        self.kept.awake.set()
+
+    @property
+    def is_out_of_reach(self) -> bool:
+        """Whether a stop cannot be written to it now, though it has something that stops it."""
+        return not self.kept.is_connected and bool(self.document.safe or self.document.heartbeat is not None)
+
+    @property
+    def is_writing(self) -> bool:
+        """Whether something that was to be written has not been confirmed."""
+        return bool(self.forced) or any(channel.is_writing for channel in self.channels.values())
+
+    # What the connection tells
+
+    def read(self, batch: Sequence[tuple[Point, Value]]) -> None:
+        """Values have come."""
+        opened = self.contacts.opened(batch) if self.contacts.contacts else ""
+        if opened:  # before anything else
+            self._emergency(opened)
+        now = self.driver.clock.now_seconds() if self.driver.clock is not None else 0.0
+        changes, faults = self.image.take(batch, now)
+        if not opened and not self.contacts.are_closed:
+            self.contacts.read(self.image.readings)
+            if self.driver.may_move:  # what was sent before that has waited for it
+                for device in self.driver.devices.values():
+                    device.kept.awake.set()
+        self._tell(changes, faults)
+        for point, value in batch:
+            for channel, key in self.replies.get(point, ()):
+                self._replied(channel, key, point, value)
+            if point == self.tripped:
+                self._watchdog(value)
+        if self.driver.listener is not None:
+            self.driver.listener.all_told()
+
+    def ready(self) -> None:
+        """A new connection has told what the device shows."""
+        if self.alarm is not None:
+            self.alarm.cancel()
+        self.note("connected again" if self.was_ready else "connected")
+        self.noted = ""
+        for channel in self.channels.values():
+            if (forgotten := channel.connected_again()) is not None:
+                self._fault(f"knows nothing any more of '{forgotten.text}' of '{forgotten.place}', which it had taken")
+        self.was_ready = True
+        self.is_ready.set()
+
+    def lost(self, why: str) -> None:
+        """There is no connection, or none any more."""
+        if self.is_ready.is_set():
+            self.is_ready.clear()
+            if self.contacts.contacts:
+                self._emergency(self.contacts.lost(why))
+            self._alarm(self.document.grace_s, why)
+        if why != self.noted and not self.driver.is_stopped:
+            self.noted = why
+            self.note(f"not connected: {why}")
+
+    def broken(self, error: Exception) -> None:
+        """Its driver has made a mistake: all devices are stopped, and the run ends."""
+        try:
+            self._fault(f"its driver has failed, {type(error).__name__}: {error}")
+        finally:
+            self.driver.stop()
+
+    def next_writes(self) -> Writes | None:
+        """What is to be written now."""
+        self.writing = None
+        if self.forced:
+            return self.forced[0]  # until it is confirmed
+        if not self.driver.may_move:
+            return None
+        for channel in self.channels.values():
+            if (some := channel.next_writes()) is not None:
+                self.writing = channel
+                return some
+        return None
+
+    def written(self) -> None:
+        """The device has confirmed that."""
+        if self.writing is None:
+            self.forced.popleft()
+        else:
+            for outcome in self.writing.written():
+                self._said(outcome)
+
+    # What follows from it
+
+    def note(self, message: str) -> None:
+        """Tell the listener something of the device."""
+        if self.driver.listener is not None:
+            self.driver.listener.driver_note(self.name, message)
+
+    def _fault(self, message: str) -> None:
+        if self.driver.listener is not None and not self.driver.is_stopped:
+            self.driver.listener.driver_fault(self.name, message)
+
+    def _emergency(self, reason: str) -> None:
+        self.driver.emergency_stop(f"{self.name}: {reason}")
+
+    def _must_move(self) -> None:
+        if not self.contacts.are_closed:
+            open_ones = " and ".join(f"'{name}'" for name in sorted(self.contacts.open_ones))
+            self._emergency(f"{open_ones} was not read within {self.document.start_s:g} s")
+
+    def _alarm(self, after_s: float, why: str) -> None:
+        if self.alarm is not None:
+            self.alarm.cancel()
+        if after_s:
+            self.alarm = asyncio.get_running_loop().call_later(after_s, self._give_up, why)
+        else:
+            self._give_up(why)
+
+    def _give_up(self, why: str) -> None:
+        """The device has been lost for longer than is waited: the loss policies hold."""
+        self._tell(*self.image.lost(why))
+
+    def _tell(self, changes: Sequence[Change], faults: Sequence[str]) -> None:
+        for signal in self.sensed:
+            reading = self.image.readings[signal]
+            shows = reading.quality is Quality.GOOD and bool(reading.value)
+            if shows != self.driver.completions.shown[signal]:
+                self.driver.formed(signal, self.driver.completions.shows(signal, shows))
+        if self.driver.listener is not None and not self.driver.is_stopped:
+            for change in changes:
+                if change.signal in self.told and change.signal not in self.sensed:
+                    self.driver.listener.signal(change.signal, change.value, None)
+        if faults:
+            several = f"{faults[0]} and {len(faults) - 1} more" if len(faults) > 1 else faults[0]
+            self._fault(f"'{several}' cannot be read: {self.image.readings[faults[0]].why}")
+
+    def _replied(self, channel: Channel | Handshake, key: str, point: Point, value: Value) -> None:
+        for outcome in channel.shows(key, value):
+            self._said(outcome)
+        if channel.shown[key] is None and value != self.garbage.get(point):
+            self.garbage[point] = value
+            self.note(f"'{point}' shows {value!r}, which says nothing of a command")
+
+    def _said(self, outcome: Outcome) -> None:
+        order = outcome.order
+        match outcome.said:
+            case Said.TAKEN:
+                if self.driver.listener is not None:
+                    self.driver.listener.taken(order.place, order.entry)
+            case Said.FAILED:
+                self._fault(f"has failed at the command of '{order.place}'{f', {order.text}' if order.text else ''}")
+            case Said.DONE:
+                if (completion := self.driver.completing.get(order.place)) is not None:
+                    self.driver.formed(completion, self.driver.completions.acknowledged(completion, order.entry))
+
+    def _watchdog(self, value: Value) -> None:
+        tripped = as_bit(value)
+        if tripped and self.has_tripped is False:
+            self._fault("its watchdog has stopped its machines: it has had no heartbeat")
+        elif tripped and self.has_tripped is None:
+            self.note("its watchdog had stopped its machines when this run began")
+        self.has_tripped = tripped
