@@ -47,6 +47,8 @@ CODES: Final[dict[str, str]] = {
     "F1016": "not carried over by the conversion",
     "F1017": "the file cannot be written",
     "F1018": "not a file of queries",
+    "F1019": "the file has changed since it was read",
+    "F1020": "an edit that cannot be made",
     # F2: the net
     "F2001": "duplicate name",
     "F2002": "unknown place",

@@ -9,7 +9,7 @@ that an editor can find its way in a net that is not well formed yet.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -111,11 +111,25 @@ class Names:
                 for other in self.occurrences
                 if not other.prefix and other.name.startswith(f"{old}.") and other.kind is not Kind.CONTROLLER
             ]
-        lines = list(self.source.lines)
-        for line, column, length in sorted(edits, reverse=True):
-            text = lines[line - 1]
-            lines[line - 1] = text[: column - 1] + new + text[column - 1 + length :]
-        return "\n".join(lines)
+        return self._with_parts((line, column, length, new) for line, column, length in edits)
+
+    def replaced(self, names: Mapping[str, str]) -> str:
+        """The text in which each full name that is a key of `names` is used under another; declarations stay."""
+        return self._with_parts(
+            (*place, length, names[word])
+            for scalar, prefix, at, length in self._used()
+            if not prefix
+            and (word := scalar.text[at : at + length]) in names
+            and (place := self._inside(scalar, at, length))
+        )
+
+    def _with_parts(self, parts: Iterable[tuple[int, int, int, str]]) -> str:
+        """The text with parts of lines replaced, each by line, column (from 1), length and the new text."""
+        lines = re.split(r"(\r\n|\r|\n)", self.source.text)  # lines at even indexes, their ends between them
+        for line, column, length, new in sorted(parts, reverse=True):
+            text = lines[2 * (line - 1)]
+            lines[2 * (line - 1)] = text[: column - 1] + new + text[column - 1 + length :]
+        return "".join(lines)
 
     def _declared(self) -> Iterator[Occurrence]:
         for name, key, body in entries_of(self.tree, "controllers"):

@@ -5,13 +5,11 @@ what the file format has no words for (a self-loop, a completion signal that no 
 code. The order of a file groups places and signals by controller, and has fault transitions last; `in_file_order` is
 that normal form, and a net that was read from a file has it already.
 
-Quoting is generous: a word that any YAML reader could take for a number, a Boolean or null is put in double quotes.
 The alternative, `yaml.dump`, prints neither short entries on one line nor aligned with what an engineer would write.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Final
@@ -36,12 +34,9 @@ from firable.nets.net import (
 from firable.nets.temporal import format_temporal
 from firable.nets.text import parse_net
 from firable.nets.time_limits import fault_place, fault_place_name, fault_transition_name, format_time, timer_name
-from firable.nets.yaml_tree import is_ambiguous
+from firable.nets.yaml_writing import flow_list, flow_mapping, scalar
 
 WIDTH_CHARACTERS: Final = 120
-
-_PLAIN: Final = re.compile(r"[A-Za-z_][\w.()>-]*(?: [\w.()>-]+)*", re.ASCII)
-_ESCAPES: Final = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
 def format_net(net: Net) -> str:
@@ -152,9 +147,9 @@ def _implied(net: Net, transition: Transition) -> dict[ExternalGate, None]:
 
 def _lines(net: Net) -> Iterator[str]:
     yield "firable: 1"
-    yield f"cell: {_text(net.name)}"
+    yield f"cell: {scalar(net.name)}"
     if net.description:
-        yield f"description: {_text(net.description)}"
+        yield f"description: {scalar(net.description)}"
     places: dict[str | None, list[Place]] = {}
     given = set(_given_places(net).values())
     for place in net.places:
@@ -169,13 +164,13 @@ def _lines(net: Net) -> Iterator[str]:
         yield "controllers:"
     for controller in net.controllers:
         name = controller.name
-        yield f"  {_text(name)}:"
+        yield f"  {scalar(name)}:"
         if controller.coordinator:
             yield "    coordinator: true"
         if controller.under is not None:
-            yield f"    under: {_text(controller.under)}"
+            yield f"    under: {scalar(controller.under)}"
         if controller.description:
-            yield f"    description: {_text(controller.description)}"
+            yield f"    description: {scalar(controller.description)}"
         yield from _scope(net, places.get(name, []), inputs.get(name, []), f"{name}.", "    ")
     if unowned := list(_scope(net, places.get(None, []), inputs.get(None, []), "", "")):
         yield ""
@@ -185,13 +180,13 @@ def _lines(net: Net) -> Iterator[str]:
     yield from _table("transitions", rows)
     yield from _table(
         "arbiters",
-        ((a.name, [("among", _list(a.among)), ("by", str(a.by))]) for a in net.arbiters),
+        ((a.name, [("among", flow_list(a.among)), ("by", str(a.by))]) for a in net.arbiters),
     )
     yield from _table("properties", ((p.name, _property(p)) for p in net.properties))
     if net.expected:
         yield ""
         yield "expect:"
-        yield from (f"  {_text(one.verdict)}: {one.status}" for one in net.expected)
+        yield from (f"  {scalar(one.verdict)}: {one.status}" for one in net.expected)
 
 
 def _scope(net: Net, places: list[Place], inputs: list[Signal], prefix: str, indent: str) -> Iterator[str]:
@@ -209,15 +204,15 @@ def _scope(net: Net, places: list[Place], inputs: list[Signal], prefix: str, ind
         if place.command:
             entries.append(("send", _command(place.command)))
         if place.completion:
-            entries.append(("until", _text(local(place.completion))))
+            entries.append(("until", scalar(local(place.completion))))
         if place.within:
             entries.append(("within", _limit(net, place, place.within, local)))
         if place.task:
-            entries.append(("task", _flow(_pairs(("name", place.task.name), *place.task.arguments))))
+            entries.append(("task", flow_mapping(_pairs(("name", place.task.name), *place.task.arguments))))
         if place.resource:
             entries.append(("opens", _resource(place.resource)))
         if place.description:
-            entries.append(("description", _text(place.description)))
+            entries.append(("description", scalar(place.description)))
         yield from _entry(local(place.name), entries, indent + "  ")
 
 
@@ -227,25 +222,25 @@ def _limit(net: Net, place: Place, limit: TimeLimit, local: Callable[[str], str]
     if (t := net.fault_transitions.get(net.place_index[place.name])) is not None:
         fault = net.transitions[t]
         if fault.outputs[:1] != (fault_place_name(place.name),):
-            entries += [("to", _text(local(name))) for name in fault.outputs[:1]]
+            entries += [("to", scalar(local(name))) for name in fault.outputs[:1]]
         if fault.name != fault_transition_name(place.name):
-            entries.append(("transition", _text(fault.name)))
+            entries.append(("transition", scalar(fault.name)))
     if limit.timer != timer_name(place.name):
-        entries.append(("timer", _text(local(limit.timer))))
-    return _flow(entries) if len(entries) > 1 else entries[0][1]
+        entries.append(("timer", scalar(local(limit.timer))))
+    return flow_mapping(entries) if len(entries) > 1 else entries[0][1]
 
 
 def _command(command: Command) -> str:
-    return _flow(_pairs(("machine", command.machine), ("command", command.command), *command.parameters))
+    return flow_mapping(_pairs(("machine", command.machine), ("command", command.command), *command.parameters))
 
 
 def _resource(resource: Resource) -> str:
     prefix = [("prefix", resource.prefix)] if resource.prefix else []
-    return _flow(_pairs(("to", resource.idle), ("machine", resource.machine), *prefix, *resource.parameters))
+    return flow_mapping(_pairs(("to", resource.idle), ("machine", resource.machine), *prefix, *resource.parameters))
 
 
 def _pairs(*pairs: tuple[str, str]) -> Iterator[tuple[str, str]]:
-    return ((_text(key), _text(value)) for key, value in pairs)
+    return ((scalar(key), scalar(value)) for key, value in pairs)
 
 
 def _transition(net: Net, transition: Transition) -> list[tuple[str, str]]:
@@ -256,20 +251,20 @@ def _transition(net: Net, transition: Transition) -> list[tuple[str, str]]:
     names = (("from", transition.inputs), ("to", transition.outputs), ("if", opening), ("unless", closing))
     return [
         *([] if transition.number is None else [("number", str(transition.number))]),
-        *([("description", _text(transition.description))] if transition.description else []),
+        *([("description", scalar(transition.description))] if transition.description else []),
         *((key, _names(list(of))) for key, of in names if of),
     ]
 
 
 def _property(prop: Property | TemporalProperty) -> list[tuple[str, str]]:
     if isinstance(prop, TemporalProperty):
-        return [(str(prop.logic), _text(format_temporal(prop.formula)))]
+        return [(str(prop.logic), scalar(format_temporal(prop.formula)))]
     if prop.kind is not PropertyKind.LEADS_TO or prop.then is None:
-        return [(str(prop.kind), _text(format_formula(prop.formula)))]
-    source, target = _text(format_formula(prop.formula)), _text(format_formula(prop.then))
+        return [(str(prop.kind), scalar(format_formula(prop.formula)))]
+    source, target = scalar(format_formula(prop.formula)), scalar(format_formula(prop.then))
     if prop.fairness is Fairness.WEAK:
         return [("leads_to", f"[{source}, {target}]")]
-    return [("leads_to", _flow((("from", source), ("to", target), ("fairness", str(prop.fairness)))))]
+    return [("leads_to", flow_mapping((("from", source), ("to", target), ("fairness", str(prop.fairness)))))]
 
 
 def _table(key: str, rows: Iterable[tuple[str, list[tuple[str, str]]]]) -> Iterator[str]:
@@ -282,8 +277,8 @@ def _table(key: str, rows: Iterable[tuple[str, list[tuple[str, str]]]]) -> Itera
 
 def _entry(name: str, entries: list[tuple[str, str]], indent: str) -> Iterator[str]:
     """One named entry, on one line if it is short enough."""
-    head = f"{indent}{_text(name)}:"
-    line = f"{head} {_flow(entries)}"
+    head = f"{indent}{scalar(name)}:"
+    line = f"{head} {flow_mapping(entries)}"
     if not entries:
         yield head
     elif len(line) <= WIDTH_CHARACTERS:
@@ -293,29 +288,5 @@ def _entry(name: str, entries: list[tuple[str, str]], indent: str) -> Iterator[s
         yield from (f"{indent}  {key}: {value}" for key, value in entries)
 
 
-def _flow(entries: Iterable[tuple[str, str]]) -> str:
-    return f"{{{', '.join(f'{key}: {value}' for key, value in entries)}}}"
-
-
 def _names(names: list[str]) -> str:
-    return _text(names[0]) if len(names) == 1 else _list(names)
-
-
-def _list(names: Iterable[str]) -> str:
-    return f"[{', '.join(map(_text, names))}]"
-
-
-def _text(text: str) -> str:
-    """A scalar that every YAML reader takes for this text."""
-    if _PLAIN.fullmatch(text) and not is_ambiguous(text):
-        return text
-    return '"' + "".join(_escaped(character) for character in text) + '"'
-
-
-def _escaped(character: str) -> str:
-    if character in _ESCAPES:
-        return _ESCAPES[character]
-    if character.isprintable():
-        return character
-    code = ord(character)
-    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+    return scalar(names[0]) if len(names) == 1 else flow_list(names)

@@ -67,7 +67,11 @@ def read_source(path: str | Path, size_bytes_max: int) -> Source:
     Raises `InputError`: F1001 where there is no such file or it may not be read, F1003 where it is too large, F1004
     where it is not text.
     """
-    data = read_bytes(path, size_bytes_max)
+    return source_of(path, read_bytes(path, size_bytes_max))
+
+
+def source_of(path: str | Path, data: bytes) -> Source:
+    """The text of a file whose bytes are read; raises `InputError` F1004 where they are not text."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

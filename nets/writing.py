@@ -35,6 +35,8 @@ def write_whole(path: str | Path, data: bytes | str) -> None:
                 stream.write(content)
                 stream.flush()
                 os.fsync(stream.fileno())
+            with suppress(FileNotFoundError):  # whoever could read what stood there can read what does now
+                unfinished.chmod(stat.S_IMODE(target.stat().st_mode))
             unfinished.replace(target)
         finally:  # nothing is left behind, whatever ended the writing
             with suppress(OSError, ValueError):

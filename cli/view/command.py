@@ -9,7 +9,7 @@ import click
 from firable.cli.options import load_net, net_argument
 
 if TYPE_CHECKING:
-    from firable.cli.view.playing import Playing
+    from firable.cli.view.editing import Editing
 
 
 @click.command(short_help="Show a net in the browser: play with it, see its counterexamples.")
@@ -18,12 +18,16 @@ if TYPE_CHECKING:
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, show_default=True, help="Where to serve on this host; 0: free."
 )
+@click.option("--read-only", is_flag=True, help="Let nobody edit the net on the page.")
 @click.option("--no-browser", is_flag=True, help="Tell the address, and open no browser.")
-def view(net: str, trace: str | None, port: int, no_browser: bool) -> int:
+def view(net: str, trace: str | None, port: int, read_only: bool, no_browser: bool) -> int:
     """Show NET in a browser on this host, until Ctrl-C.
 
     Click a transition that may fire, and switch the gates; a transition that may not says what it waits for. The page
     checks the net, and plays each counterexample step by step, or the run that --trace names.
+
+    Edit on the page changes NET where it is a net file, and keeps its comments and its order; each edit is written to
+    the file at once, if the file is a net with it, and can be undone. With --read-only nothing is edited.
 
     Only this host is served, and only who has the token, which stands in the address that is opened.
     """
@@ -31,6 +35,7 @@ def view(net: str, trace: str | None, port: int, no_browser: bool) -> int:
 
     from firable.cli.draw import drawable
     from firable.cli.text import show_diagnostic
+    from firable.cli.view.editing import editing_of
     from firable.cli.view.playing import Playing
     from firable.cli.view.runs import Run
     from firable.semantics.trace import read_trace
@@ -41,24 +46,25 @@ def view(net: str, trace: str | None, port: int, no_browser: bool) -> int:
         show_diagnostic(note)
     runs = []
     if trace is not None:
-        run = Run(trace, "the run of that file", read_trace(trace))
+        run = Run(trace, "the run of that file", read_trace(trace), is_given=True)
         run.to_json(loaded.net)  # what is no run of the net is refused before anything is served
         runs.append(run)
+    editing = editing_of(Playing(loaded, net, runs), net, read_only=read_only)
     try:
-        asyncio.run(_served(Playing(loaded, net, runs), port, open_it=not no_browser))
+        asyncio.run(_served(editing, port, open_it=not no_browser))
     except KeyboardInterrupt:
         click.echo("", err=True)
     return 0
 
 
-async def _served(playing: Playing, port: int, *, open_it: bool) -> None:
+async def _served(editing: Editing, port: int, *, open_it: bool) -> None:
     import asyncio
 
     from firable.cli.view.playing import application
     from firable.executor.operating.control import Endpoint, listening, new_token
 
     endpoint = Endpoint("127.0.0.1", port, new_token())
-    async with listening(application(playing, endpoint), endpoint) as address:
+    async with listening(application(editing.playing, endpoint, editing.routes()), endpoint) as address:
         show(f"{address}/#token={endpoint.token}", open_it=open_it)
         await asyncio.Event().wait()
 

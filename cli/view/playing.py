@@ -28,9 +28,17 @@ class Playing:
         self.loaded = loaded
         self.file = file
         self.runs = list(runs)
+        self.editable = False
         self.player = Player(loaded.net)
         self.verdicts: list[dict[str, Any]] | None = None
         self.checking = asyncio.Lock()
+
+    def take(self, loaded: Loaded) -> None:
+        """Another net, after an edit; nothing that was found of the one before is known of it."""
+        self.loaded = loaded
+        self.player = Player(loaded.net)
+        self.verdicts = None
+        self.runs = [run for run in self.runs if run.is_given]
 
     @property
     def public(self) -> Collection[str]:
@@ -52,8 +60,9 @@ class Playing:
         return {
             "mode": "play",
             "file": self.file,
+            "editable": self.editable,
             "net": moment.structure(net),
-            "picture": draw_net(net, marking=0),
+            "picture": await asyncio.to_thread(draw_net, net, marking=0),
             "moment": moment.told(self.player, moment.begin(net)),
             "runs": [run.summary() for run in self.runs],
             "verdicts": self.verdicts,
@@ -74,9 +83,11 @@ class Playing:
         """Check the net, once: a net that is not edited gets the same verdicts."""
         async with self.checking:
             if self.verdicts is None:
-                net = self.player.net
-                with self.loaded.placing():
-                    verdicts, runs = await asyncio.to_thread(checked, net)
+                loaded = self.loaded
+                with loaded.placing():
+                    verdicts, runs = await asyncio.to_thread(checked, loaded.net)
+                if loaded is not self.loaded:
+                    raise refusal("the net has been edited while it was checked")
                 self.verdicts = [verdict_json(verdict) for verdict in verdicts]
                 self.runs += runs
         return {"verdicts": self.verdicts, "runs": [run.summary() for run in self.runs]}
@@ -89,8 +100,8 @@ class Playing:
         raise refusal("the page asks for a run that is not known")
 
 
-def application(playing: Playing, endpoint: Endpoint) -> web.Application:
+def application(playing: Playing, endpoint: Endpoint, more: Iterable[web.AbstractRouteDef] = ()) -> web.Application:
     """A net to play with, as an application."""
     app = web.Application(middlewares=[admission(endpoint, playing.public)], client_max_size=BODY_BYTES_MAX)
-    app.router.add_routes(playing.routes())
+    app.router.add_routes([*playing.routes(), *more])
     return app

@@ -34,6 +34,8 @@ class Run:
     cycle_at: int | None = None
     """The firing with which the part that is fired for ever begins."""
     note: str = ""
+    is_given: bool = False
+    """Whether it is the trace that was named, and not what a check has found."""
 
     def summary(self) -> dict[str, Any]:
         """What the page lists."""

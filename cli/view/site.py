@@ -103,4 +103,5 @@ def diagnostic_json(one: Diagnostic) -> dict[str, object]:
         "hint": one.hint,
         "line": None if one.span is None else one.span.line,
         "column": None if one.span is None else one.span.column,
+        "length": None if one.span is None else one.span.length,
     }

@@ -3,6 +3,7 @@
 
 import { h } from "./dom";
 import { Picture } from "./picture";
+import { ask } from "./server";
 
 export interface Frame {
   tools: HTMLElement;
@@ -12,9 +13,16 @@ export interface Frame {
   banner: HTMLElement;
   /** A sentence that stands over the picture. */
   hint: HTMLElement;
+  /** Over when another frame takes the place of this one. */
+  gone: AbortSignal;
 }
 
+let shown = new AbortController();
+
 export function frame(title: string, says: string, kind: string, picture: Picture): Frame {
+  shown.abort();
+  shown = new AbortController();
+  const gone = shown.signal;
   const tools = h("div", { class: "tools", role: "toolbar", "aria-label": kind });
   const below = h("div", { class: "below" });
   const side = h("aside", { "aria-label": "Details" });
@@ -53,8 +61,20 @@ export function frame(title: string, says: string, kind: string, picture: Pictur
   addEventListener("resize", () => {
     if (innerWidth !== width) picture.fit();
     width = innerWidth;
-  });
-  return { tools, below, side, status, banner, hint };
+  }, { signal: gone });
+  return { tools, below, side, status, banner, hint, gone };
+}
+
+/** Look every two seconds whether the file is still what is shown, and say where it is not. */
+export function watchFile(where: Frame, reload: () => void): void {
+  const timer = setInterval(() => {
+    if (document.hidden || where.banner.querySelector(".reload") !== null) return;
+    ask<{ current: boolean }>("api/edit/version").then(({ current }) => {
+      if (current || where.gone.aborted) return;
+      banner(where.banner, "open", "The file has been changed on the disk.", h("button", { type: "button", class: "reload", click: reload }, "Load it again"));
+    }, () => undefined); // that nobody answers is told by what one does
+  }, 2000);
+  where.gone.addEventListener("abort", () => clearInterval(timer));
 }
 
 /** A panel with a heading, which folds. */

@@ -1,20 +1,43 @@
 // The beginning: who are we, and what is it that is shown here?
 
 import { h } from "./dom";
+import { Edit } from "./edit";
+import { banner } from "./frame";
 import { Live, type LiveStart } from "./live";
 import { Play } from "./play";
-import { ask, keepToken, Refused, type PlayPage } from "./server";
+import { ask, keepToken, Refused, type Edited, type EditState, type PlayPage } from "./server";
 import "./style.css";
 
 async function begin(): Promise<void> {
   try {
     const page = await ask<PlayPage | LiveStart>("api/page");
     if (page.mode === "live") new Live(page);
-    else new Play(page);
+    else play(page);
   } catch (error) {
     if (error instanceof Refused && error.status === 401) return askForToken();
     const words = error instanceof Refused ? error.message : "The server does not answer: has the command ended?";
     message("This page cannot be shown", h("p", { role: "alert" }, words));
+  }
+}
+
+function play(page: PlayPage): void {
+  new Play(page, (state) => edit(page, state), () => void reload(page));
+}
+
+function edit(page: PlayPage, state: EditState): Edit {
+  return new Edit(page, state, () => void begin());
+}
+
+/** The file has changed on the disk: play what it holds now, or mend it. */
+async function reload(page: PlayPage): Promise<void> {
+  try {
+    const now = await ask<Edited>("api/edit/reload", {});
+    if ("page" in now) return play(now.page);
+    const state = { text: now.draft, version: now.version ?? "", undo: null, redo: null, arcs: {}, marked: [] };
+    edit(page, state).refuse(now.errors, now.draft);
+  } catch (error) {
+    const words = error instanceof Refused ? error.message : "the connection is lost";
+    banner(document.querySelector<HTMLElement>(".banners")!, "bad", `The file cannot be read: ${words}.`);
   }
 }
 

@@ -32,21 +32,23 @@ const quoted = (name: string): string =>
 
 export class Picture {
   readonly element: HTMLElement;
-  private readonly drawing: SVGSVGElement;
+  private drawing!: SVGSVGElement;
   private readonly tokens = new Map<string, SVGCircleElement>();
   private readonly bars = new Map<string, SVGGElement>();
+  private readonly places = new Map<string, SVGGElement>();
   private readonly gates: { signal: string; wanted: boolean; group: SVGGElement }[] = [];
   private readonly flights: Flight[] = [];
-  private readonly width: number;
-  private readonly height: number;
+  private width = 0;
+  private height = 0;
   private scale = 1;
   private told: Record<string, Wait> = {};
   private readonly marked = new Set<string>();
 
   constructor(
-    private readonly net: Net,
+    private net: Net,
     text: string,
     private readonly on: {
+      place?: (name: string) => void;
       transition?: (name: string) => void;
       signal?: (name: string) => void;
       pointed?: (name: string | null) => void;
@@ -54,18 +56,30 @@ export class Picture {
   ) {
     this.element = document.createElement("div");
     this.element.className = "picture";
-    const root = this.element.attachShadow({ mode: "open" });
     const style = document.createElement("style");
     style.textContent = pictureStyle;
+    this.element.attachShadow({ mode: "open" }).append(style);
+    this.draw(net, text);
+    this.pan();
+    if (this.on.place) this.rove();
+  }
+
+  /** Show another drawing, of the same size and at the same place as the one before. */
+  draw(net: Net, text: string): void {
+    this.net = net;
+    for (const map of [this.tokens, this.bars, this.places]) map.clear();
+    this.gates.length = this.flights.length = 0;
+    this.told = {};
+    this.drawing?.remove();
     const parsed = new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
     this.drawing = document.adoptNode(parsed) as unknown as SVGSVGElement;
     this.width = Number(this.drawing.getAttribute("width"));
     this.height = Number(this.drawing.getAttribute("height")) - TITLE_HEIGHT;
     this.drawing.setAttribute("role", "group");
     this.drawing.setAttribute("aria-label", `the net ${net.name}`);
-    root.append(this.drawing, style);
+    this.element.shadowRoot!.prepend(this.drawing);
     this.prepare();
-    this.pan();
+    this.zoomTo(this.scale);
   }
 
   private found<T extends Element>(...names: [string, ...string[]]): T | null {
@@ -84,6 +98,9 @@ export class Picture {
       circle.after(token);
       group.setAttribute("role", "img");
       this.tokens.set(place.name, token);
+      this.places.set(place.name, group);
+      if (this.on.place) this.pressed(group, () => this.on.place?.(place.name));
+      if (this.on.place) group.setAttribute("aria-label", [place.name, place.says].filter(Boolean).join(", "));
     }
     for (const { name, says } of this.net.transitions) {
       const group = this.found<SVGGElement>("transition", name);
@@ -93,14 +110,8 @@ export class Picture {
         bar.before(svg("rect", { class: "hit", x: x! - 5, y: y! - 7, width: width! + 10, height: height! + 14, rx: 7 }));
       }
       group.classList.add("transition");
-      group.setAttribute("role", "button");
       group.setAttribute("data-says", says);
-      group.addEventListener("click", () => this.on.transition?.(name));
-      group.addEventListener("keydown", (event) => {
-        if (event.key !== "Enter" && event.key !== " ") return;
-        event.preventDefault();
-        this.on.transition?.(name);
-      });
+      this.pressed(group, () => this.on.transition?.(name));
       for (const kind of ["pointerenter", "focus"]) group.addEventListener(kind, () => this.on.pointed?.(name));
       for (const kind of ["pointerleave", "blur"]) group.addEventListener(kind, () => this.on.pointed?.(null));
       this.bars.set(name, group);
@@ -118,6 +129,43 @@ export class Picture {
           this.gates.push({ signal: signal.name, wanted, group });
         }
       }
+    }
+  }
+
+  private pressed(group: SVGGElement, act: () => void): void {
+    group.setAttribute("role", "button");
+    group.addEventListener("click", act);
+    group.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter" && event.key !== " ") return;
+      event.preventDefault();
+      act();
+    });
+  }
+
+  /** Go through places and transitions by the arrow keys; one of them is reached by Tab. */
+  private rove(): void {
+    this.element.shadowRoot!.addEventListener("keydown", (event) => {
+      const to = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[(event as KeyboardEvent).key];
+      if (to === undefined) return;
+      const all = [...this.element.shadowRoot!.querySelectorAll<SVGGElement>("[role=button]")];
+      const at = all.indexOf(event.target as SVGGElement);
+      const next = all[(at + to + all.length) % all.length];
+      if (at < 0 || next === undefined) return;
+      event.preventDefault();
+      for (const one of all) one.setAttribute("tabindex", one === next ? "0" : "-1");
+      next.focus();
+    });
+  }
+
+  /** Show which place or transition is chosen. */
+  choose(kind: string, name: string): void {
+    const chosen = kind === "place" ? this.places.get(name) : this.bars.get(name);
+    const all = [...this.places.values(), ...this.bars.values()];
+    for (const one of all) {
+      one.classList.toggle("chosen", one === chosen);
+      one.setAttribute("tabindex", one === (chosen ?? all[0]) ? "0" : "-1");
+      if (one === chosen) one.setAttribute("aria-pressed", "true");
+      else one.removeAttribute("aria-pressed");
     }
   }
 

@@ -1,10 +1,10 @@
 // Playing with a net. The page holds where it is and where it was; what may fire, and what comes of it, it asks.
 
 import { announce, counted, h } from "./dom";
-import { banner, frame, panel, type Frame } from "./frame";
+import { banner, frame, panel, watchFile, type Frame } from "./frame";
 import { Picture } from "./picture";
 import { Playback } from "./playback";
-import { ask, Refused, type Fired, type Moment, type PlayPage, type Run, type RunSummary, type Verdict } from "./server";
+import { ask, Refused, type EditState, type Fired, type Moment, type PlayPage, type Run, type RunSummary, type Verdict } from "./server";
 
 interface Step {
   what: string;
@@ -36,7 +36,11 @@ export class Play {
   private readonly words = new Map<string, string>();
   private playback: Playback | null = null;
 
-  constructor(private readonly page: PlayPage) {
+  constructor(
+    private readonly page: PlayPage,
+    private readonly edit: (state: EditState) => void,
+    private readonly reload: () => void,
+  ) {
     for (const { name, says } of page.net.transitions) this.words.set(name, says);
     this.picture = new Picture(page.net, page.picture, {
       transition: (name) => void this.fire(name),
@@ -45,7 +49,9 @@ export class Play {
     });
     this.frame = frame(page.net.name || "the net", page.net.description, "Playing", this.picture);
     this.steps = [{ what: "the initial marking", moment: page.moment }];
-    this.frame.tools.append(this.undoButton, this.redoButton, this.resetButton, this.gatesSwitch);
+    const editButton = this.button("Edit", "Edit the net file", () => void this.beginEdit());
+    this.frame.tools.append(this.undoButton, this.redoButton, this.resetButton, this.gatesSwitch, editButton);
+    if (page.editable) watchFile(this.frame, this.reload);
     this.gatesSwitch.title = "Free: external gates are open, as the analysis has them. Else they are as the signals say.";
     this.frame.side.append(
       h("div", { class: "own" }, panel("May fire", this.mayFire), this.waitPanel),
@@ -54,10 +60,19 @@ export class Play {
     );
     this.makeSwitches();
     this.showChecks(page.verdicts, page.runs);
-    addEventListener("keydown", (event) => this.key(event));
+    addEventListener("keydown", (event) => this.key(event), { signal: this.frame.gone });
     const kept = sessionStorage.getItem(KEPT);
     this.show();
     void this.goOn(kept ?? "{}");
+  }
+
+  private beginEdit(): Promise<void> {
+    return this.doing(async () => {
+      const state = await ask<EditState>("api/edit");
+      if (state.why_not === undefined) return this.edit(state);
+      this.frame.hint.textContent = `Not to be edited: ${state.why_not}.`;
+      announce(this.frame.hint.textContent);
+    });
   }
 
   private get now(): Moment {

@@ -83,6 +83,7 @@ export interface Verdict {
 export interface PlayPage {
   mode: "play";
   file: string;
+  editable: boolean;
   net: Net;
   picture: string;
   moment: Moment;
@@ -96,7 +97,25 @@ export interface Problem {
   hint: string;
   line: number | null;
   column: number | null;
+  length: number | null;
 }
+
+export const PARTS = ["from", "to", "if", "unless"] as const;
+export type Part = (typeof PARTS)[number];
+
+/** The file that is edited, or why none is. */
+export interface EditState {
+  why_not?: string;
+  text: string;
+  version: string;
+  undo: string | null;
+  redo: string | null;
+  arcs: Record<string, Record<Part, string[]>>;
+  marked: string[];
+}
+
+/** What came of an edit: the net with it, or a text that is no net and was not written. */
+export type Edited = { page: PlayPage; edit: EditState } | { errors: Problem[]; draft: string; version: string | null };
 
 /** An answer that is a refusal, in the server's words. */
 export class Refused extends Error {

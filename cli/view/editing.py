@@ -1,0 +1,256 @@
+"""Editing the net on the page: what is asked is done to the text of its file, which stays the truth.
+
+Each edit is made in the text (`nets/editing`), the whole text is read again, and only what reads is written, at once:
+the file on the disk is always the net that is shown. What does not read comes back as a draft with its errors, to be
+mended in the text or thrown away. The page says with each edit which file it means, by the bytes that it had; where
+these are others now, because somebody has the file open in an editor, nothing is written (F1019).
+
+Who may edit: whoever may see, on this host, and only the one net file that `firable view` was given. A net of the
+catalogue, PNML and bundles are not edited, and with `--read-only` nothing is.
+
+Steps are undone here and not in the page, so that a reload of the window loses none. A file that was read again begins
+anew: what another program has written is not undone from here.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from aiohttp import web
+
+from firable.cli.draw import NODES_MAX
+from firable.cli.view.playing import Playing
+from firable.cli.view.site import answering, diagnostic_json, refusal
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.editing import edits
+from firable.nets.editing.net_file import NetFile
+from firable.nets.editing.yaml_text import YamlText
+from firable.nets.loading import Loaded
+from firable.nets.occurrences import Kind
+from firable.nets.source import Source
+from firable.nets.text import parse_positioned
+from firable.nets.text_positions import Positions
+
+STEPS_MAX: Final = 200
+"""So many edits are undone."""
+
+Asked = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class _Step:
+    """An edit that was made: in words, and the text before it, or after it once it is undone."""
+
+    what: str
+    text: str
+
+
+@dataclass
+class Editing:
+    """The file that is edited; `why_not` says why it is none, and then nothing is written."""
+
+    playing: Playing
+    file: NetFile | None
+    why_not: str = ""
+    done: list[_Step] = field(default_factory=list)
+    undone: list[_Step] = field(default_factory=list)
+    one_at_a_time: asyncio.Lock = field(default_factory=asyncio.Lock)
+
+    def routes(self) -> Iterable[web.AbstractRouteDef]:
+        """What the page asks."""
+        yield web.get("/api/edit", answering(self.state))
+        yield web.get("/api/edit/version", answering(self.version))
+        for name, answer in (
+            ("", self.edit),
+            ("/text", self.put),
+            ("/try", self.tried),
+            ("/undo", self.undo),
+            ("/redo", self.redo),
+            ("/reload", self.reload),
+        ):
+            yield web.post(f"/api/edit{name}", answering(answer))
+
+    async def state(self, _: Asked) -> dict[str, Any]:
+        """The text, and what the page lists of it."""
+        if self.file is None:
+            return {"why_not": self.why_not}
+        text = YamlText(self.file.source)
+        arcs = {
+            name: {part: edits.names_in(text.at(("transitions", name, part))) for part in edits.PARTS}
+            for name in text.at(("transitions",)) or {}
+        }
+        return {
+            "text": self.file.source.text,
+            "version": self.file.version,
+            "undo": self.done[-1].what if self.done else None,
+            "redo": self.undone[-1].what if self.undone else None,
+            "arcs": arcs,
+            "marked": [place.name for place in self.playing.player.net.places if place.marked],
+        }
+
+    async def version(self, _: Asked) -> dict[str, Any]:
+        """Whether the file is still what is shown."""
+        return {"current": self.file is not None and await asyncio.to_thread(self.file.is_current)}
+
+    async def edit(self, asked: Asked) -> dict[str, Any]:
+        """One edit of the net."""
+        make, what = _edit_of(asked)
+        async with self.one_at_a_time:
+            file = self._meant(asked)
+            after = make(file.source)
+            if after.text == file.source.text:
+                return await self._shown()
+            return await self._written(after.text, what)
+
+    async def put(self, asked: Asked) -> dict[str, Any]:
+        """The whole text, as somebody has typed it."""
+        async with self.one_at_a_time:
+            self._meant(asked)
+            return await self._written(_text(asked), "the text")
+
+    async def tried(self, asked: Asked) -> dict[str, Any]:
+        """What the reader says of a text; nothing is written."""
+        try:
+            await asyncio.to_thread(_read, Source(self.playing.file, _text(asked)))
+        except InputError as error:
+            return {"errors": [diagnostic_json(one) for one in error.diagnostics]}
+        return {"errors": []}
+
+    async def undo(self, asked: Asked) -> dict[str, Any]:
+        """The text before the last edit."""
+        async with self.one_at_a_time:
+            return await self._back(asked, self.done, self.undone)
+
+    async def redo(self, asked: Asked) -> dict[str, Any]:
+        """The text after the edit that was undone last."""
+        async with self.one_at_a_time:
+            return await self._back(asked, self.undone, self.done)
+
+    async def reload(self, _: Asked) -> dict[str, Any]:
+        """The file as it is on the disk now; where it is no net, it comes back as a draft."""
+        async with self.one_at_a_time:
+            self.file = file = NetFile.read(self._file().path)
+            self.done.clear()
+            self.undone.clear()
+            try:
+                self.playing.take(await asyncio.to_thread(_read, file.source))
+            except InputError as error:
+                return _draft(error, file.source.text, version=file.version)
+            return await self._shown()
+
+    def _file(self) -> NetFile:
+        if self.file is None:
+            raise InputError([Diagnostic("F1020", self.why_not, "edit a net file: `firable view cell.firable.yaml`")])
+        return self.file
+
+    def _meant(self, asked: Asked) -> NetFile:
+        """The file, which must be the one that the page shows."""
+        file = self._file()
+        if asked.get("version") != file.version:
+            message = f"{file.path} has been edited since this window has shown it"
+            raise InputError([Diagnostic("F1019", message, "load it again; nothing is written")])
+        return file
+
+    async def _back(self, asked: Asked, steps: list[_Step], others: list[_Step]) -> dict[str, Any]:
+        file = self._meant(asked)
+        if not steps:
+            raise refusal("there is nothing to undo, or to do again")
+        step = steps[-1]
+        loaded = await asyncio.to_thread(_read, Source(file.source.file, step.text))
+        self.file = file.written(step.text)
+        steps.pop()
+        others.append(_Step(step.what, file.source.text))
+        self.playing.take(loaded)
+        return await self._shown()
+
+    async def _written(self, text: str, what: str) -> dict[str, Any]:
+        """A new text, written where it is a net."""
+        file = self._file()
+        try:
+            loaded = await asyncio.to_thread(_read, Source(file.source.file, text))
+        except InputError as error:
+            return _draft(error, text)
+        self.file = file.written(text)
+        self.done = [*self.done, _Step(what, file.source.text)][-STEPS_MAX:]
+        self.undone.clear()
+        self.playing.take(loaded)
+        return await self._shown()
+
+    async def _shown(self) -> dict[str, Any]:
+        return {"page": await self.playing.page({}), "edit": await self.state({})}
+
+
+def editing_of(playing: Playing, argument: str, *, read_only: bool) -> Editing:
+    """How the net that a command has named may be edited."""
+    if read_only:
+        return Editing(playing, None, "the page was opened with --read-only")
+    if argument.startswith("catalogue:"):
+        name = argument.removeprefix("catalogue:")
+        hint = f"`firable convert {argument} -o {name}.firable.yaml` makes a file of it"
+        return Editing(playing, None, f"a net of the catalogue is not edited: {hint}")
+    if not isinstance(playing.loaded.positions, Positions):
+        hint = f"`firable convert {argument} -o {Path(argument).stem}.firable.yaml` makes a net file of it"
+        return Editing(playing, None, f"only a net file is edited: {hint}")
+    file = NetFile.read(argument)
+    if not file.may_be_written():
+        return Editing(playing, None, f"{argument} may not be written to")
+    playing.editable = True
+    return Editing(playing, file)
+
+
+def _read(source: Source) -> Loaded:
+    """The net of a text, small enough for a picture."""
+    net, positions = parse_positioned(source.text, source.file)
+    if (count := len(net.places) + len(net.transitions)) > NODES_MAX:
+        message = f"{count:,} places and transitions make no picture that anybody can read"
+        raise InputError([Diagnostic("F1020", message, f"edit a net of more than {NODES_MAX:,} in an editor of text")])
+    return Loaded(net, positions=positions)
+
+
+def _draft(error: InputError, text: str, version: str | None = None) -> dict[str, Any]:
+    """A text that is no net: what is wrong with it, and where; it is not written."""
+    return {"errors": [diagnostic_json(one) for one in error.diagnostics], "draft": text, "version": version}
+
+
+def _text(asked: Asked) -> str:
+    if not isinstance(text := asked.get("text"), str):
+        raise refusal("a text is wanted")
+    return text
+
+
+_KINDS: Final = {kind.value: kind for kind in (Kind.CONTROLLER, Kind.PLACE, Kind.SIGNAL, Kind.TRANSITION)}
+
+
+def _edit_of(asked: Asked) -> tuple[Callable[[Source], Source], str]:
+    """The edit that a request names, and in words; raises `InputError` F5070 where it names none."""
+    match asked:
+        case {"do": "add", "kind": "controller", "name": str(name)}:
+            return lambda s: edits.add_controller(s, name), f"controller {name} added"
+        case {"do": "add", "kind": "transition", "name": str(name)}:
+            return lambda s: edits.add_transition(s, name), f"transition {name} added"
+        case {"do": "add", "kind": "place", "name": str(name), "owner": str() | None as owner}:
+            return lambda s: edits.add_place(s, name, owner), f"place {name} added"
+        case {"do": "add", "kind": "signal", "name": str(name), "owner": str() | None as owner}:
+            return lambda s: edits.add_sensor(s, name, owner), f"sensor {name} added"
+        case {"do": "connect", "transition": str(t), "part": str(part), "name": str(name)}:
+            return lambda s: edits.connect(s, t, part, name), f"{t} {part} {name}"
+        case {"do": "disconnect", "transition": str(t), "part": str(part), "name": str(name)}:
+            return lambda s: edits.disconnect(s, t, part, name), f"{t} no more {part} {name}"
+        case {"do": "mark", "name": str(name), "marked": bool(marked)}:
+            return lambda s: edits.mark(s, name, marked=marked), f"{'a' if marked else 'no'} token on {name}"
+        case {"do": what, "kind": str(kind), "name": str(name)} if kind in _KINDS:
+            of = _KINDS[kind]
+            match what, asked:
+                case "describe", {"words": str(words)}:
+                    return lambda s: edits.describe(s, of, name, words), f"{name} described"
+                case "rename", {"new": str(new)}:
+                    return lambda s: edits.rename(s, of, name, new), f"{name} renamed to {new}"
+                case "own", {"owner": str() | None as owner} if of in {Kind.PLACE, Kind.SIGNAL}:
+                    return lambda s: edits.own(s, of, name, owner), f"{name} given to {owner or 'nobody'}"
+                case "delete", _:
+                    return lambda s: edits.delete(s, of, name), f"{name} deleted"
+    raise refusal("the page asks for an edit that is not known")

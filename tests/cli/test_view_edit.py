@@ -1,0 +1,232 @@
+"""The page edits a net: the text of the file is the truth, and what is no net is not written."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import urllib.error
+import urllib.request
+from collections.abc import Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+from support.browser import PATIENCE_MS, browser, command, needs_browser, page_at
+
+from firable.cli.main import main
+from firable.cli.options import load_net
+from firable.cli.view.editing import editing_of
+from firable.cli.view.playing import Playing
+from firable.nets.diagnostics import InputError
+
+expect.set_options(timeout=PATIENCE_MS)
+
+TEXT = """\
+# the cell
+firable: 1
+cell: demo
+controllers:
+  robot:
+    start: free
+    inputs: [door_shut]   # a sensor
+    places:
+      free:     # at rest
+      busy:     {send: {machine: R, command: MOVE}, until: at_home}
+  mc:
+transitions:
+  go:   {from: robot.free, to: robot.busy}   # there
+  back: {from: robot.busy, to: robot.free}   # and back
+properties:
+  rests: {always_possible: robot.free}
+"""
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with browser() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+    path = tmp_path_factory.mktemp("edit") / "cell.firable.yaml"
+    path.write_text(TEXT)
+    with command("view", path, "--no-browser") as (address, _):
+        yield address, path
+
+
+@pytest.fixture
+def file(served: tuple[str, Path]) -> Path:
+    """The file as it was at first, and known so to the server."""
+    address, path = served
+    path.write_text(TEXT)
+    assert asked(address, "reload", {})[0] == 200
+    return path
+
+
+def asked(address: str, path: str, body: object = None, *, shown: bool = True) -> tuple[int, Any]:
+    base, _, token = address.partition("#token=")
+    data = None if body is None else json.dumps(body).encode()
+    request = urllib.request.Request(f"{base}api/edit/{path}".rstrip("/"), data)
+    if shown:
+        request.add_header("Authorization", f"Bearer {token}")
+    try:
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return answer.status, json.loads(answer.read())
+    except urllib.error.HTTPError as error:
+        return error.code, json.loads(error.read())
+
+
+def ended(answer: Coroutine[Any, Any, dict[str, Any]]) -> dict[str, Any]:
+    """An answer of the server, in a thread of its own: the browser is driven from an event loop in this one."""
+    with ThreadPoolExecutor() as thread:
+        return thread.submit(asyncio.run, answer).result()
+
+
+def begin(page: Page) -> None:
+    page.get_by_role("button", name="Edit", exact=True).click()
+    expect(page.get_by_label("Text of the net file")).to_have_value(TEXT)
+
+
+def done(page: Page, words: str) -> None:
+    expect(page.locator(".status")).to_have_text(f"Done: {words}.")
+
+
+@needs_browser
+def test_a_net_is_edited_in_the_picture_and_by_names_and_all_is_undone(
+    chromium: Browser, served: tuple[str, Path], file: Path
+) -> None:
+    with page_at(chromium, served[0]) as page:
+        begin(page)
+        adding = page.locator(".panel").filter(has=page.get_by_role("heading", name="Add"))
+        adding.get_by_label("Name").fill("done")
+        adding.get_by_label("Owner").select_option("mc")
+        page.keyboard.press("Enter")
+        done(page, "place done added")
+        page.get_by_role("button", name="Arc").click()
+        page.locator('[id="transition:go"] rect.hit').first.click()
+        page.locator('[id="place:mc.done"] circle.place').click()
+        done(page, "go to mc.done")
+        page.get_by_role("group", name="Gate unless").get_by_role("combobox").select_option("robot.door_shut")
+        page.get_by_role("button", name="Gate unless: add").click()
+        done(page, "go unless robot.door_shut")
+        page.keyboard.press("Escape")
+        page.locator('[id="place:robot.busy"] circle.place').click()
+        page.get_by_label("Owner").first.select_option("mc")
+        page.get_by_role("button", name="Give").click()
+        done(page, "robot.busy given to mc")
+        page.get_by_label("Name").first.fill("moving")
+        page.keyboard.press("Enter")
+        done(page, "mc.busy renamed to moving")
+        moved = "{send: {machine: R, command: MOVE}, until: at_home}\n"
+        expected = (
+            TEXT.replace(f"      busy:     {moved}", "")
+            .replace("  mc:\n", f"  mc:\n    places:\n      done:\n      moving: {moved}")
+            .replace("robot.busy}   # there", "[mc.moving, mc.done], unless: robot.door_shut}   # there")
+            .replace("robot.busy, to: robot.free}", "mc.moving, to: robot.free}")
+        )
+        assert file.read_text() == expected
+        page.get_by_role("button", name="← Play").click()
+        expect(page.locator('[id="place:mc.moving"]')).to_be_attached()
+        page.get_by_role("button", name="Edit", exact=True).click()
+        for words in (
+            "mc.busy renamed to moving",
+            "robot.busy given to mc",
+            "go unless robot.door_shut",
+            "go to mc.done",
+        ):
+            page.locator(".picture").focus()
+            page.keyboard.press("Control+z")
+            expect(page.locator(".status")).to_have_text(f"Undone: {words}.")
+        page.keyboard.press("Control+z")
+        expect(page.get_by_label("Text of the net file")).to_have_value(TEXT)
+        assert file.read_text() == TEXT
+        page.keyboard.press("Control+Shift+z")
+        expect(page.locator('[id="place:mc.done"]')).to_be_attached()
+
+
+@needs_browser
+def test_what_is_no_net_is_shown_at_its_line_and_not_written(
+    chromium: Browser, served: tuple[str, Path], file: Path
+) -> None:
+    with page_at(chromium, served[0]) as page:
+        begin(page)
+        page.locator('[id="place:robot.free"]').focus()
+        page.keyboard.press("Enter")
+        page.get_by_role("button", name="Delete robot.free").click()
+        expect(page.get_by_role("alert")).to_contain_text("nothing is written: there is no place 'robot.free'")
+        text = page.get_by_label("Text of the net file")
+        expect(text).to_have_attribute("aria-invalid", "true")
+        expect(page.locator(".gutter .bad")).to_have_text("14")
+        assert file.read_text() == TEXT
+        text.fill(text.input_value().replace("always_possible: robot.free", "never: robot.busy"))
+        expect(page.locator(".problems li")).to_have_count(0)
+        page.keyboard.press("Control+s")
+        done(page, "the text")
+        expect(page.locator('[id="place:robot.free"]')).to_have_count(0)
+        assert "never: robot.busy" in file.read_text()
+        assert "# and back" in file.read_text()
+
+
+@needs_browser
+def test_a_file_that_somebody_else_has_changed_is_not_written_over(
+    chromium: Browser, served: tuple[str, Path], file: Path
+) -> None:
+    theirs = TEXT.replace("cell: demo", "cell: other")
+    with page_at(chromium, served[0]) as page:
+        begin(page)
+        page.get_by_label("Chosen").select_option("transition:back")
+        file.write_text(theirs)
+        page.get_by_role("button", name="Delete back").click()
+        expect(page.get_by_role("alert")).to_contain_text("has been changed by somebody else")
+        assert file.read_text() == theirs
+        page.get_by_role("button", name="Load it again").click()
+        expect(page.get_by_label("Text of the net file")).to_have_value(theirs)
+        expect(page.get_by_role("button", name="Undo")).to_be_disabled()
+        file.write_text(TEXT)
+        expect(page.locator(".banner")).to_contain_text("The file has been changed on the disk.")
+
+
+def test_nobody_edits_without_the_token_or_what_is_not_understood(served: tuple[str, Path], file: Path) -> None:
+    address = served[0]
+    for path in ("", "text", "try", "undo", "redo", "reload"):
+        assert asked(address, path, {}, shown=False)[0] == 401
+    version = asked(address, "")[1]["version"]
+    for body in (
+        {},
+        {"do": "add"},
+        {"do": "own", "kind": "transition", "name": "go", "owner": None},
+        {"do": "delete", "kind": "cell", "name": "c"},
+    ):
+        status, answer = asked(address, "", {"version": version, **body})
+        assert (status, answer["errors"][0]["code"]) == (422, "F5070")
+    status, answer = asked(address, "text", {"version": "another", "text": "firable: 1\ncell: c\n"})
+    assert (status, answer["errors"][0]["code"]) == (422, "F1019")
+    status, answer = asked(address, "undo", {"version": version})
+    assert (status, answer["errors"][0]["code"]) == (422, "F5070")
+    assert file.read_text() == TEXT
+
+
+@pytest.mark.parametrize(
+    ("net", "read_only", "why"),
+    [
+        ("cell.firable.yaml", True, "--read-only"),
+        ("catalogue:one_robot", False, "`firable convert catalogue:one_robot -o one_robot.firable.yaml` makes a file"),
+        ("cell.pnml", False, "`firable convert cell.pnml -o cell.firable.yaml` makes a net file"),
+    ],
+)
+def test_what_may_not_be_edited_says_why(
+    net: str, read_only: bool, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("cell.firable.yaml").write_text(TEXT)
+    assert main(["convert", "cell.firable.yaml", "-o", "cell.pnml"]) == 0
+    loaded = load_net(net)
+    editing = editing_of(Playing(loaded, net), net, read_only=read_only)
+    assert not editing.playing.editable
+    assert why in ended(editing.state({}))["why_not"]
+    with pytest.raises(InputError, match="F1020"):
+        ended(editing.put({"version": None, "text": "firable: 1\ncell: c\n"}))
+    assert Path("cell.firable.yaml").read_text() == TEXT
