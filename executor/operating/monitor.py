@@ -17,6 +17,9 @@ its gate (O4). Those of completions stay, which only their command clears.
 the latency, but for one that waits until its place is free. A marking of the belief in which the machine is still at it
 is then dropped, as one whose signal should have been taken by now; what is left, if anything, explains the silence.
 
+The same markings are believed again and again, so what may happen hidden in one, and what must, is remembered, for a
+bounded number of them.
+
 The first divergence is the last: a model that the cell has left says nothing of what follows. Rejected: a twin, the
 simulated cell run beside the real one. It has one history where the belief has all, so it needs a tolerance for every
 difference, and it does not know when workpieces come.
@@ -42,6 +45,9 @@ LATENCY_SECONDS: Final = 0.5
 """How long after its change a signal is taken at the latest, unless a caller knows better."""
 
 _NEVER: Final = -math.inf
+
+_REMEMBERED: Final = 10_000
+"""For how many markings it is remembered what may happen hidden in them, and what must."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +108,9 @@ class _Demand:
     subject: str
 
 
+_Demanded = tuple[list[tuple[str, float, str | None]], list[tuple[int, str]]]
+"""The commands that must be done, each with how long it may take and its completion; the signals that must be taken."""
+
 _Belief = dict[Marking, tuple[float, ...]]
 """Each marking of the loop with, for each signal, when it last changed there without having been taken since."""
 
@@ -150,6 +159,10 @@ class Monitor:
         self.shown = tuple((self._bit(place), means) for place, means in map(loop.shown.__getitem__, self.signals))
         self.work = {place.name: self._work(laws, place.name, loop.at) for place in laws.commanding}
         self.taken = [bool(loop.net.initial_marking & bit) == means for bit, means in self.shown]
+        self.hidden_in: dict[Marking, list[_Move]] = {}
+        self.demanded_in: dict[tuple[Marking, tuple[bool, ...]], _Demanded] = {}
+        self.shown_by: dict[Marking, list[int]] = {}
+        """For each change of the loop that a move makes, the indexes of the signals that it changes."""
         self.sent_seconds: dict[str, float] = {}
         self.marking = net.initial_marking
         self.divergence: Divergence | None = None
@@ -261,20 +274,28 @@ class Monitor:
         while open_:
             marking = open_.pop()
             since = closed[marking]
-            for move in self.hidden:
-                if move.firable(marking):
-                    after, stamps = self._after(marking, since, move, at_seconds)
-                    if self._add(closed, after, stamps):
-                        open_.append(after)
+            for move in self._hidden(marking):
+                after, stamps = self._after(marking, since, move, at_seconds)
+                if self._add(closed, after, stamps):
+                    open_.append(after)
         return closed
+
+    def _hidden(self, marking: Marking) -> list[_Move]:
+        """What may happen hidden in a marking."""
+        if (moves := self.hidden_in.get(marking)) is None:
+            if len(self.hidden_in) >= _REMEMBERED:
+                self.hidden_in.clear()
+            moves = self.hidden_in[marking] = [move for move in self.hidden if move.firable(marking)]
+        return moves
 
     def _after(
         self, marking: Marking, since: tuple[float, ...], move: _Move, at_seconds: float
     ) -> tuple[Marking, tuple[float, ...]]:
+        if (changed := self.shown_by.get(move.flips)) is None:
+            changed = self.shown_by[move.flips] = [s for s, (bit, _) in enumerate(self.shown) if move.flips & bit]
         stamps = since
-        for s, (bit, _) in enumerate(self.shown):
-            if move.flips & bit:
-                stamps = (*stamps[:s], at_seconds, *stamps[s + 1 :])
+        for s in changed:
+            stamps = (*stamps[:s], at_seconds, *stamps[s + 1 :])
         return marking ^ move.flips, stamps
 
     @staticmethod
@@ -287,15 +308,29 @@ class Monitor:
 
     def _demands(self, marking: Marking, since: tuple[float, ...]) -> Iterator[_Demand]:
         """What must have happened by when, if the loop is in this marking."""
-        for place, work in self.work.items():
-            waits = work.waits_while_empty and not marking & work.waits_while_empty
-            if marking & work.busy and not waits:
-                begun = self.sent_seconds.get(place, 0.0) + work.longest_seconds
-                completion = self.net.place(place).completion
-                yield _Demand(self._excused(begun, completion) + self.latency_seconds, place)
-        for name, (bit, means), stamp, taken in zip(self.signals, self.shown, since, self.taken, strict=True):
-            if (bool(marking & bit) == means) != taken:
-                yield _Demand(self._excused(stamp, name) + self.latency_seconds, name)
+        works, signals = self._demanded(marking)
+        for place, longest_seconds, completion in works:
+            begun = self.sent_seconds.get(place, 0.0) + longest_seconds
+            yield _Demand(self._excused(begun, completion) + self.latency_seconds, place)
+        for s, name in signals:
+            yield _Demand(self._excused(since[s], name) + self.latency_seconds, name)
+
+    def _demanded(self, marking: Marking) -> _Demanded:
+        """What must happen in a marking, whenever it came about."""
+        key = (marking, tuple(self.taken))
+        if (known := self.demanded_in.get(key)) is not None:
+            return known
+        works = [
+            (place, work.longest_seconds, self.net.place(place).completion)
+            for place, work in self.work.items()
+            if marking & work.busy and not (work.waits_while_empty and not marking & work.waits_while_empty)
+        ]
+        shown = [bool(marking & bit) == means for bit, means in self.shown]
+        signals = [(s, name) for s, name in enumerate(self.signals) if shown[s] != self.taken[s]]
+        if len(self.demanded_in) >= _REMEMBERED:
+            self.demanded_in.clear()
+        self.demanded_in[key] = works, signals
+        return works, signals
 
     def _look_at_promises(self, at_seconds: float) -> None:
         held = {name for name in self.signals if self.is_held(name)}
