@@ -102,9 +102,10 @@ def test_transition_of_free_parts_is_asked_of_nobody() -> None:
 @examples(6)
 @given(st.one_of(owned_nets(), timed_nets()))
 def test_protocol_of_random_nets_with_free_parts_refines_and_loses_nothing(net: Net) -> None:
-    found = explore_protocol(freed(split(net)), limits=Limits(Deadline.after(2)))
+    deadline = Deadline.after(2)
+    found = explore_protocol(freed(split(net)), limits=Limits(deadline))
     assert Status.VIOLATED not in statuses(found)
-    assert found.space.bound or statuses(found) == {Status.PROVED}
+    assert found.space.bound or deadline.over or statuses(found) == {Status.PROVED}
 
 
 def test_partition_refinement_and_closures_both_see_what_a_dead_controller_loses() -> None:
