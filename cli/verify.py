@@ -213,7 +213,8 @@ def _refuse_another_net(file: str, net: Net, of: Net) -> None:
 def _obligations(document: Document, timeout_ms: int) -> Iterator[tuple[str, str]]:
     """The SMT-LIB 2 text of each obligation, by the name of its file: verdict, number of the claim, obligation."""
     from firable.analysis.deadline import Deadline
-    from firable.analysis.evidence.checking.obligations import Evidence, obligations, sums_text
+    from firable.analysis.evidence.checking.obligation import Evidence
+    from firable.analysis.evidence.checking.obligations import obligations, sums_text
     from firable.analysis.evidence.refusal import TimeIsOverError
     from firable.nets.bundle import file_stem
 

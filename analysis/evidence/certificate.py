@@ -14,6 +14,8 @@ technique that found it, can check:
   marking, which falls along some firing (or along every one), and each "always" with a set that is not left;
 - *stubborn sets* are markings too, in each of which a set of transitions says which firings count: no goal is reached
   by them, nor then by those that are left out;
+- a *reduction* is a list of rules by which the net becomes a smaller one that reaches the goal if the net itself does,
+  and a certificate for that one;
 - a *continuation* is a firing sequence and a certificate for the net that starts where it ends: from there the goal is
   never reached again;
 - *progress* shows a response under fairness: ranks that no firing without the answer raises, and for each rank a
@@ -30,9 +32,10 @@ and Stålmarck 2000, "Checking safety properties using induction and a SAT-solve
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
+from firable.nets.formula import Constant, Formula
 from firable.nets.net import Marking
 
 
@@ -168,7 +171,55 @@ class StubbornSets:
     chosen: tuple[int, ...]
 
 
-NeverCertificate = InductiveInvariant | Labelling | StubbornSets
+class Rule(StrEnum):
+    """The rules of a reduction, with what a step names of each.
+
+    What each of them asks for and does is in `firable.analysis.evidence.checking.reductions`.
+    """
+
+    CONSTANT = "constant"  # places whose value never changes
+    IRRELEVANT = "irrelevant"  # moves that the goal does not depend on
+    UNNEEDED = "unneeded"  # places that no move needs
+    COPY = "copy"  # two places: the first is always the second, or always its complement
+    SUBSUMED = "subsumed"  # two moves: the second does what the first does, and needs no more
+    EARLY = "early"  # a move that may as well be made at once
+    FACTS = "facts"  # nothing: which literals are never true together is computed anew
+    DEAD = "dead"  # moves that a fact forbids
+    GATE = "gate"  # a move, and places whose value its other needs imply
+    IMPLIED = "implied"  # a place whose value is implied wherever it is needed
+    CLOSERS_EARLY = "closers-early"  # a place around which moves are made in one
+    OPENERS_LATE = "openers-late"  # the same, by the other order
+    ALWAYS = "always"  # a move that needs nothing: there is no deadlock
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One application of a rule.
+
+    Moves are numbered: the transitions of the net by their indexes, then those that steps make of two, one by one.
+    """
+
+    rule: Rule
+    moves: tuple[int, ...] = ()
+    places: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Reduction:
+    """The net becomes smaller by the steps, and then falls apart; in one part the goal is never met.
+
+    `part` names its places. `goal` speaks of them, and follows from the goal of the net wherever the net, with what the
+    steps say of its places, meets it; `then` shows that it is never met. Where the goal is false after the steps, both
+    are missing.
+    """
+
+    steps: tuple[Step, ...]
+    part: tuple[str, ...] = ()
+    goal: Formula = field(default=Constant(value=False))
+    then: InductiveInvariant | Labelling | StubbornSets | None = None
+
+
+NeverCertificate = InductiveInvariant | Labelling | StubbornSets | Reduction
 """What shows that a goal is never met."""
 
 

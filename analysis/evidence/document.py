@@ -37,8 +37,10 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from firable.analysis.evidence.certificate import Certificate
+from firable.analysis.evidence.certificate_records import certificate_to_json
+from firable.analysis.evidence.claim_records import Sets, claim_to_json
 from firable.analysis.evidence.claims import Claim
-from firable.analysis.evidence.document_records import EvidenceRecord, Sets, certificate_to_json, claim_to_json
+from firable.analysis.evidence.document_records import EvidenceRecord
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.formula import FormulaError
 from firable.nets.interchange import canonical_json, net_digest, net_from_json, net_to_json

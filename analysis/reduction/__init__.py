@@ -26,8 +26,9 @@ terms, in the essay of its file:
 - `agglomeration`: two transitions that may as well fire as one
 - `pairs`: the facts, which literals are never true together
 
-`reduce` applies them until none applies, `goals` is what they preserve, `components` takes apart what is left, and
-`deciding` puts all of it before any technique.
+What a rule does it notes as a step, which a checker with conditions of its own takes again
+(`firable.analysis.evidence.checking.reductions`). `reduce` applies the rules until none applies, `goals` is what they
+preserve, `components` takes apart what is left, and `deciding` puts all of it before any technique.
 
 All of it is for interleaving: synchronous steps count how long things take, which no reduction leaves alone.
 Rejected: reductions that change what is asked but keep a bound on the answer, since no verdict here is approximate;

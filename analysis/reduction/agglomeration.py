@@ -46,6 +46,7 @@ from itertools import product
 from typing import Final
 
 from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import Rule
 from firable.analysis.reduction.draft import Draft, Literal, Move, Tail, composed, literal
 from firable.analysis.reduction.pairs import Facts
 
@@ -93,11 +94,13 @@ def agglomerate_at(draft: Draft, facts: Facts, place: int) -> str:
     if around is None:
         return ""
     if around.closers_early():
+        draft.note(Rule.CLOSERS_EARLY, places=(place,))
         around.compose()
         return "closers early"
     if around.openers_late():
         if draft.deadlock:
             draft.tails.append(Tail(tuple(around.openers.values())))
+        draft.note(Rule.OPENERS_LATE, places=(place,))
         around.compose()
         return "openers late"
     return ""

@@ -17,6 +17,7 @@ Cost: linear in the arcs.
 
 from __future__ import annotations
 
+from firable.analysis.evidence.certificate import Rule
 from firable.analysis.reduction.draft import Draft, literal
 
 
@@ -34,10 +35,12 @@ def remove_constants(draft: Draft) -> bool:
                     if made not in possible:
                         possible.add(made)
                         todo.append(made)
+    constant = [place for place in draft.places if literal(place, not draft.values[place]) not in possible]
+    if constant:
+        draft.note(Rule.CONSTANT, places=constant)
     dead = [number for number, count in missing.items() if count and number in draft.moves]
     for number in dead:
         draft.remove(number)
-    constant = [place for place in draft.places if literal(place, not draft.values[place]) not in possible]
     draft.substitute({place: draft.values[place] for place in constant})
     for place in constant:
         draft.drop(place)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from firable.analysis.evidence.certificate import Rule
 from firable.analysis.reduction.draft import Draft, Move
 from firable.analysis.reduction.goals import Value
 
@@ -40,6 +41,8 @@ def merge_places(draft: Draft) -> bool:
         place: (draft.net.places[other].name, draft.values[place] == draft.values[other])
         for place, other in stands_for.items()
     }
+    for place, other in stands_for.items():
+        draft.note(Rule.COPY, places=(place, other))
     draft.substitute(values)
     dead = 0
     for place, other in stands_for.items():
@@ -81,13 +84,16 @@ def _thin_out(draft: Draft, numbers: list[int]) -> int:
         needs = frozenset(draft.moves[number].literals)
         if (other := same.setdefault(needs, number)) != number:
             draft.same_as[number] = other
+            draft.note(Rule.SUBSUMED, (number, other))
             draft.remove(number)
             removed += 1
     if draft.goal is None:
         return removed
     weakest: list[frozenset[int]] = []
     for needs in sorted(same, key=lambda needs: (len(needs), same[needs])):
-        if any(weaker <= needs for weaker in weakest[:_COMPARED_MAX]):
+        subsuming = next((weaker for weaker in weakest[:_COMPARED_MAX] if weaker <= needs), None)
+        if subsuming is not None:
+            draft.note(Rule.SUBSUMED, (same[needs], same[subsuming]))
             draft.remove(same[needs])
             removed += 1
         else:

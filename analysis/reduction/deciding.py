@@ -4,7 +4,8 @@ Every technique that decides a goal is a function of a net, a goal and limits (`
 stands in front of any of them. Where it leaves nothing to decide, the goal having become true or false, it answers by
 itself; where what is left falls apart, its parts are decided one by one. The witness is lifted and replayed on the
 original net, so a fault in a rule cannot become a wrong counterexample; against a wrong "not reachable" there is the
-proof in each rule, and the tests.
+proof in each rule, the tests, and evidence, whose checker takes the steps anew
+(`firable.analysis.evidence.checking.reductions`).
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def decide_reduced(
 ) -> Finding:
     """Reduce the net for the goal, let `decide` decide the rest, and lift its witness.
 
-    The method names the rules. A certificate would be one of the small net, so it is not handed on. Raises
+    The method names the rules. A certificate of the small net is not handed on: evidence is made with the steps. Raises
     `WitnessError` where a witness does not replay on the original net.
 
     >>> from firable.nets.catalogue import catalogue_net

@@ -30,7 +30,9 @@ from typing import Final
 
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import NEVER, Deadline
+from firable.analysis.evidence.certificate import Rule, Step
 from firable.analysis.reduction.goals import Goal, Value, literals_in, rewritten
+from firable.nets.formula import Constant
 from firable.nets.net import Net, Place, Transition
 
 _POLL: Final = 1_000  # transitions that are read between two looks at the deadline
@@ -116,8 +118,9 @@ class Draft:
     Raises `BudgetExceeded` where the deadline comes before the net is read: a part of it says nothing.
 
     `values` are those of M0; `at[l]` are the moves that need literal l. What a rule does goes through the methods, so
-    that the index keeps up. `number_of` gives the move that a transition was at first, `same_as` the one that it was
-    merged into. `touched` are the places at which something has changed since a rule last took them.
+    that the index keeps up. A transition is the move of its index; `same_as` gives the one that it was merged into.
+    `touched` are the places at which something has changed since a rule last took them, `steps` what was done so far,
+    for those who check it.
     """
 
     net: Net
@@ -132,7 +135,7 @@ class Draft:
     tails: list[Tail] = field(default_factory=list)
     applied: dict[str, int] = field(default_factory=dict)
     same_as: dict[int, int] = field(default_factory=dict)
-    number_of: dict[int, int] = field(default_factory=dict)
+    steps: list[Step] = field(default_factory=list)
     _next: int = 0
     _goal_literals: frozenset[Literal] | None = None
 
@@ -145,9 +148,10 @@ class Draft:
             if t and t % _POLL == 0 and self.deadline.over:
                 raise BudgetExceeded("the time was over before the net was read for its reduction")
             if (move := self._taken_over(t, transition)) is not None:
-                self.number_of[t] = self.add(move)
+                self._put(t, move)
             else:
                 self.count("dead transition")
+        self._next = len(self.net.transitions)
 
     def _taken_over(self, t: int, transition: Transition) -> Move | None:
         if not transition.openable:
@@ -169,6 +173,11 @@ class Draft:
         """Note that a rule was applied."""
         if times:
             self.applied[rule] = self.applied.get(rule, 0) + times
+
+    def note(self, rule: Rule, moves: Iterable[int] = (), places: Iterable[int] = ()) -> None:
+        """Keep a step for those who check it; a goal that is false already needs no more of them."""
+        if self.goal is not None and self.goal.formula != Constant(value=False):
+            self.steps.append(Step(rule, tuple(moves), tuple(self.net.places[p].name for p in places)))
 
     @property
     def deadlock(self) -> bool:
@@ -192,11 +201,14 @@ class Draft:
         """Add a move; its number."""
         number = self._next
         self._next += 1
+        self._put(number, move)
+        return number
+
+    def _put(self, number: int, move: Move) -> None:
         self.moves[number] = move
         for one in move.literals:
             self.at[one].add(number)
             self.touched[one // 2] = None
-        return number
 
     def remove(self, number: int) -> Move:
         """Remove a move."""
@@ -209,10 +221,7 @@ class Draft:
     def replace(self, number: int, move: Move) -> None:
         """Put another move in the place of one, which keeps its number."""
         self.remove(number)
-        self.moves[number] = move
-        for one in move.literals:
-            self.at[one].add(number)
-            self.touched[one // 2] = None
+        self._put(number, move)
 
     def needing(self, place: int) -> set[int]:
         """The moves that need a value of the place."""

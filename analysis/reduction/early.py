@@ -16,6 +16,7 @@ Each move is fired so at most once, because two that undo each other would do so
 
 from __future__ import annotations
 
+from firable.analysis.evidence.certificate import Rule
 from firable.analysis.reduction.draft import Draft
 
 
@@ -34,6 +35,7 @@ def fire_early(draft: Draft, fired: set[int]) -> bool:
             draft.values[place] = not draft.values[place]
             draft.touched[place] = None
         draft.first.append(move.origin)
+        draft.note(Rule.EARLY, (number,))
         fired.add(number)
         count += 1
     draft.count("early firing", count)

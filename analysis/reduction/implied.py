@@ -21,6 +21,7 @@ Cost: for each move, the pairs of its needs.
 from __future__ import annotations
 
 from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import Rule
 from firable.analysis.reduction.draft import Draft, Move
 from firable.analysis.reduction.pairs import Pairs
 
@@ -33,6 +34,8 @@ def remove_dead(draft: Draft, facts: Pairs, deadline: Deadline) -> bool:
     if deadline.over:
         return False
     dead = [number for number, move in draft.moves.items() if facts.dead(move)]
+    if dead:
+        draft.note(Rule.DEAD, dead)
     for number in dead:
         draft.remove(number)
     draft.count("dead transition", len(dead))
@@ -51,6 +54,7 @@ def remove_implied_gates(draft: Draft, facts: Pairs, deadline: Deadline) -> bool
         for place in list(move.reads):
             if _implied(move, place, facts):
                 move = move.without((place,))
+                draft.note(Rule.GATE, (number,), (place,))
                 removed += 1
         if move is not draft.moves[number]:
             draft.replace(number, move)
@@ -70,6 +74,7 @@ def remove_implied_places(draft: Draft, facts: Pairs, deadline: Deadline) -> boo
         if sum(len(move.needs) for move in moves) > _AROUND_MAX:
             continue
         if all(_implied(move, place, facts) for move in moves):
+            draft.note(Rule.IMPLIED, places=(place,))
             draft.drop(place)
             removed += 1
     draft.count("implied place", removed)

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import Rule, Step
 from firable.analysis.goal import Limits
 from firable.analysis.reduction.agglomeration import agglomerate
 from firable.analysis.reduction.constants import remove_constants
@@ -40,7 +41,7 @@ class Reduced:
     """A smaller net in which the goal is reachable if and only if it is in the `original`, and the way back.
 
     Under interleaving, external gates free. `original_goal` and `goal` say the same of either net. `applied` counts the
-    applications of each rule.
+    applications of each rule, `steps` lists them for those who check them.
     """
 
     original: Net
@@ -51,6 +52,7 @@ class Reduced:
     first: tuple[Origin, ...]
     moves: Mapping[str, Move]
     tails: tuple[Tail, ...]
+    steps: tuple[Step, ...]
 
     @property
     def summary(self) -> str:
@@ -136,7 +138,15 @@ def reduce_for_goal(net: Net, goal: Formula, limits: Limits | None = None) -> Re
     assert draft.goal is not None
     moves = {name: draft.moves[number] for name, number in numbers.items()}
     return Reduced(
-        net, goal, small, draft.goal.as_formula(), draft.applied, tuple(draft.first), moves, tuple(draft.tails)
+        net,
+        goal,
+        small,
+        draft.goal.as_formula(),
+        draft.applied,
+        tuple(draft.first),
+        moves,
+        tuple(draft.tails),
+        tuple(draft.steps),
     )
 
 
@@ -154,10 +164,10 @@ def reduce_for_liveness(net: Net, limits: Limits | None = None) -> ReducedTransi
     names = {number: name for name, number in numbers.items()}
     images: dict[str, str | None] = {}
     for t, transition in enumerate(net.transitions):
-        number = draft.number_of.get(t)
+        number = t
         while number in draft.same_as:
             number = draft.same_as[number]
-        images[transition.name] = None if number is None else names.get(number)
+        images[transition.name] = names.get(number)
     return ReducedTransitions(net, small, draft.applied, images)
 
 
@@ -176,7 +186,9 @@ def _reduce(draft: Draft, limits: Limits) -> None:
         if fresh:
             facts = pairs(draft, facts, deadline, matrix_bytes_max)
             draft.touch_all()
-            if facts is None:
+            if facts is not None:
+                draft.note(Rule.FACTS)
+            else:
                 if agglomerate(draft, NoFacts(), deadline):
                     _by_arcs(draft, fired, deadline)
                 return
@@ -197,7 +209,8 @@ def _by_arcs(draft: Draft, fired: set[int], deadline: Deadline) -> None:
 def _settle(draft: Draft) -> None:
     """Let go of deadlocks where there can be none, because a move needs nothing or the goal is false."""
     if draft.goal is not None and draft.goal.deadlock:
-        if any(not move.needs for move in draft.moves.values()):
+        if (free := next((number for number, move in draft.moves.items() if not move.needs), None)) is not None:
+            draft.note(Rule.ALWAYS, (free,))
             draft.settle(Goal(Constant(value=False)))
         elif draft.goal.formula == Constant(value=False):
             draft.settle(Goal(draft.goal.formula))

@@ -21,6 +21,7 @@ Cost: linear in the arcs.
 
 from __future__ import annotations
 
+from firable.analysis.evidence.certificate import Rule
 from firable.analysis.reduction.draft import Draft
 
 
@@ -40,6 +41,8 @@ def remove_irrelevant(draft: Draft) -> bool:
                     relevant |= new
                     todo += new
         others = [number for number in draft.moves if number not in kept]
+        if others:
+            draft.note(Rule.IRRELEVANT, others)
         for number in others:
             draft.remove(number)
         draft.count("irrelevant transition", len(others))
@@ -50,6 +53,8 @@ def remove_irrelevant(draft: Draft) -> bool:
 def remove_unneeded_places(draft: Draft) -> bool:
     """Drop the places that no move needs and the goal does not speak of; whether there were any."""
     unneeded = [place for place in draft.places if not draft.needing(place) and not draft.protected(place)]
+    if unneeded:
+        draft.note(Rule.UNNEEDED, places=unneeded)
     for place in unneeded:
         draft.drop(place)
     draft.count("irrelevant place", len(unneeded))

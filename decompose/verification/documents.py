@@ -18,7 +18,8 @@ from typing import Final
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
-from firable.analysis.evidence.checking.obligations import Evidence, obligations
+from firable.analysis.evidence.checking.obligation import Evidence
+from firable.analysis.evidence.checking.obligations import obligations
 from firable.analysis.evidence.claims import ClaimKind
 from firable.analysis.evidence.document import Document, document_from_text
 from firable.analysis.evidence.refusal import TimeIsOverError

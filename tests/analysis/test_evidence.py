@@ -30,7 +30,8 @@ from firable.analysis.evidence.certificate import (
     Whole,
 )
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
-from firable.analysis.evidence.checking.obligations import Evidence, obligations, sums_text
+from firable.analysis.evidence.checking.obligation import Evidence
+from firable.analysis.evidence.checking.obligations import obligations, sums_text
 from firable.analysis.evidence.claims import STATE_GOALS, Claim, ClaimKind
 from firable.analysis.evidence.document import document_from_text, seal
 from firable.analysis.evidence.meaning import contact

@@ -44,7 +44,7 @@ from firable.analysis.evidence.certificate import (
 )
 from firable.analysis.evidence.checking.checker import check_evidence
 from firable.analysis.evidence.checking.nodes import EMPTY, UNIT, Nodes
-from firable.analysis.evidence.checking.obligations import Evidence
+from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import document_from_text
 from firable.analysis.evidence.refusal import TimeIsOverError

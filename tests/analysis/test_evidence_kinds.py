@@ -23,7 +23,8 @@ from support.whole_nets import formulas
 from firable.analysis.check import check
 from firable.analysis.evidence.certificate import FiringSequence
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
-from firable.analysis.evidence.checking.obligations import Evidence, obligations
+from firable.analysis.evidence.checking.obligation import Evidence
+from firable.analysis.evidence.checking.obligations import obligations
 from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking, marking_of, without_start
 from firable.analysis.evidence.document import Document, document_from_text, seal
 from firable.analysis.evidence.meaning import commands_clash, completions_clash, contact, tidy

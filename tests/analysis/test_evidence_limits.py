@@ -19,11 +19,12 @@ from firable.analysis.evidence.certificate import (
     Unfolded,
 )
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
-from firable.analysis.evidence.checking.obligations import Evidence, obligations
+from firable.analysis.evidence.checking.obligation import Evidence
+from firable.analysis.evidence.checking.obligations import obligations
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record, document_from_text
 from firable.analysis.evidence.meaning import suffices
-from firable.analysis.evidence.producing import claims as producing
+from firable.analysis.evidence.producing import spaces as producing
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.evidence.refusal import TimeIsOverError
@@ -123,5 +124,5 @@ def test_without_a_diagram_in_time_ctl_is_shown_on_more_listed_markings(monkeypa
     assert len(listed.space.markings) == 16
     assert check_evidence(Evidence(net, Discipline.INTERLEAVING, claim, listed)).shown
     monkeypatch.setattr(producing, "WIDE_MAX", 15)
-    with pytest.raises(LackingError, match="more than 15 markings"):
+    with pytest.raises(LackingError, match="markings, and no decision diagram of them at hand"):
         Certifier(net, Discipline.INTERLEAVING, Limits()).certify(claim)

@@ -13,7 +13,7 @@ from support.true_claims import true
 from firable.analysis.check import check
 from firable.analysis.evidence.certificate import FiringSequence
 from firable.analysis.evidence.checking.checker import check_document
-from firable.analysis.evidence.checking.obligations import Evidence
+from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking
 from firable.analysis.evidence.meaning import (
     commands_clash,

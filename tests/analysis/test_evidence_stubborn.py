@@ -17,11 +17,11 @@ from support.stubborn_forging import forged, goal_of
 
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import Deadline
-from firable.analysis.evidence.certificate import Continuation, Markings, StubbornSets
+from firable.analysis.evidence.certificate import Continuation, Labelling, Markings, Reduction, StubbornSets
 from firable.analysis.evidence.checking.checker import check_evidence
 from firable.analysis.evidence.checking.columns import columns, numbers
 from firable.analysis.evidence.checking.cubes import firings
-from firable.analysis.evidence.checking.obligations import Evidence
+from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.checking.stubborn import Stubborn
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import document_from_text
@@ -238,9 +238,12 @@ def test_looking_through_ends_in_time() -> None:
         Stubborn(LOOP, found, Deadline.after(0)).check(Holds("z"))
 
 
-def test_the_certifier_takes_few_markings_with_sets_before_a_diagram_of_all() -> None:
+def test_the_certifier_takes_few_markings_of_a_small_net_before_a_diagram_of_all() -> None:
     certifier = Certifier(family_net("workshop-30"), Discipline.INTERLEAVING, Limits())
-    assert isinstance(certifier.certify(Claim(ClaimKind.NEVER, Deadlock())), StubbornSets)
+    found = certifier.certify(Claim(ClaimKind.NEVER, Deadlock()))
+    assert isinstance(found, Reduction)
+    assert isinstance(found.then, Labelling)
+    assert isinstance(found.then.space, Markings)
 
 
 @given(st.integers(0, 9).flatmap(lambda width: st.tuples(st.just(width), st.lists(st.integers(0, 2**width - 1)))))

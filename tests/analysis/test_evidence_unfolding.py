@@ -18,7 +18,7 @@ from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.certificate import Labelling, Markings, Unfolded
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
 from firable.analysis.evidence.checking.listed import Part
-from firable.analysis.evidence.checking.obligations import Evidence
+from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.checking.runs import Lasso
 from firable.analysis.evidence.checking.unfolding import Unfolding
 from firable.analysis.evidence.claims import Claim, ClaimKind

@@ -12,7 +12,7 @@ from support.pigeons import pigeon_evidence
 from support.second_solver import by_cvc5
 
 from firable.analysis.evidence.certificate import Labelling
-from firable.analysis.evidence.checking.obligations import Evidence
+from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record, seal
 from firable.analysis.evidence.producing.labels import listed

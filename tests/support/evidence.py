@@ -1,7 +1,7 @@
 """Evidence as the tests of the techniques need it: of one finding, of one claim, and as a document."""
 
 from firable.analysis.evidence.certificate import FiringSequence
-from firable.analysis.evidence.checking.obligations import Evidence
+from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.producing.claims import Certifier

@@ -7,10 +7,12 @@ from support.evidence import certified, evidence_of_finding
 
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Certificate, FiringSequence
-from firable.analysis.evidence.checking.obligations import Evidence
+from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.labels import drawn, labelling
+from firable.analysis.evidence.producing.nevers import Nevers
+from firable.analysis.evidence.producing.spaces import Spaces
 from firable.analysis.evidence.producing.stubborn import stubborn_sets
 from firable.analysis.goal import Limits
 from firable.analysis.induction.k_induction import decide_by_k_induction
@@ -121,6 +123,12 @@ def _stubborn(net: Net, goal: Formula) -> Evidence | None:
     return None if found is None else _of(net, Claim(ClaimKind.NEVER, goal), found)
 
 
+def reduced(net: Net, goal: Formula) -> Evidence | None:
+    """The steps of a reduction, and what shows the goal of what they leave."""
+    found = Nevers(Spaces(net, Discipline.INTERLEAVING, Limits())).reduced(goal)
+    return None if found is None else _of(net, Claim(ClaimKind.NEVER, goal), found)
+
+
 def _invented(net: Net, claim: Claim, firings: str, cycle: str = "") -> Evidence:
     prefix, around = (tuple((name,) for name in names.split()) for names in (firings, cycle))
     return _of(net, claim, FiringSequence(prefix, around))
@@ -148,6 +156,9 @@ EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
     "rounds": lambda: on_diagram(ENDING, _ctl("AF b")),
     "root": lambda: on_diagram(CHOICE, _ctl("EG not c")),
     "stubborn sets": lambda: _stubborn(family_net("manufacturing_cells-3"), Deadlock()),
+    "reduction": lambda: reduced(family_net("workshop-2"), Deadlock()),
+    "reduced to nothing": lambda: reduced(family_net("manufacturing_cells-2"), Deadlock()),
+    "reduced to a part": lambda: reduced(family_net("philosophers-3"), BOTH_EAT),
     "continuation": lambda: certified(family_net("philosophers-3"), Claim(ClaimKind.LOST, Start())),
     "fires": lambda: _invented(
         TURNS, Claim(ClaimKind.FIRES, Holds("b"), fires=("go", "tock")), "tick tock tick go tock"

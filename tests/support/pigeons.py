@@ -1,7 +1,7 @@
 """A claim that is true and that no solver shows in a moment: the pigeonhole principle."""
 
 from firable.analysis.evidence.certificate import InductiveInvariant
-from firable.analysis.evidence.checking.obligations import Evidence
+from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind
 from firable.nets.formula import And, Compare, Count, Holds, Or, Sign
 from firable.nets.net import Net, Place

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from support.naive_space import Markings, NaiveSpace
 
-from firable.analysis.evidence.checking.obligations import Evidence
+from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl
 from firable.analysis.temporal.ltl import refuting
 from firable.analysis.temporal.sets import Sets

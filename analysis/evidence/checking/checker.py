@@ -30,6 +30,7 @@ from firable.analysis.evidence.certificate import (
     Labelling,
     Markings,
     Progress,
+    Reduction,
     StubbornSets,
     Theorem,
     Unfolded,
@@ -37,10 +38,8 @@ from firable.analysis.evidence.certificate import (
 from firable.analysis.evidence.checking.diagrams import Diagrams
 from firable.analysis.evidence.checking.labelling import LabelledSpace, labelled
 from firable.analysis.evidence.checking.listed import Listed, Part
+from firable.analysis.evidence.checking.obligation import Evidence, Obligation, TimedTerms
 from firable.analysis.evidence.checking.obligations import (
-    Evidence,
-    Obligation,
-    TimedTerms,
     contact_free,
     continued,
     diagram_term,
@@ -49,6 +48,7 @@ from firable.analysis.evidence.checking.obligations import (
     wrong_sums,
 )
 from firable.analysis.evidence.checking.progress import check_progress
+from firable.analysis.evidence.checking.reduced import left_of
 from firable.analysis.evidence.checking.runs import check_refuting_run, check_unanswered_run, holds
 from firable.analysis.evidence.checking.stubborn import Stubborn
 from firable.analysis.evidence.checking.theorems import check_premises
@@ -80,6 +80,7 @@ _SHOWS: Final = {
         ClaimKind.ORDERED,
     },
     StubbornSets: {ClaimKind.NEVER},
+    Reduction: {ClaimKind.NEVER},
     Continuation: {ClaimKind.LOST},
     Progress: {ClaimKind.LEADS_TO},
     Theorem: {ClaimKind.LIVE, ClaimKind.HOME, ClaimKind.ALWAYS_POSSIBLE},
@@ -194,6 +195,13 @@ class _Checker:
                 stubborn.check(claim.state_goal)
                 words = f"{len(stubborn.markings):,} markings with stubborn sets, and {stubborn.n_firings:,} firings"
                 return Checked(shown=True, method=f"{words}, looked through")
+            case Reduction():
+                left = left_of(evidence, self.deadline)
+                late = self._unsolved(evidence, left.obligations)
+                if left.rest is None or late:
+                    return Checked(None if late else True, left.words, late)
+                rest = self.check(left.rest)
+                return replace(rest, method=f"{left.words}, and of what is left: {rest.method}")
             case Continuation(firings):
                 rest = self.check(continued(evidence))
                 return replace(rest, method=f"{len(firings):,} firings played, and from there: {rest.method}")

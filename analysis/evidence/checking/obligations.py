@@ -17,6 +17,10 @@ question:
 
     siphons   a set of places that is not empty, a siphon, and lacks a place of each trap
 
+Of a reduction they are those of the net that is left, and one more:
+
+    weaker    the goal of the net, with what the steps say of its places, and not the goal of what is left
+
 Nothing here is taken from the technique that found the certificate; the relation is an evaluation
 of the firing rule. An obligation is SMT-LIB 2 text for any solver, so that nobody needs to trust ours. The sums are
 integers and only multiplied out: their file is in linear arithmetic without a variable.
@@ -25,8 +29,7 @@ integers and only multiplied out: their file is in linear arithmetic without a v
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from itertools import count
+from dataclasses import dataclass, replace
 from typing import Final
 
 from firable.analysis.deadline import NEVER, Deadline
@@ -40,13 +43,16 @@ from firable.analysis.evidence.certificate import (
     Inequality,
     Labelling,
     Markings,
+    Reduction,
     Theorem,
 )
+from firable.analysis.evidence.checking.obligation import Evidence, Obligation, TimedTerms, comments
+from firable.analysis.evidence.checking.reduced import left_of
 from firable.analysis.evidence.claims import Claim, ClaimKind, without_start
 from firable.analysis.evidence.meaning import contact
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse
 from firable.analysis.induction.encoding import Relation, interleaving_relation, step_relation
-from firable.analysis.induction.smt import Operator, Term, Terms, smtlib, subterms
+from firable.analysis.induction.smt import Operator, Term, Terms, subterms
 from firable.nets.net import Marking, Net
 from firable.semantics.counting import TableTooLargeError, at_most
 from firable.semantics.firing import Valuation
@@ -56,51 +62,6 @@ from firable.semantics.trace import Discipline
 
 LITERALS_MAX: Final = 20_000  # of a set of markings that is written as a formula
 ENTRIES_MAX: Final = 200_000  # of the table of a sum
-_CLOCK_EVERY: Final = 256
-
-
-@dataclass(frozen=True, slots=True)
-class Evidence:
-    """A claim about a net under a discipline, with what shows it."""
-
-    net: Net
-    discipline: Discipline
-    claim: Claim
-    certificate: Certificate
-
-
-@dataclass(frozen=True, slots=True)
-class Obligation:
-    """Terms that must not all be true together; `statement` is what that shows."""
-
-    name: str
-    statement: str
-    asserted: tuple[Term, ...]
-
-    def text(self, evidence: Evidence) -> str:
-        """The SMT-LIB 2 file, whose answer must be `unsat`."""
-        return smtlib(self.asserted, _comments(evidence, self.statement))
-
-
-def _comments(evidence: Evidence, statement: str) -> list[str]:
-    return [
-        f"of '{evidence.net.name}' ({evidence.discipline}): {evidence.claim}",
-        f"To show: {statement}.",
-        "Asserted is that it does not hold, so the answer `unsat` shows it.",
-    ]
-
-
-@dataclass(frozen=True)
-class TimedTerms(Terms):
-    """Terms for as long as there is time; raises `TimeIsOverError` then."""
-
-    deadline: Deadline = NEVER
-    _made: Iterator[int] = field(default_factory=count, repr=False, compare=False)
-
-    def _term(self, operator: Operator, operands: tuple[Term, ...] = (), name: str = "") -> Term:
-        if next(self._made) % _CLOCK_EVERY == 0 and self.deadline.over:
-            raise TimeIsOverError
-        return super()._term(operator, operands, name)
 
 
 def obligations(evidence: Evidence, deadline: Deadline = NEVER) -> tuple[Obligation, ...]:
@@ -113,6 +74,10 @@ def obligations(evidence: Evidence, deadline: Deadline = NEVER) -> tuple[Obligat
             return tuple(_of_invariant(evidence, invariant, TimedTerms(deadline=deadline)))
         case Labelling(space) if _size(evidence.net, space) <= LITERALS_MAX:
             return tuple(_of_set(evidence, space, TimedTerms(deadline=deadline)))
+        case Reduction():
+            left = left_of(evidence, deadline)
+            rest = () if left.rest is None else obligations(left.rest, deadline)
+            return (*left.obligations, *rest)
         case Continuation():
             return obligations(continued(evidence), deadline)
         case Theorem(_, _, traps):
@@ -357,7 +322,7 @@ def sums_text(evidence: Evidence) -> str | None:
     if not isinstance(certificate, InductiveInvariant) or not (certificate.equations or certificate.inequalities):
         return None
     statement = "in the initial marking the sums are as stated, no firing changes or lowers them"
-    lines = [*(f"; {line}" for line in _comments(evidence, statement)), "(set-logic QF_LIA)", "(assert (or false"]
+    lines = [*(f"; {line}" for line in comments(evidence, statement)), "(set-logic QF_LIA)", "(assert (or false"]
     for of, initial, changes in _sums(evidence.net, certificate):
         wrong = "distinct" if isinstance(of, Equation) else "<"
         lines.append(f"  ({wrong} {_number(initial)} {_number(of.tokens)})")

@@ -1,39 +1,34 @@
 """A certificate for a claim, from what the run that decided it has left, or else by a technique that leaves one.
 
 First comes what is at hand: the invariant or the firing sequence of a finding, the markings where the run held all of
-them, listed where they are few and as a decision diagram otherwise. Where the run that decided left nothing behind
-(stubborn sets, a reduced net, a graph with too many markings to list), another technique is asked within the time that
-is left: a decision diagram, invariants, the state equation, k-induction, property-directed reachability. Nothing here
-needs to be right for a check to be sound: what is wrong is refused by the checker.
+them (`spaces`). Where the run that decided left nothing behind, another technique is asked within the time that is left
+(`nevers` for what is never so). Nothing here needs to be right for a check to be sound: what is wrong is refused by the
+checker.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, Final
+from typing import Any
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
-from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import (
     Certificate,
     Continuation,
     Diagram,
     FiringSequence,
-    InductiveInvariant,
     Labelling,
-    Markings,
-    NeverCertificate,
-    StubbornSets,
     Theorem,
     Unfolded,
 )
 from firable.analysis.evidence.checking.theorems import check_premises
-from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl, is_marking, without_start
-from firable.analysis.evidence.meaning import contact, tidy
-from firable.analysis.evidence.producing.labels import TooLargeError, drawn, labelling, listed
+from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl, without_start
+from firable.analysis.evidence.meaning import tidy
+from firable.analysis.evidence.producing.labels import TooLargeError, drawn, labelling
 from firable.analysis.evidence.producing.lacking import NO_TIME, LackingError
+from firable.analysis.evidence.producing.nevers import Nevers
 from firable.analysis.evidence.producing.ranks import progress
 from firable.analysis.evidence.producing.runs import (
     InOrder,
@@ -44,17 +39,11 @@ from firable.analysis.evidence.producing.runs import (
     runs_by_search,
     runs_on_graph,
 )
-from firable.analysis.evidence.producing.stubborn import stubborn_sets
+from firable.analysis.evidence.producing.spaces import MARKINGS_MAX, WIDE_MAX, Spaces
 from firable.analysis.evidence.producing.theorems import theorem_on
 from firable.analysis.evidence.producing.unfolding import unfolded_markings
 from firable.analysis.goal import Finding, Limits
-from firable.analysis.induction.k_induction import decide_by_k_induction
-from firable.analysis.induction.pdr import decide_by_pdr
-from firable.analysis.spaces.reachability import Budget, ReachabilityGraph, explore
 from firable.analysis.spaces.space import StateSpace
-from firable.analysis.spaces.symbolic import SymbolicSpace, explore_symbolically
-from firable.analysis.structure.contact import decide_contact_by_invariants
-from firable.analysis.structure.state_equation import decide_by_state_equation
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
@@ -62,12 +51,6 @@ from firable.nets.temporal import Temporal
 from firable.nets.verdict import Witness
 from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
-
-MARKINGS_MAX: Final = 20_000
-"""How many markings are listed where a decision diagram would do as well."""
-WIDE_MAX: Final = 100_000
-"""How many markings are listed where none would, or none is at hand: for responses, LTL, synchronous steps, CTL."""
-_SECONDS: Final = 30.0
 
 
 class Certifier:
@@ -81,66 +64,11 @@ class Certifier:
         space: StateSpace[Any] | None = None,
         findings: Iterable[tuple[Formula, Finding]] = (),
     ) -> None:
-        self.net, self.discipline, self.limits, self._given = net, discipline, limits, space
-        self._findings: Mapping[Formula, Finding] = {tidy(goal): found for goal, found in findings}
-        self._contact: NeverCertificate | None = None
+        self.net, self.discipline, self.limits = net, discipline, limits
+        self.spaces = Spaces(net, discipline, limits, space)
+        self.nevers = Nevers(self.spaces, {tidy(goal): found for goal, found in findings})
         self._ends: list[tuple[Continuation, Callable[[Formula], bool]]] = []
         self.deadlock: Witness | None = None
-
-    @cached_property
-    def graph(self) -> ReachabilityGraph | None:
-        """All markings as a graph, where they are few enough to be listed for whatever is claimed."""
-        return self._explored(MARKINGS_MAX if self.discipline is Discipline.INTERLEAVING else WIDE_MAX)
-
-    @cached_property
-    def wide(self) -> ReachabilityGraph | None:
-        """The same, where only listed markings will do."""
-        return self.graph or self._explored(WIDE_MAX)
-
-    def _explored(self, most: int) -> ReachabilityGraph | None:
-        graph = self._given
-        if isinstance(graph, SymbolicSpace) and graph.n_markings > most:
-            return None
-        if not isinstance(graph, ReachabilityGraph) or not graph.complete:
-            budget = Budget(most, self.limits.memory_bytes)
-            graph = explore(self.net, self.discipline, budget, deadline=self._part(0.2))
-        return graph.until(self.limits.deadline) if graph.complete and graph.n_markings <= most else None
-
-    @cached_property
-    def markings(self) -> Markings | None:
-        """The markings of `graph` as they are written."""
-        return None if self.graph is None else listed(self.graph)
-
-    @cached_property
-    def wide_markings(self) -> Markings | None:
-        """The markings of `wide` as they are written."""
-        return self.markings or (None if self.wide is None else listed(self.wide))
-
-    @cached_property
-    def symbolic(self) -> SymbolicSpace | None:
-        """All markings as a decision diagram, where they are too many to be listed."""
-        if self.graph is not None or self.discipline is Discipline.STEP:
-            return None
-        if isinstance(self._given, SymbolicSpace):
-            return self._given.until(self.limits.deadline)
-        try:
-            return explore_symbolically(self.net, Limits(self._part(0.3), self.limits.memory_bytes)).until(
-                self.limits.deadline
-            )
-        except BudgetExceeded:
-            return None
-
-    @cached_property
-    def diagram(self) -> Diagram | None:
-        """The same markings as they are written."""
-        try:
-            return None if self.symbolic is None else drawn(self.symbolic)
-        except TooLargeError:
-            return None
-
-    def _part(self, share: float) -> Deadline:
-        left = self.limits.deadline.left_seconds
-        return self.limits.deadline.within(_SECONDS if left is None else left * share)
 
     def certify(self, claim: Claim, witness: Witness | None = None) -> Certificate:
         """A certificate for a claim; `witness` is the run that the verdict came with.
@@ -160,9 +88,9 @@ class Certifier:
     def _certificate(self, claim: Claim, witness: Witness | None) -> Certificate | None:
         match claim.kind:
             case ClaimKind.NEVER:
-                return self._never(claim.state_goal)
+                return self.nevers.certificate(claim.state_goal)
             case ClaimKind.REACHABLE:
-                found = witness or self._way(lambda space: space.satisfying(claim.state_goal))
+                found = witness or self.spaces.way(lambda space: space.satisfying(claim.state_goal))
                 return None if found is None else FiringSequence(found.firings)
             case ClaimKind.LOST:
                 return self._lost(claim.state_goal, witness)
@@ -171,11 +99,11 @@ class Certifier:
             case ClaimKind.LTL:
                 return self._unfolded(claim)
             case ClaimKind.LEADS_TO:
-                if self.wide is None or self.wide_markings is None:
+                if self.spaces.wide is None or self.spaces.wide_markings is None:
                     raise LackingError(f"ranks for a response are written for up to {WIDE_MAX:,} markings")
-                return progress(self.wide, self.wide_markings, claim)
+                return progress(self.spaces.wide, self.spaces.wide_markings, claim)
             case ClaimKind.ORDERED:
-                return None if self.markings is None else Labelling(self.markings)
+                return None if self.spaces.markings is None else Labelling(self.spaces.markings)
             case ClaimKind.UNORDERED:
                 return None if witness is None else self._unordered(witness)
             case ClaimKind.LIVE | ClaimKind.HOME:
@@ -186,24 +114,24 @@ class Certifier:
 
     def _unfolded(self, claim: Claim) -> Unfolded | None:
         """Markings that serve every formula, where they are few; else those that this one asks for; else all."""
-        if self.markings is not None:
-            return Unfolded(self.markings)
+        if self.spaces.markings is not None:
+            return Unfolded(self.spaces.markings)
         if self.discipline is Discipline.INTERLEAVING:
             try:
-                found = unfolded_markings(self.net, claim.goal, WIDE_MAX, self._part(0.2))
+                found = unfolded_markings(self.net, claim.goal, WIDE_MAX, self.spaces.part(0.2))
                 return None if found is None else Unfolded(found)
             except (TooLargeError, BudgetExceeded):
                 pass  # all markings, which a graph finds faster, may be few enough
-        if self.wide_markings is None:
+        if self.spaces.wide_markings is None:
             raise LackingError(f"a tableau is unfolded on up to {WIDE_MAX:,} markings")
-        return Unfolded(self.wide_markings)
+        return Unfolded(self.spaces.wide_markings)
 
     def asked_for(self, formula: Temporal) -> Unfolded:
         """What shows a formula of LTL of which it is not known yet whether it holds; raises `LackingError`."""
         if self.discipline is Discipline.STEP:
             raise LackingError("what fires is not spoken of in steps")
         try:
-            found = unfolded_markings(self.net, formula, WIDE_MAX, self._part(0.3))
+            found = unfolded_markings(self.net, formula, WIDE_MAX, self.spaces.part(0.3))
         except (TooLargeError, BudgetExceeded):
             raise LackingError(NO_TIME) from None
         if found is None:
@@ -223,78 +151,13 @@ class Certifier:
         formula = as_ctl(claim)
         if formula is None:
             return None
-        if self.graph is not None and self.markings is not None:
-            return labelling(self.graph, self.markings, formula)
-        if self.symbolic is not None and self.diagram is not None:
-            return labelling(self.symbolic, self.diagram, formula)
-        if self.wide is not None and self.wide_markings is not None:
-            return labelling(self.wide, self.wide_markings, formula)
+        if self.spaces.graph is not None and self.spaces.markings is not None:
+            return labelling(self.spaces.graph, self.spaces.markings, formula)
+        if self.spaces.symbolic is not None and self.spaces.diagram is not None:
+            return labelling(self.spaces.symbolic, self.spaces.diagram, formula)
+        if self.spaces.wide is not None and self.spaces.wide_markings is not None:
+            return labelling(self.spaces.wide, self.spaces.wide_markings, formula)
         raise LackingError(f"there are more than {WIDE_MAX:,} markings, and no decision diagram of them at hand")
-
-    def _never(self, goal: Formula) -> NeverCertificate | None:
-        finding = self._findings.get(goal)
-        if finding is not None and isinstance(finding.certificate, NeverCertificate):
-            return finding.certificate
-        if self.graph is not None and self.markings is not None:
-            return None if self.graph.satisfying(goal).any() else Labelling(self.markings)
-        if goal == self._contact_goal and (found := self.contact_free()) is not None:
-            return found
-        if not isinstance(self._given, SymbolicSpace) and (sets := self._stubborn(self.net, goal)) is not None:
-            return sets
-        if self.symbolic is not None and self.diagram is not None:
-            return None if self.symbolic.satisfying(goal) else Labelling(self.diagram)
-        return self._induced(self.net, goal)
-
-    def _stubborn(self, net: Net, goal: Formula) -> StubbornSets | None:
-        """Few markings with stubborn sets, where they are few."""
-        if self.discipline is Discipline.STEP:
-            return None
-        try:
-            return stubborn_sets(net, goal, Limits(self._part(0.2), self.limits.memory_bytes))
-        except BudgetExceeded:
-            return None
-
-    @cached_property
-    def _contact_goal(self) -> Formula:
-        return contact(self.net)
-
-    def _contact_excluded(self) -> NeverCertificate | None:
-        return self._never(self._contact_goal)
-
-    def contact_free(self) -> NeverCertificate | None:
-        """The invariants that exclude contact, of a net of any size; None where they do not."""
-        if self._contact is None:
-            found = decide_contact_by_invariants(self.net, Limits(self._part(0.3), self.limits.memory_bytes))
-            self._contact = found.certificate if isinstance(found.certificate, InductiveInvariant) else None
-        return self._contact
-
-    def _induced(self, net: Net, goal: Formula) -> InductiveInvariant | None:
-        """An inductive invariant against a goal, by the methods that give one, from the quick to the thorough."""
-        limits = self.limits
-        if self.discipline is Discipline.STEP:
-            tries: tuple[Callable[[], Finding], ...] = (
-                lambda: decide_by_k_induction(net, goal, limits, discipline=self.discipline),
-            )
-        else:
-            tries = (
-                lambda: decide_by_state_equation(net, goal, replace(limits, deadline=self._part(0.3))),
-                lambda: decide_by_k_induction(net, goal, replace(limits, deadline=self._part(0.3))),
-                lambda: decide_by_pdr(net, goal, replace(limits, deadline=self._part(0.8))),
-            )
-        for attempt in tries:
-            if limits.deadline.over:  # to begin with any of them takes a while on a large net
-                raise BudgetExceeded(NO_TIME)
-            found = attempt()
-            if isinstance(found.certificate, InductiveInvariant):
-                return found.certificate
-            if found.reachable:
-                return None
-        raise LackingError("no technique that leaves an invariant found one within the time for evidence")
-
-    def _way(self, targets: Callable[[StateSpace[Any]], Any]) -> Witness | None:
-        """A way into a set, from whichever space there is."""
-        space: StateSpace[Any] | None = self.graph or self.symbolic or self._given
-        return None if space is None else space.witness(targets(space))
 
     def _lost(self, goal: Formula, witness: Witness | None) -> Continuation | None:
         spelled = tidy(without_start(self.net, goal))
@@ -305,11 +168,11 @@ class Certifier:
         def lost(space: StateSpace[Any]) -> Any:
             return space.algebra.negation(space.backward(space.satisfying(goal)))
 
-        space: StateSpace[Any] | None = self.graph or self.symbolic
+        space: StateSpace[Any] | None = self.spaces.graph or self.spaces.symbolic
         if space is not None and (
             witness is None or not space.contains(lost(space), self.net.marking(witness.marking))
         ):
-            witness = self._way(lost)
+            witness = self.spaces.way(lost)
         for way in (witness, self.deadlock):
             if way is not None and (found := self._never_after(way, goal, spelled)) is not None:
                 return found
@@ -320,8 +183,8 @@ class Certifier:
         marking, net = self.net.marking(way.marking), self.net
         places = tuple(replace(place, marked=bool(marking >> p & 1)) for p, place in enumerate(net.places))
         net = replace(net, places=places, properties=())
-        if self.symbolic is not None:
-            symbolic = self.symbolic
+        if self.spaces.symbolic is not None:
+            symbolic = self.spaces.symbolic
             after = symbolic.engine.forward(
                 symbolic.engine.single([i for i in range(marking.bit_length()) if marking >> i & 1])
             )
@@ -330,14 +193,14 @@ class Certifier:
             found = Continuation(way.firings, Labelling(_alone(drawn(symbolic, [after]))))
             self._ends.append((found, lambda other: not after & symbolic.satisfying(other)))
             return found
-        graph = explore(net, self.discipline, Budget(MARKINGS_MAX, self.limits.memory_bytes), deadline=self._part(0.3))
-        if graph.complete:
+        spaces = Spaces(net, self.discipline, self.limits)
+        if (graph := spaces.graph) is not None and spaces.markings is not None:
             if graph.satisfying(spelled).any():
                 return None
-            found = Continuation(way.firings, Labelling(listed(graph)))
+            found = Continuation(way.firings, Labelling(spaces.markings))
             self._ends.append((found, lambda other: not graph.satisfying(other).any()))
             return found
-        shown = self._stubborn(net, spelled) or self._induced(net, spelled)
+        shown = Nevers(spaces).certificate(spelled)
         return None if shown is None else Continuation(way.firings, shown)
 
     def theorem(self, claim: Claim) -> Theorem:
@@ -357,7 +220,7 @@ class Certifier:
         try:
             if self.discipline is Discipline.STEP:
                 raise LackingError("no theorem on a class of nets applies")
-            return theorem_on(self.net, self._contact_excluded, self._part(0.5))
+            return theorem_on(self.net, self.nevers.contact_excluded, self.spaces.part(0.5))
         except LackingError as error:
             return str(error)
         except (BudgetExceeded, IncompleteGraph):
@@ -369,12 +232,12 @@ class Certifier:
         Raises `LackingError` where a transition fires in none of them.
         """
         try:
-            if self.graph is not None:
-                return runs_on_graph(self.graph, tuple(names), home)
+            if self.spaces.graph is not None:
+                return runs_on_graph(self.spaces.graph, tuple(names), home)
             prefix: tuple[tuple[str, ...], ...] = ()
             net = self.net
             if home is not None and home != net.initial_marking:
-                way = self._way(lambda space: _one(space, home))
+                way = self.spaces.way_to(home)
                 if way is None:
                     raise LackingError("no way to the home marking was found")
                 prefix = way.firings
@@ -382,7 +245,7 @@ class Certifier:
                 net = replace(net, places=places, properties=())
             if self.discipline is Discipline.STEP:
                 raise LackingError(f"there are more than {MARKINGS_MAX:,} markings")
-            found = runs_by_search(net, tuple(names), Limits(self._part(0.5), self.limits.memory_bytes))
+            found = runs_by_search(net, tuple(names), Limits(self.spaces.part(0.5), self.limits.memory_bytes))
             return [FiringSequence((*prefix, *run)) for run in found]
         except NotFoundError as error:
             raise LackingError(str(error)) from None
@@ -391,8 +254,8 @@ class Certifier:
 
     def run_in_order(self, one: tuple[str, ...], others: tuple[str, ...]) -> InOrder | None:
         """A run that fires one of these, and one of those at a moment before or after it, and which two."""
-        if self.graph is not None:
-            return run_in_order(self.graph, one, others) or run_in_order(self.graph, others, one)
+        if self.spaces.graph is not None:
+            return run_in_order(self.spaces.graph, one, others) or run_in_order(self.spaces.graph, others, one)
         for pair in ((t, u) for t in one for u in others if t != u):
             try:
                 runs = self.runs_firing(pair)
@@ -406,7 +269,9 @@ class Certifier:
 
     def homes(self) -> Marking | None:
         """A home marking, M0 if it is one; None where there is none or it is not known."""
-        space: StateSpace[Any] | None = self.graph or (self.symbolic if self.diagram is not None else None)
+        space: StateSpace[Any] | None = self.spaces.graph or (
+            self.spaces.symbolic if self.spaces.diagram is not None else None
+        )
         if space is None:
             return None
         try:
@@ -422,12 +287,8 @@ class Certifier:
 
     def parted(self) -> Formula | None:
         """Something that holds for ever from one marking and never again from another: why there is no home marking."""
-        space: StateSpace[Any] | None = self.graph or self.symbolic
+        space: StateSpace[Any] | None = self.spaces.graph or self.spaces.symbolic
         return None if space is None else parting(space)
-
-
-def _one(space: StateSpace[Any], marking: Marking) -> Any:
-    return space.satisfying(is_marking(space.net, marking))
 
 
 def _alone(diagram: Diagram) -> Diagram:

@@ -1,0 +1,137 @@
+"""The JSON of claims and of sets of markings, as records that refuse whatever is not of their shape.
+
+Each record says how its data become the value (`of`), with all names looked up in the net.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from firable.analysis.evidence.certificate import Diagram, Markings
+from firable.analysis.evidence.claims import STATE_GOALS, TRUE, Claim, ClaimKind
+from firable.nets.formula import Formula, Holds, format_formula, parse_formula
+from firable.nets.net import Fairness, Net
+from firable.nets.temporal import Logic, Temporal, format_temporal, logics, parse_temporal
+from firable.nets.temporal_parts import atoms_in
+
+Natural = Annotated[int, Field(ge=0)]
+Hexadecimal = Annotated[str, Field(pattern=r"^(0|[1-9a-f][0-9a-f]*)$")]
+
+
+class Data(BaseModel):
+    """Data of one shape; whatever else stands there is refused."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class ClaimRecord(Data):
+    """A claim; what a kind of claim does not speak of is left out."""
+
+    kind: ClaimKind
+    goal: str = ""
+    then: str = ""
+    fairness: Fairness = Fairness.NONE
+    fires: list[str] = []
+
+    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)  # not strict: an enumeration is a string here
+
+    def of(self, net: Net) -> Claim:
+        """The claim, its names looked up."""
+        goal: Temporal = TRUE
+        if self.goal:
+            goal = parse_formula(self.goal) if self.kind in STATE_GOALS else parse_temporal(self.goal)
+        if self.kind not in STATE_GOALS:
+            wanted = Logic.CTL if self.kind is ClaimKind.CTL else Logic.LTL
+            if wanted not in logics(goal):
+                raise ValueError(f"'{self.goal}' is no formula of {wanted.upper()}")
+        then: Formula = parse_formula(self.then) if self.then else TRUE
+        for formula in (goal, then):
+            for atom in atoms_in(formula):
+                if isinstance(atom, Holds):
+                    known(atom.place, net.place_index)
+                else:
+                    known(atom.transition, net.transition_index)
+        fires = tuple(known(name, net.transition_index) for name in self.fires)
+        return Claim(self.kind, goal, then, self.fairness, fires)
+
+
+def claim_to_json(claim: Claim) -> dict[str, Any]:
+    """The data of a claim."""
+    data: dict[str, Any] = {"kind": claim.kind.value, "goal": format_temporal(claim.goal)}
+    if claim.kind in STATE_GOALS:
+        data["goal"] = format_formula(claim.state_goal)
+    if claim.then != TRUE:
+        data["then"] = format_formula(claim.then)
+    if claim.fairness is not Fairness.NONE:
+        data["fairness"] = claim.fairness.value
+    if claim.fires:
+        data["fires"] = list(claim.fires)
+    return data
+
+
+class MarkingsRecord(Data):
+    """Listed markings."""
+
+    kind: Literal["markings"]
+    markings: list[Hexadecimal]
+
+    def space(self, net: Net) -> Markings:
+        """The set."""
+        markings = tuple(int(marking, 16) for marking in self.markings)
+        if any(marking >> len(net.places) for marking in markings):
+            raise ValueError("a marking holds a place that the net does not have")
+        return Markings(markings)
+
+
+class DiagramRecord(Data):
+    """A decision diagram."""
+
+    kind: Literal["diagram"]
+    order: list[str]
+    rows: list[Annotated[list[Natural], Field(min_length=3, max_length=3)]]
+    roots: Annotated[list[Natural], Field(min_length=1)]
+
+    def space(self, net: Net) -> Diagram:
+        """The set."""
+        order = tuple(known(name, net.place_index) for name in self.order)
+        return Diagram(order, tuple((row[0], row[1], row[2]) for row in self.rows), tuple(self.roots))
+
+
+@dataclass
+class Sets:
+    """The sets of a document, each once."""
+
+    spaces: list[Markings | Diagram] = field(default_factory=list)
+
+    def number(self, space: Markings | Diagram) -> int:
+        """The number of a set."""
+        for number, known_ in enumerate(self.spaces):
+            if known_ is space:
+                return number
+        self.spaces.append(space)
+        return len(self.spaces) - 1
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """The data of all sets."""
+        return [
+            {"kind": "markings", "markings": [f"{marking:x}" for marking in space.markings]}
+            if isinstance(space, Markings)
+            else {
+                "kind": "diagram",
+                "order": list(space.order),
+                "rows": [list(row) for row in space.rows],
+                "roots": list(space.roots),
+            }
+            for space in self.spaces
+        ]
+
+
+def known(name: str, names: Mapping[str, int]) -> str:
+    """The name itself, which the net must have; `ValueError` where it has not."""
+    if name not in names:
+        raise ValueError(f"the net has no '{name}'")
+    return name
