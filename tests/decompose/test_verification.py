@@ -43,23 +43,28 @@ def bundled(name: str) -> Bundle:
     return make_bundle(check(family_net(name) if "-" in name else catalogue_net(name)))
 
 
+@cache
+def answered(text: str, timeout_ms: int) -> tuple[str, ...]:
+    """What cvc5 answers to a text, which few of the tests and mutants change."""
+    return by_cvc5(text, timeout_ms)
+
+
+records: dict[tuple[str, int], tuple[CheckedRecord, ...]] = {}
+
+
+def examined(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
+    """What the checker finds of a document, likewise found once."""
+    key = document.to_text(), timeout_ms
+    if key not in records:
+        records[key] = tuple(check_document(document, timeout_ms=timeout_ms))
+    return iter(records[key])
+
+
 @pytest.fixture
 def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a solver answers to one text, and a checker to one document, is found once: a mutant changes few of them."""
-    answers: dict[str, tuple[str, ...]] = {}
-    records: dict[str, tuple[CheckedRecord, ...]] = {}
-
-    def solver(text: str, timeout_ms: int) -> tuple[str, ...]:
-        return answers[text] if text in answers else answers.setdefault(text, by_cvc5(text, timeout_ms))
-
-    def checker(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
-        text = document.to_text()
-        if text not in records:
-            records[text] = tuple(check_document(document, timeout_ms=timeout_ms))
-        return iter(records[text])
-
-    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", {"cvc5": solver})
-    monkeypatch.setattr(documents, "check_document", checker)
+    """What was answered to a text or found of a document before is not asked again."""
+    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", {"cvc5": answered})
+    monkeypatch.setattr(documents, "check_document", examined)
 
 
 def survives(make: Callable[[], Bundle], whole: Bundle) -> bool:
@@ -81,6 +86,7 @@ def test_everything_in_the_bundle_of_a_cell_is_shown(name: str, solver: str) -> 
     assert all(one.shown and one.method and not one.only_claimed for one in checked)
 
 
+@pytest.mark.usefixtures("remembering")
 def test_what_is_read_back_is_shown_too() -> None:
     bundle = bundled("conceptual_one_robot")
     assert check_bundle(Bundle.from_bytes(bundle.to_bytes())) == check_bundle(bundle)
@@ -139,6 +145,7 @@ def test_the_theorem_on_the_protocol_is_published_as_it_is_proved() -> None:
     assert blocks() == tuple((verdict.name, verdict.statement) for verdict in verdicts)
 
 
+@pytest.mark.usefixtures("remembering")
 def test_another_theorem_on_the_protocol_is_refused() -> None:
     bundle = bundled("one_robot")
     text = bundle.evidence["protocol.smt2"]
@@ -324,6 +331,7 @@ def test_weaker_assertions_and_sly_commands_are_refused() -> None:
         assert family_refused(bundle, "eq7.smt2", changed)
 
 
+@pytest.mark.usefixtures("remembering")
 @pytest.mark.parametrize("given_up", ["unknown", "unknown (TIMEOUT)", "unknown (INCOMPLETE)", "timeout"])
 def test_an_answer_that_refutes_is_refused_and_one_that_is_missing_only_claims(
     given_up: str, monkeypatch: pytest.MonkeyPatch
@@ -331,7 +339,7 @@ def test_an_answer_that_refutes_is_refused_and_one_that_is_missing_only_claims(
     bundle = bundled("conceptual_one_robot")
 
     def saying(answer: str) -> dict[str, Callable[[str, int], tuple[str, ...]]]:
-        return {"cvc5": lambda text, ms: tuple(answer if line == "unsat" else line for line in by_cvc5(text, ms))}
+        return {"cvc5": lambda text, ms: tuple(answer if line == "unsat" else line for line in answered(text, ms))}
 
     monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", saying("sat"))
     with pytest.raises(InputError, match="is refuted: the solver says sat"):
@@ -379,6 +387,7 @@ def without_evidence_on(bundle: Bundle, *names: str) -> Bundle:
     return replace(bundle, verdicts=verdicts, evidence={**bundle.evidence, file: text})
 
 
+@pytest.mark.usefixtures("remembering")
 def test_a_warning_without_evidence_is_only_claimed_and_a_demand_refused() -> None:
     bundle = bundled("conceptual_one_robot")
     checked = check_bundle(without_evidence_on(bundle, "live", "reversible"))
@@ -419,6 +428,7 @@ def test_a_warning_that_was_made_undecided_is_told() -> None:
         check_bundle(replace(bare, verdicts=(*bare.verdicts, replace(doubted, statement="all is well"))))
 
 
+@pytest.mark.usefixtures("remembering")
 @pytest.mark.parametrize("status", Status)
 def test_a_verdict_that_nobody_knows_is_refused(status: Status) -> None:
     bundle = bundled("conceptual_one_robot")

@@ -1,6 +1,7 @@
 """Every net of a small scope: all arcs and internal gates over the places, up to the names of transitions."""
 
 from collections.abc import Iterator
+from functools import cache
 from itertools import combinations_with_replacement, product
 
 from firable.nets.net import Marking, Net, Place, Transition
@@ -15,6 +16,7 @@ def shapes(n_places: int) -> list[Shape]:
     return list(product(range(16), repeat=n_places))
 
 
+@cache
 def transition(name: str, shape: Shape) -> Transition:
     """The transition of this shape."""
     inputs, outputs, permissive, inhibitive = (
