@@ -9,6 +9,7 @@ from support.bundle_mutants import evidence_mutants, line_mutants, net_mutants, 
 from support.free_parts import freed
 from support.layered_nets import cells_in_a_line
 from support.owned_nets import owned_net
+from support.remembered import answered
 
 from firable.analysis.check import check
 from firable.decompose.bundling import make_bundle
@@ -141,6 +142,7 @@ def test_both_solvers_answer_the_whole_file() -> None:
     assert set(answers[1::2]) == {"unsat"}
 
 
+@pytest.mark.usefixtures("remembering")
 def test_bundles_with_the_protocol_are_shown() -> None:
     bundle = bundled("shuttle")
     checked = {one.verdict.name: one for one in check_bundle(bundle)}
@@ -197,17 +199,11 @@ def test_the_protocols_without_rounds_have_no_such_invariant() -> None:
         Obligations(built(example("shuttle"), NO_FAULTS, Variant.named("naive")))
 
 
-@pytest.fixture(scope="module")
-def remembered() -> Callable[[str, int], tuple[str, ...]]:
-    answers: dict[str, tuple[str, ...]] = {}
-    return lambda text, ms: answers[text] if text in answers else answers.setdefault(text, by_cvc5(text, ms))
-
-
-def refused(bundle: Bundle, solver: Callable[[str, int], tuple[str, ...]]) -> bool:
+def refused(bundle: Bundle) -> bool:
     """Whether what the bundle says of the protocol is refused, or what it brings for that is of no use."""
     try:
         examination = Examination(bundle)
-        check_explored(examination, check_cut(bundle.decomposition), "cvc5", solver, TIMEOUT_MS)
+        check_explored(examination, check_cut(bundle.decomposition), "cvc5", answered, TIMEOUT_MS)
     except NotShownError:
         return True
     known = set(examination.checked)
@@ -227,11 +223,9 @@ def stated_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("stated_once")
-def test_every_single_change_of_a_verdict_on_the_protocol_is_refused(
-    remembered: Callable[[str, int], tuple[str, ...]],
-) -> None:
+def test_every_single_change_of_a_verdict_on_the_protocol_is_refused() -> None:
     bundle = of_the_living("shuttle")
-    assert not refused(bundle, remembered)
+    assert not refused(bundle)
     mutants = [
         (how, make) for how, make in verdict_mutants(bundle) if how.startswith(("verdict explored", "verdict f"))
     ]
@@ -241,7 +235,7 @@ def test_every_single_change_of_a_verdict_on_the_protocol_is_refused(
             mutant = make()
         except (InputError, ValueError):
             continue
-        assert refused(mutant, remembered), how
+        assert refused(mutant), how
 
 
 @pytest.mark.parametrize("family", TITLES)
@@ -258,19 +252,18 @@ def test_every_single_change_of_a_line_of_the_evidence_is_refused(family: str) -
 
 
 @pytest.mark.usefixtures("stated_once")
-def test_evidence_on_the_protocol_that_is_missing_or_exchanged_is_refused(
-    remembered: Callable[[str, int], tuple[str, ...]],
-) -> None:
+def test_evidence_on_the_protocol_that_is_missing_or_exchanged_is_refused() -> None:
     bundle = of_the_living("shuttle")
-    assert not refused(bundle, remembered)
+    assert not refused(bundle)
     mutants = [
         (how, make) for how, make in evidence_mutants(bundle) if how.startswith(("explored.smt2", "faults.smt2"))
     ]
     assert len(mutants) > 20
     for how, make in mutants:
-        assert refused(make(), remembered), how
+        assert refused(make()), how
 
 
+@pytest.mark.usefixtures("remembering")
 def test_evidence_on_the_protocol_that_no_verdict_names_is_refused() -> None:
     bundle = of_the_living("shuttle")
     verdicts = tuple(verdict for verdict in bundle.verdicts if not verdict.name.startswith("faults."))
@@ -324,6 +317,7 @@ def test_the_evidence_on_the_protocol_of_one_net_is_that_of_no_other() -> None:
     assert count > 80
 
 
+@pytest.mark.usefixtures("remembering")
 def test_verdicts_on_the_protocol_that_were_left_out_are_missed() -> None:
     bundle = of_the_living("shuttle")
     for family in TITLES:
@@ -333,6 +327,7 @@ def test_verdicts_on_the_protocol_that_were_left_out_are_missed() -> None:
                 check_bundle(replace(bundle, verdicts=verdicts))
 
 
+@pytest.mark.usefixtures("remembering")
 def test_a_family_that_was_left_out_with_its_evidence_claims_nothing() -> None:
     bundle = of_the_living("shuttle")
     verdicts = tuple(v for v in bundle.verdicts if v.name.partition(".")[0] not in TITLES)
@@ -341,14 +336,12 @@ def test_a_family_that_was_left_out_with_its_evidence_claims_nothing() -> None:
 
 
 @pytest.mark.parametrize("kind", ["keeps.decide/hand_over", "home", "way.fetch", "one-token.fire/unload", "divergence"])
-def test_an_answer_that_refutes_is_refused_and_a_missing_one_only_claims(
-    kind: str, remembered: Callable[[str, int], tuple[str, ...]]
-) -> None:
+def test_an_answer_that_refutes_is_refused_and_a_missing_one_only_claims(kind: str) -> None:
     bundle = bundled("shuttle")
 
     def saying(answer: str) -> Callable[[str, int], tuple[str, ...]]:
         def solver(text: str, ms: int) -> tuple[str, ...]:
-            said = list(remembered(text, ms))
+            said = list(answered(text, ms))
             if kind in said:
                 said[said.index(kind) + 1] = answer
             return tuple(said)

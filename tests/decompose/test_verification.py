@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 from support.bundle_mutants import decomposition_mutants, evidence_mutants, line_mutants, verdict_mutants
+from support.remembered import answered
 
 from firable.analysis.check import check
-from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
-from firable.analysis.evidence.document import Document, document_from_text
+from firable.analysis.evidence.document import document_from_text
 from firable.analysis.spaces.reachability import Budget
 from firable.decompose.bundling import make_bundle
 from firable.decompose.proofs.families import FAMILIES
@@ -26,7 +26,7 @@ from firable.decompose.verification.protocol import TITLE, blocks, published
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS
-from firable.decompose.verification.solvers import SOLVERS, SolverError, by_cvc5, gave_up
+from firable.decompose.verification.solvers import SOLVERS, SolverError, gave_up
 from firable.decompose.verification.words import SENTENCES
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net, family_net
@@ -41,30 +41,6 @@ CELLS = ("conceptual_one_robot", "one_robot", "two_robots_shared")
 @cache
 def bundled(name: str) -> Bundle:
     return make_bundle(check(family_net(name) if "-" in name else catalogue_net(name)))
-
-
-@cache
-def answered(text: str, timeout_ms: int) -> tuple[str, ...]:
-    """What cvc5 answers to a text, which few of the tests and mutants change."""
-    return by_cvc5(text, timeout_ms)
-
-
-records: dict[tuple[str, int], tuple[CheckedRecord, ...]] = {}
-
-
-def examined(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
-    """What the checker finds of a document, likewise found once."""
-    key = document.to_text(), timeout_ms
-    if key not in records:
-        records[key] = tuple(check_document(document, timeout_ms=timeout_ms))
-    return iter(records[key])
-
-
-@pytest.fixture
-def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was answered to a text or found of a document before is not asked again."""
-    monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", {"cvc5": answered})
-    monkeypatch.setattr(documents, "check_document", examined)
 
 
 def survives(make: Callable[[], Bundle], whole: Bundle) -> bool:

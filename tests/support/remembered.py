@@ -1,0 +1,24 @@
+"""Answers of the second solver and findings of the checker that many tests and mutants share, found once a process."""
+
+from collections.abc import Iterator
+from functools import cache
+
+from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
+from firable.analysis.evidence.document import Document
+from firable.decompose.verification.solvers import by_cvc5
+
+_found: dict[tuple[str, int], tuple[CheckedRecord, ...]] = {}
+
+
+@cache
+def answered(text: str, timeout_ms: int) -> tuple[str, ...]:
+    """What cvc5 answers to a text."""
+    return by_cvc5(text, timeout_ms)
+
+
+def examined(document: Document, timeout_ms: int) -> Iterator[CheckedRecord]:
+    """What the checker finds of a document."""
+    key = document.to_text(), timeout_ms
+    if key not in _found:
+        _found[key] = tuple(check_document(document, timeout_ms=timeout_ms))
+    return iter(_found[key])
