@@ -27,7 +27,7 @@ mod in_place;
 use std::hint::black_box;
 
 use crate::budget::{Memory, Stop, Watch};
-use crate::region::Region;
+use crate::region::{Region, write_first};
 use crate::seat::{LANES, MOVED_BITS, REACH, Shape, Slot};
 
 /// Whether a key is in the set, and where it belongs.
@@ -92,6 +92,33 @@ fn look<S: Slot>(buckets: &[[S; LANES]], asked: &mut Asked<S>) -> usize {
         open += usize::from(S::matches(&buckets[home], wanted) == 0);
     }
     open
+}
+
+/// Empty buckets that are being filled, and how many slots of each are taken. To ask a bucket itself for its first free
+/// slot would be to read all of it just after one slot was written, and for that the processor waits.
+struct Filling<'a, S> {
+    buckets: &'a mut [[S; LANES]],
+    taken: &'a mut [u8],
+}
+
+impl<'a, S: Slot> Filling<'a, S> {
+    /// Buckets, and a zero for each, that nobody has read before.
+    fn new(buckets: &'a mut [[S; LANES]], taken: &'a mut [u8]) -> Self {
+        write_first(buckets.as_flattened_mut());
+        Filling { buckets, taken }
+    }
+
+    /// Puts what stands for a key into the first bucket with a free slot from the one where it belongs on; false where all
+    /// that would be tried for it are full, or past the end.
+    #[inline(always)]
+    fn take(&mut self, home: usize, wanted: S) -> bool {
+        let tried = &mut self.taken[home..];
+        let Some(moved) = tried.iter().take(REACH).position(|&taken| usize::from(taken) < LANES) else { return false };
+        let free = usize::from(tried[moved]) % LANES;
+        tried[moved] += 1;
+        self.buckets[home + moved][free] = S::new(wanted.get() + moved as u64);
+        true
+    }
 }
 
 /// A set of keys.
@@ -254,7 +281,12 @@ impl<S: Slot> Exact<S> {
         loop {
             shape = shape.larger()?;
             let mut room = Self::room(shape, memory)?;
-            let filled = self.refill(shape, room.all_mut().as_chunks_mut().0, watch);
+            let buckets = room.all_mut().as_chunks_mut().0;
+            let filled = memory.filled(0, buckets.len()).and_then(|mut taken| {
+                let filled = self.refill(shape, Filling::new(buckets, &mut taken), watch);
+                memory.release(taken.len());
+                filled
+            });
             if filled == Ok(true) {
                 memory.release(Self::bytes(self.shape));
                 (self.slots, self.shape) = (room, shape);
@@ -267,24 +299,15 @@ impl<S: Slot> Exact<S> {
 
     /// Puts all keys into other buckets; false where some of them are full. That ends with as many buckets as keep any
     /// eight keys apart, if not with memory.
-    fn refill(&self, shape: Shape, buckets: &mut [[S; LANES]], watch: &mut Watch<'_>) -> Result<bool, Stop> {
+    fn refill(&self, shape: Shape, mut filling: Filling<'_, S>, watch: &mut Watch<'_>) -> Result<bool, Stop> {
         for (at, bucket) in self.buckets().iter().enumerate() {
             watch.tick(LANES)?;
             for slot in bucket.iter().map(|slot| slot.get()).take_while(|&slot| slot != 0) {
                 let home = at + 1 - (slot & REACH as u64) as usize;
                 let (home, wanted) = shape.seat::<S>(self.shape.mixed(home, slot));
-                let mut moved = 0;
-                let free = loop {
-                    let free = S::matches(&buckets[home + moved], S::new(0));
-                    if free != 0 {
-                        break free.trailing_zeros() as usize % LANES;
-                    }
-                    moved += 1;
-                    if moved == REACH {
-                        return Ok(false);
-                    }
-                };
-                buckets[home + moved][free] = S::new(wanted.get() + moved as u64);
+                if !filling.take(home, wanted) {
+                    return Ok(false);
+                }
             }
         }
         Ok(true)

@@ -14,7 +14,7 @@ mod candidates;
 
 use crate::budget::{Memory, Stop, Watch};
 use crate::marking::{Width, linear_hash, mix};
-use crate::region::Region;
+use crate::region::{Region, write_first};
 use crate::store::Store;
 
 pub use candidates::Candidates;
@@ -217,6 +217,7 @@ impl Table {
         const PART: usize = 1 << 12;
         let mut wider = self.wider(memory)?;
         let (shape, slots) = (wider.shape(), wider.all_mut());
+        write_first(slots);
         for first in (0..self.store.len()).step_by(PART) {
             for index in first..self.store.len().min(first + PART) {
                 file(shape, slots, mix(linear_hash(width, self.store.get(width, index))), index);

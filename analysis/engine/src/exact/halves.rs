@@ -4,7 +4,7 @@
 //! end of the lower half belongs to neither thread: it is given back, and put into the whole table when nobody works on
 //! it.
 
-use super::{Asked, Exact, Place, ROOM};
+use super::{Asked, Exact, Filling, Place, ROOM};
 use crate::seat::{FACTOR, LANES, REACH, Shape, Slot};
 use std::hint::black_box;
 use std::mem;
@@ -71,17 +71,23 @@ impl<S: Slot> Exact<S> {
     pub(crate) fn grow_by_two(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<bool, Stop> {
         let Ok(shape) = self.shape.larger() else { return Ok(false) };
         let Ok(mut room) = Self::room(shape, memory) else { return Ok(false) };
-        let [mut low, mut high] = halves(shape, room.all_mut());
-        let ended = AtomicBool::new(false);
+        let Ok(mut taken) = memory.filled(0, shape.buckets as usize + REACH) else {
+            memory.release(Self::bytes(shape));
+            return Ok(false);
+        };
+        let [low, high] = halves(shape, room.all_mut());
+        let (taken_low, taken_high) = taken.split_at_mut(low.buckets.len());
+        let (from, ended) = (&*self, AtomicBool::new(false));
         let past = thread::scope(|scope| {
-            let work =
-                || high.refill(self, || if ended.load(Ordering::Relaxed) { Err(Stop::Cancelled) } else { Ok(()) });
+            let go_on = || if ended.load(Ordering::Relaxed) { Err(Stop::Cancelled) } else { Ok(()) };
+            let work = move || high.refill(from, taken_high, go_on);
             // Where the system has no thread to give, all is done here.
             let other = thread::Builder::new().spawn_scoped(scope, work).ok()?;
-            let past = low.refill(self, || watch.tick(LANES));
+            let past = low.refill(from, taken_low, || watch.tick(LANES));
             ended.store(past.is_err(), Ordering::Relaxed);
             Some((past, other.join().unwrap_or_else(|panic| resume_unwind(panic))))
         });
+        memory.release(taken.len());
         let past = match past {
             Some((Ok(low), Ok(high))) => [low, high],
             Some((Err(stop), _) | (_, Err(stop))) => {
@@ -189,12 +195,18 @@ impl<S: Slot> HalfExact<'_, S> {
         usize::from(count)
     }
 
-    /// Puts those of all keys that belong here into this half; gives back those that belong past its end. Asks at each
-    /// bucket whether to go on.
-    fn refill(&mut self, from: &Exact<S>, mut poll: impl FnMut() -> Result<(), Stop>) -> Result<Vec<u64>, Stop> {
+    /// Puts those of all keys that belong here into this half, which is empty as are the counts of what its buckets hold;
+    /// gives back those that belong past its end. Asks at each bucket whether to go on.
+    fn refill(
+        self,
+        from: &Exact<S>,
+        taken: &mut [u8],
+        mut poll: impl FnMut() -> Result<(), Stop>,
+    ) -> Result<Vec<u64>, Stop> {
         let old = from.shape;
         let (start, end) =
             if self.id == 0 { (0, old.buckets as usize / 2) } else { (old.buckets as usize / 2, usize::MAX) };
+        let mut filling = Filling::new(self.buckets, taken);
         let mut past = Vec::new();
         // What belongs before the middle may stand past it.
         let until = (end.saturating_add(REACH)).min(from.buckets().len());
@@ -207,17 +219,8 @@ impl<S: Slot> HalfExact<'_, S> {
                 }
                 let mixed = old.mixed(home, slot);
                 let (home, wanted) = self.shape.seat::<S>(mixed);
-                let home = home - self.first;
-                let reach = self.buckets.len().min(home + REACH);
-                let tried = self.buckets[home..reach].iter_mut().enumerate();
-                let free = tried
-                    .map(|(moved, bucket)| (moved, S::matches(bucket, S::new(0)), bucket))
-                    .find(|tried| tried.1 != 0);
-                match free {
-                    Some((moved, free, bucket)) => {
-                        bucket[free.trailing_zeros() as usize % LANES] = S::new(wanted.get() + moved as u64);
-                    }
-                    None => past.push(self.shape.key(mixed)),
+                if !filling.take(home - self.first, wanted) {
+                    past.push(self.shape.key(mixed));
                 }
             }
         }

@@ -10,7 +10,7 @@
 
 use super::{Asked, Exact, Place, ROOM};
 use crate::budget::{Memory, Stop, Watch};
-use crate::region::Region;
+use crate::region::{Region, write_first};
 use crate::seat::{LANES, REACH, Shape, Slot};
 
 /// Buckets from which the next larger table has each of their keys in a later bucket: a third of it is more than
@@ -86,6 +86,8 @@ impl<S: Slot> Exact<S> {
                 return Err(Stop::Memory);
             }
             memory.claim(Self::bytes(shape) - Self::bytes(old))?;
+            let slots = |shape| Self::bytes(shape) / size_of::<S>();
+            write_first(&mut self.slots.all_mut()[slots(old)..slots(shape)]);
             self.shape = shape;
             homeless = self.move_up(old, homeless, watch)?;
             if homeless.is_empty() {

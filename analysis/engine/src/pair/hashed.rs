@@ -14,6 +14,7 @@ use crate::explore::Space;
 use crate::known::Hashed;
 use crate::marking::{Width, linear_hash, mix};
 use crate::net::Net;
+use crate::region::write_first;
 use crate::store::Store;
 use crate::table::{Shape, Table};
 
@@ -102,6 +103,7 @@ impl HashedHalf<'_> {
         mut poll: impl FnMut(usize) -> Result<(), Stop>,
     ) -> Result<Vec<(u64, usize)>, Stop> {
         let words = width.words();
+        write_first(self.slots);
         let mut past = Vec::new();
         let mut own = [(0_u64, 0_usize); BATCH];
         let mut count = 0;
