@@ -13,7 +13,8 @@ fire is seen in the central net:
   disturb each other. What would disturb one of them fires no more (O1), nor what shares a signal with it. A part that
   is promised is firable; or it is behind: its transition was decided before, so the central net has its tokens moved
   already, and others may have gone on from there, but its order never comes. A part that is *free of promise* locks
-  nothing; but it may be behind, too, beside whatever else is promised, and its gates may have changed since.
+  nothing, whatever it has voted; but it may be behind, too, beside whatever else is promised, and its gates may have
+  changed since.
 
 Everything else can be brought to rest, and is then fired as if nobody were dead. So the net here is the central one,
 the life of who dies, and the promises that a dead coordinator leaves:
@@ -59,7 +60,7 @@ class Bereft:
     who: str
     coordinator: str = ""
     free: frozenset[tuple[str, str]] = frozenset()
-    """The transition and the controller of each part that is free of promise; `parts` take them for such as promise."""
+    """The transition and the controller of each part free of promise; `parts` takes them for such as promise."""
 
     @cached_property
     def held_up(self) -> frozenset[str]:
@@ -161,7 +162,7 @@ class Bereft:
 
     @cached_property
     def left(self) -> tuple[Part, ...]:
-        """The parts of which a promise may be left by a dead coordinator, and keeps somebody from firing."""
+        """The parts that a dead coordinator may leave promised or behind, and that keep somebody from firing so."""
         if self.who:
             return ()
         disturbed = {other for part in self._going for other in self._in_the_way(part)}
@@ -192,21 +193,22 @@ class Bereft:
 
     def _holding(self, part: Part, held: Mapping[Part, str]) -> Iterator[Transition]:
         """The part is promised and firable, but for what others of its round may have moved; or it is behind."""
-        free = self._is_free(part)
-        excluding = () if free else self.parts.excluding(part)
-        others = {held[other] for other in excluding if other in held and not self._is_free(other)}
+        name, here = f"{part.whole}/{part.controller}", (held[part],)
+        full, empty = {*part.outputs}, {*part.inputs}
+        if self.is_free(part):
+            yield Transition(f"behind/{name}", (), here, _sorted({DYING, *full}), _sorted(empty))
+            return
+        others = {held[other] for other in self.parts.excluding(part) if other in held and not self.is_free(other)}
+        # What its own firing has moved is as that leaves it, whatever a gate of it wanted there before.
+        full = full.union(set(part.permissive) - part.writes)
+        empty = empty.union(set(part.inhibitive) - part.writes)
+        yield Transition(f"behind/{name}", (), here, _sorted({DYING, *full}), _sorted(empty | others))
         moved = moved_beside(self.parts, part)
         full, empty = {*part.inputs, *part.permissive} - moved, {*part.outputs, *part.inhibitive} - moved
-        name, here = f"{part.whole}/{part.controller}", (held[part],)
         yield Transition(f"hold/{name}", (), here, _sorted({DYING, *full}), _sorted(empty | others))
-        full, empty = {*part.outputs}, {*part.inputs}
-        if not free:
-            # What its own firing has moved is as that leaves it, whatever a gate of it wanted there before.
-            full = full.union(set(part.permissive) - part.writes)
-            empty = empty.union(set(part.inhibitive) - part.writes)
-        yield Transition(f"behind/{name}", (), here, _sorted({DYING, *full}), _sorted(empty | others))
 
-    def _is_free(self, part: Part) -> bool:
+    def is_free(self, part: Part) -> bool:
+        """Whether a part promises nothing."""
         return (part.whole, part.controller) in self.free
 
     def _central(self, held: Mapping[Part, str]) -> Iterator[Transition]:

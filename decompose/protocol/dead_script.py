@@ -1,31 +1,33 @@
 """That the net which the dead leave stands for the protocol without them: its obligations, and what z3 answers.
 
 What goes on while somebody is dead is found in a net of the size of the central one (`bereft`). Here it is tied to the
-protocol's net under faults, in one SMT-LIB 2 file for all who can be dead: of the protocol in which every part
-promises. That one that is free of promise keeps back no more is argued (docs/protocol.md). The invariant is kept
-(`starts`, `keeps`), and of each configuration of that it is asked, once for all:
+protocol's net under faults, with its parts that are free of promise, in one SMT-LIB 2 file for all who can be dead. A
+part is *in the way* of another one that it would disturb while it is promised; or, where it is free of promise, while
+it is behind: its transition is committed, and it has not obeyed yet. The invariant is kept (`starts`, `keeps`), and of
+each configuration of that it is asked, once for all:
 
 - `home.GROUP`: while a round is open, and its coordinator and those who take part live, it can be brought to its end;
 - `homeward.STEP`: of what is still to be done, the step leaves less;
-- `way.T`: where the round of T is at rest, no promise disturbs its parts and those who take part in it live, T fires by
-  the steps of its way if the central net can fire it;
+- `way.T`: where the round of T is at rest, nothing is in the way of its parts and those who take part in it live, T
+  fires by the steps of its way if the central net can fire it;
 
 and of each who can be dead:
 
 - `at-once.WHO`: no step fires what is said to stand still at once;
 - `undisturbed.WHO`: where the rounds in which the dead have no hand are at rest, and T goes on in the net that is left,
   nothing keeps T from its way;
-- `promised.WHO.PART`: a promise that the dead leave is one that the net that is left may hold at this marking.
+- `promised.WHO.PART`: a promise that the dead leave is one that the net that is left may hold at this marking; so it is
+  of a part free of promise that is behind.
 
 So, by hand: the rounds in which the dead have no hand come to rest by steps of the others alone (`home`), and these end
-(`homeward`; asked here, as the `faults.smt2` of a bundle is of the protocol with its free parts). What the protocol has
-then is a marking of the net that is left, with the promises that stand (`promised`; `astray` is empty by the
+(`homeward`; asked here too, so that this file leans on no other). What the protocol has then is a marking of the net
+that is left, with the promises that stand and the parts that are behind (`promised`; `astray` is empty by the
 invariant), and each of its firings is one of the protocol (`undisturbed`, `way`), after which the same holds again.
 What can fire again there can fire again here. What the executor does beyond the protocol's net, the signals that a
 promise holds still and the rounds that a coordinator does not open, is argued in docs/protocol.md.
 
 The invariant is that of `faults.smt2`, and one sentence more: *a promise stands*, whether its round was given up or
-not.
+not. Given is that votes stand, as there.
 Rejected: a question for each who is dead of every step and transition, which is quadratic and shows nothing more.
 """
 
@@ -40,28 +42,31 @@ from firable.analysis.induction.smt import Answer, in_ascii, symbol
 from firable.decompose.proofs.script import LOGIC, Reader
 from firable.decompose.protocol.bereft import Bereft, deaths, moved_beside
 from firable.decompose.protocol.building import ProtocolNet, protocol_net
-from firable.decompose.protocol.completeness import way
-from firable.decompose.protocol.draft import CHANNELS, at, central, coordinator_down, down
+from firable.decompose.protocol.draft import at, central, channels_of, coordinator_down, down
 from firable.decompose.protocol.inductive import (
     Sentence,
     demands,
     effect,
     homeward,
     implied,
-    invariant,
     negated,
+    persistent,
     touched,
 )
 from firable.decompose.protocol.inductive_script import (
+    GIVEN,
     INVARIANT,
+    PERSISTENT,
     Obligations,
     after,
     all_of,
     any_of,
+    fired_by_its_way,
     literal,
     sentence,
 )
-from firable.decompose.protocol.rounds import asked, committed, decided
+from firable.decompose.protocol.parts import Part, Parts
+from firable.decompose.protocol.rounds import committed, decided, is_open
 from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Transition
@@ -79,14 +84,14 @@ SAYS: Final = {
     "keeps": "after the step, they still do",
     "home": "a round of the living can be brought to its end",
     "homeward": "the step leaves less to be done",
-    "way": "what the central net can fire, and no promise disturbs, is fired by these steps",
+    "way": "what the central net can fire, and nothing is in the way of, is fired by these steps",
     "at-once": "nobody but the dead fires what stands still at once",
     "undisturbed": "what goes on in the net that is left finds nothing in its way",
-    "promised": "a promise to the dead is one that the net that is left may hold",
+    "promised": "a promise to the dead, or a part that is behind, is one that the net that is left may hold",
 }
 """What each kind of obligation says, in the order of the file."""
 
-_OF_PART: Final = (*CHANNELS, "promised", "obeyed", "heard", "noted")
+_OF_PROMISING: Final = ("promised", "heard")
 
 
 @dataclass(frozen=True)
@@ -97,12 +102,12 @@ class DeadObligations:
 
     @cached_property
     def protocol(self) -> ProtocolNet:
-        """The protocol in which every part promises, under any number of faults."""
-        return protocol_net(replace(self.decomposition, free=()), PROTOCOL, ANY_FAULTS)
+        """The protocol under any number of faults."""
+        return protocol_net(self.decomposition, PROTOCOL, ANY_FAULTS)
 
     @cached_property
     def _rounds(self) -> Obligations:
-        """What `faults.smt2` says where every part promises."""
+        """What `faults.smt2` says of it."""
         return Obligations(self.protocol)
 
     def beginning(self) -> str:
@@ -113,19 +118,22 @@ class DeadObligations:
         places = sorted(place.name for place in protocol.net.places)
         lines += [LOGIC, *(f"(declare-const {symbol(place)} Bool)" for place in places)]
         defined = {
-            INVARIANT: all_of(map(sentence, invariant(protocol))),
+            INVARIANT: all_of(map(sentence, self._rounds.invariant)),
             STANDING: all_of(map(sentence, self._standing)),
         }
         defined |= {name: sentence(fact) for fact, name in self._rounds.facts.items()}
         defined |= {self._open(group): any_of(map(symbol, self._memory(group))) for group in self._groups}
         lines += [f"(define-fun {name} () Bool {text})" for name, text in defined.items()]
+        if self._rounds.given:
+            votes = all_of(map(sentence, persistent(protocol)))
+            lines += [GIVEN, f"(define-fun {PERSISTENT} () Bool {votes})"]
         return "\n".join(lines) + "\n"
 
     def blocks(self) -> Iterator[tuple[str, str]]:
         """Each obligation by its name. From the second one on, promises stand."""
         marked = all_of(literal((place.name, place.marked)) for place in self.protocol.net.places)
         name, block = _block("starts", "starts", [marked, f"(not (and {INVARIANT} {STANDING}))"])
-        yield name, f"{block}\n(assert {INVARIANT})\n(assert {STANDING})\n"
+        yield name, f"{block}\n(assert {INVARIANT})\n(assert {STANDING})\n{self._rounds.given}"
         for made in (self._keeping(), self._home(), self._leading(), self._ways()):
             yield from made
         for bereft in self.deaths:
@@ -134,7 +142,13 @@ class DeadObligations:
     @cached_property
     def deaths(self) -> tuple[Bereft, ...]:
         """Everybody who can be dead, in the order of the names."""
-        return tuple(sorted(deaths(self.protocol.parts, self.decomposition.free), key=lambda bereft: bereft.verdict))
+        some = deaths(self._promising, self.decomposition.free)
+        return tuple(sorted(some, key=lambda bereft: bereft.verdict))
+
+    @cached_property
+    def _promising(self) -> Parts:
+        """The parts as if each of them promised: what it would disturb then."""
+        return Parts(replace(self.decomposition, free=()), PROTOCOL)
 
     @cached_property
     def _groups(self) -> list[tuple[str, ...]]:
@@ -146,7 +160,7 @@ class DeadObligations:
     def _standing(self) -> tuple[Sentence, ...]:
         """A promised part is firable, but for what others of its round may have moved."""
         parts, found = self.protocol.parts, list[Sentence]()
-        for part in (part for its in parts.coordinated.values() for part in its):
+        for part in (part for t in parts.coordinated for part in parts.promising(t)):
             moved = moved_beside(parts, part)
             needs = [(place, True) for place in (*part.inputs, *part.permissive)]
             needs += [(place, False) for place in (*part.outputs, *part.inhibitive)]
@@ -155,9 +169,12 @@ class DeadObligations:
 
     def _memory(self, group: Iterable[str]) -> Iterator[str]:
         """What is asked, promised, known or on its way in a round."""
+        parts = self.protocol.parts
         for t in group:
-            yield from (asked(t), committed(t), decided(self.protocol.parts, t))
-            yield from (at(kind, part) for part in self.protocol.parts.coordinated[t] for kind in _OF_PART)
+            yield from (is_open(parts, t), committed(t), decided(parts, t))
+            for part in parts.coordinated[t]:
+                kinds = (*channels_of(part), "obeyed", "noted", *(() if part.free else _OF_PROMISING))
+                yield from (at(kind, part) for kind in kinds)
 
     @staticmethod
     def _open(group: Iterable[str]) -> str:
@@ -170,16 +187,22 @@ class DeadObligations:
             return [down(part.controller) for part in parts.local if part.whole == t]
         return [coordinator_down(parts.decider(t)), *(down(part.controller) for part in parts.coordinated[t])]
 
-    def _disturbing(self, t: str) -> Iterator[str]:
-        """The promises of others that keep a part of a transition from being promised or fired."""
-        parts = self.protocol.parts
+    def _in_the_way(self, t: str) -> set[str]:
+        """What keeps a part of a transition from being promised, voted on or fired, each a formula."""
+        parts = self._promising
         its = parts.coordinated.get(t) or [part for part in parts.local if part.whole == t]
-        yield from (at("promised", other) for part in its for other in parts.excluding(part))
+        return {self._left(other) for part in its for other in parts.excluding(part)}
+
+    def _left(self, part: Part) -> str:
+        """That a part is promised, or where it is free of promise, that it is behind."""
+        if (part.whole, part.controller) in self.decomposition.free:
+            return all_of(map(literal, ((committed(part.whole), True), (at("obeyed", part), False))))
+        return symbol(at("promised", part))
 
     # --- The obligations
 
     def _keeping(self) -> Iterator[tuple[str, str]]:
-        some = (*invariant(self.protocol), *self._standing)
+        some = (*self._rounds.invariant, *self._standing)
         texts, at_ = {one: sentence(one) for one in some}, touched(some)
         for t in sorted(self.protocol.net.transitions, key=lambda t: t.name):
             changes = effect(t)
@@ -206,12 +229,10 @@ class DeadObligations:
     def _ways(self) -> Iterator[tuple[str, str]]:
         parts = self.protocol.parts
         for t in sorted(parts.transitions, key=lambda t: t.name):
-            fired = "true"
-            for name in reversed(way(self.protocol, t.name) or ()):
-                step = self.protocol.net.transition(name)
-                fired = all_of([*map(literal, demands(step)), after(effect(step), fired)])
+            fired = fired_by_its_way(self.protocol, t.name)
             can = [literal((central(place), full)) for place, full in demands(t)]
-            free = [literal((place, False)) for place in (*self._downs(t.name), *self._disturbing(t.name))]
+            free = [literal((place, False)) for place in self._downs(t.name)]
+            free += [f"(not {obstacle})" for obstacle in self._in_the_way(t.name)]
             if t.name in parts.coordinated:
                 free.append(f"(not {self._open(parts.groups[parts.group_of[t.name]])})")
             yield _block(f"way.{t.name}", "way", [all_of(can), all_of(free), f"(not {fired})"])
@@ -227,25 +248,26 @@ class DeadObligations:
         others = [*(down(subnet.name) for subnet in self.decomposition.subnets), *map(coordinator_down, parts.deciders)]
         alive = [literal((place, False)) for place in others if place != is_down]
         kept = []
-        held = {f"held/{part.whole}/{part.controller}": at("promised", part) for part in bereft.left}
+        held = {f"held/{part.whole}/{part.controller}": self._left(part) for part in bereft.left}
         for t in (t for t in parts.transitions if t.name not in bereft.held_up):
-            seen = [literal((held[p], False)) for p in bereft.net.transition(t.name).inhibitive if p in held]
-            in_the_way = [*self._disturbing(t.name), *self._downs(t.name)]
-            ways = [*map(symbol, in_the_way), *(self._open(g) for g in parts.groups if t.name in g)]
+            seen = [f"(not {held[p]})" for p in bereft.net.transition(t.name).inhibitive if p in held]
+            ways = [*self._in_the_way(t.name), *map(symbol, self._downs(t.name))]
+            ways += [self._open(g) for g in parts.groups if t.name in g]
             kept.append(all_of([*seen, any_of(ways)]))
         if kept:
             asserted = [dead, all_of([*at_rest, *alive]), any_of(kept)]
             yield _block(f"undisturbed.{who}", "undisturbed", asserted)
         for part in sorted(bereft.left, key=lambda part: f"{part.whole}/{part.controller}"):
             name = f"{part.whole}/{part.controller}"
-            may = [self._guard(bereft.net.transition(f"{act}/{name}"), held) for act in ("behind", "hold")]
-            yield _block(f"promised.{who}.{name}", "promised", [symbol(at("promised", part)), f"(not {any_of(may)})"])
+            acts = ("behind",) if bereft.is_free(part) else ("behind", "hold")
+            may = [self._guard(bereft.net.transition(f"{act}/{name}"), held) for act in acts]
+            yield _block(f"promised.{who}.{name}", "promised", [self._left(part), f"(not {any_of(may)})"])
 
     def _guard(self, t: Transition, held: dict[str, str]) -> str:
         """Where a transition of the net that is left may fire, said of the protocol's net."""
-        of = {**held, **{place.name: central(place.name) for place in self.protocol.parts.net.places}}
-        full = [literal((of[place], True)) for place in t.permissive if place in of]
-        return all_of([*full, *(literal((of[place], False)) for place in t.inhibitive if place in of)])
+        of = {**held, **{place.name: symbol(central(place.name)) for place in self.protocol.parts.net.places}}
+        full = [of[place] for place in t.permissive if place in of]
+        return all_of([*full, *(f"(not {of[place]})" for place in t.inhibitive if place in of)])
 
 
 def _block(name: str, kind: str, asserted: Iterable[str]) -> tuple[str, str]:

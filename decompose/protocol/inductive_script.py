@@ -126,6 +126,19 @@ def tried(step: Transition, text: str) -> str:
     return f"(let ({' '.join(sorted(bound))}) {text})"
 
 
+def fired_by_its_way(protocol: ProtocolNet, t: str) -> str:
+    """That the steps of its way can be taken one after the other; those of votes that stand, where they can be."""
+    unasked = {at("hear", part) for part in protocol.parts.coordinated.get(t, ()) if part.free}
+    text = "true"
+    for name in reversed(way(protocol, t) or ()):
+        step = protocol.net.transition(name)
+        if protocol.steps[name].kind in VOTING or name in unasked:
+            text = tried(step, text)
+        else:
+            text = all_of([*map(literal, demands(step)), after(effect(step), text)])
+    return text
+
+
 @dataclass(frozen=True)
 class Obligations:
     """The obligations on one protocol net; under faults those on its tokens and on what is busy for ever are left out.
@@ -276,16 +289,8 @@ class Obligations:
 
     def _ways(self) -> Iterator[str]:
         ceased = list(map(literal, may_go_on(self.protocol)))
-        free = (part for its in self.protocol.parts.coordinated.values() for part in its if part.free)
-        unasked = {at("hear", part) for part in free}
         for t in sorted(self.protocol.parts.transitions, key=lambda t: t.name):
-            fired = "true"
-            for name in reversed(way(self.protocol, t.name) or ()):
-                step = self.protocol.net.transition(name)
-                if self.protocol.steps[name].kind in VOTING or name in unasked:
-                    fired = tried(step, fired)
-                else:
-                    fired = all_of([*map(literal, demands(step)), after(effect(step), fired)])
+            fired = fired_by_its_way(self.protocol, t.name)
             can = all_of(literal((central(place), full)) for place, full in demands(t))
             yield _block(f"way.{t.name}", "way", [*ceased, can, f"(not {OPEN})", f"(not {fired})"])
 

@@ -155,12 +155,13 @@ class Wake:
         One that is free of promise has locked nothing, and its gates may be as they like by now.
         """
         own = part.own
-        if self._is_free(part):
+        if self.is_free(part):
             return set(own.outputs), set(own.inputs)
         seen, shut = {*own.permissive} - part.writes, {*own.inhibitive} - part.writes  # gates on what it has moved
         return {*own.outputs, *seen}, {*own.inputs, *shut}
 
-    def _is_free(self, part: Part) -> bool:
+    def is_free(self, part: Part) -> bool:
+        """Whether it promises nothing, and nobody waits for it but where it is behind."""
         return (part.whole, part.controller) in self.free
 
     def _transitions(self) -> Iterator[Transition]:
@@ -170,11 +171,13 @@ class Wake:
         yield Transition("life/is-dead", (DYING,), (DEAD,))
         for act in ("behind", "hold"):
             for place, part in sorted(self.promises.items()):
+                if act == "hold" and self.is_free(part):
+                    continue
                 full, empty = self._promised(part) if act == "hold" else self._behind(part)
                 full = full | {DYING}
-                if not self._is_free(part):
+                if not self.is_free(part):
                     others = self._places_of(self.voting.others(part))
-                    empty = empty | {other for other in others if not self._is_free(self.promises[other])}
+                    empty = empty | {other for other in others if not self.is_free(self.promises[other])}
                 name = f"{act}{place.removeprefix('held')}"
                 yield Transition(name, (), (place,), tuple(sorted(full)), tuple(sorted(empty)))
         stopped: dict[str, set[str]] = {}

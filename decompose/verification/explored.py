@@ -7,6 +7,7 @@ no other net's file will do. What the solver's answers come to is argued in docs
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 from firable.decompose.verification.checked import Examination
@@ -64,8 +65,10 @@ def check_explored(examination: Examination, cut: Cut, solver: str, answers: Ans
         if any(verdict.name.startswith(f"{family}.") for verdict in examination.bundle.verdicts):
             free = frozenset(examination.bundle.decomposition.free)
             stated = Obligations(Voting(cut, family == "faults", free))
-            open_ = {name.partition(".")[0] for name in answered(examination, stated, answers, timeout_ms)}
-            _judge(examination, stated, solver, open_)
+            found = answered(examination, stated, answers, timeout_ms)
+            for name, answer in found.refuted:  # each verdict of the family must hold, and all rest on the one file
+                raise refuted(f"{family}.smt2", name, answer)
+            _judge(examination, stated, solver, {name.partition(".")[0] for name in found.open_})
 
 
 def same_text(examination: Examination, stated: Obligations) -> str:
@@ -85,8 +88,21 @@ def _sentences(stated: Obligations) -> dict[str, str]:
     return {name: f"{words}, {_FAULTS}" for name, words in safe.items()} | {"resumes": _RESUMES}
 
 
-def answered(examination: Examination, stated: Obligations, answers: Answers, timeout_ms: int) -> set[str]:
-    """The obligations of a file that the solver gave up; an answer that refutes one is refused."""
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The obligations of a file that the solver gave up, and those that it refutes, with what it says of them."""
+
+    open_: tuple[str, ...]
+    refuted: tuple[tuple[str, str], ...]
+
+
+def refuted(file: str, name: str, answer: str) -> NotShownError:
+    """What is said where a verdict rests on what the solver refutes."""
+    return NotShownError(f"'{name}' of '{file}' is refuted: the solver says {answer}", "evidence", file)
+
+
+def answered(examination: Examination, stated: Obligations, answers: Answers, timeout_ms: int) -> Found:
+    """What the solver answers to the file of a family, which must be the one that is stated anew."""
     file = same_text(examination, stated)
     try:
         said = answers(stated.text, timeout_ms)
@@ -94,13 +110,9 @@ def answered(examination: Examination, stated: Obligations, answers: Answers, ti
         raise NotShownError(f"the solver cannot read '{file}': {error}", "evidence", file) from None
     if said[::2] != tuple(map(spelled, stated.names)) or len(said) % 2:
         raise NotShownError(f"the solver does not answer one obligation of '{file}' after the other", "evidence", file)
-    open_ = set()
-    for name, answer in zip(stated.names, said[1::2], strict=True):
-        if answer != "unsat" and not gave_up(answer):
-            raise NotShownError(f"'{name}' of '{file}' is refuted: the solver says {answer}", "evidence", file)
-        if answer != "unsat":
-            open_.add(name)
-    return open_
+    unshown = [(name, answer) for name, answer in zip(stated.names, said[1::2], strict=True) if answer != "unsat"]
+    late = tuple(name for name, answer in unshown if gave_up(answer))
+    return Found(late, tuple((name, answer) for name, answer in unshown if not gave_up(answer)))
 
 
 def _judge(examination: Examination, stated: Obligations, solver: str, open_: set[str]) -> None:

@@ -1,20 +1,28 @@
 """That the net which the dead leave stands for the protocol without them: `dead.smt2` stated anew, byte for byte.
 
 The second text of `firable.decompose.protocol.dead_script`, over the protocol's net and the nets that are left as the
-checker has made them itself. docs/protocol.md has the obligations and the form of the file.
+checker has made them itself. What a part would disturb is asked of the protocol in which every part promises: one that
+is free of promise is in the way of the same, but only while it is behind. docs/protocol.md has the obligations and the
+form of the file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
 from firable.decompose.verification.bereft import Wake, wakes
 from firable.decompose.verification.formulas import spelled
-from firable.decompose.verification.voting import HOME, MEMORY, MESSAGES, Part, Step, central
-from firable.decompose.verification.voting_obligations import INVARIANT, Obligations, Sentence
+from firable.decompose.verification.voting import HOME, Part, Step, Voting, central
+from firable.decompose.verification.voting_obligations import (
+    INVARIANT,
+    STANDING,
+    Obligations,
+    Sentence,
+    where_possible,
+)
 from firable.nets.net import Transition
 from firable.nets.source import printable
 
@@ -24,10 +32,10 @@ KINDS: Final = {
     "keeps": "after the step, they still do",
     "home": "a round of the living can be brought to its end",
     "homeward": "the step leaves less to be done",
-    "way": "what the central net can fire, and no promise disturbs, is fired by these steps",
+    "way": "what the central net can fire, and nothing is in the way of, is fired by these steps",
     "at-once": "nobody but the dead fires what stands still at once",
     "undisturbed": "what goes on in the net that is left finds nothing in its way",
-    "promised": "a promise to the dead is one that the net that is left may hold",
+    "promised": "a promise to the dead, or a part that is behind, is one that the net that is left may hold",
 }
 """The kinds of obligations, and what each says."""
 OF_ONE: Final = ("at-once", "undisturbed", "promised")
@@ -71,10 +79,12 @@ def _eq1(t: Transition) -> list[tuple[str, bool]]:
 
 @dataclass(frozen=True)
 class OutageObligations(Obligations):
-    """The file on all who can be dead, of the protocol of a net under faults in which every part promises."""
+    """The file on all who can be dead, of the protocol of a net under faults."""
 
-    free: frozenset[tuple[str, str]] = frozenset()
-    """The transition and the controller of each part that does not."""
+    @cached_property
+    def _promising(self) -> Voting:
+        """The protocol in which every part promises."""
+        return replace(self.voting, free=frozenset())
 
     @property
     def family(self) -> str:
@@ -84,7 +94,7 @@ class OutageObligations(Obligations):
     @cached_property
     def wakes(self) -> tuple[Wake, ...]:
         """Everybody who can be dead, in the order of the names."""
-        return tuple(sorted(wakes(self.voting, self.free), key=lambda wake: wake.name))
+        return tuple(sorted(wakes(self._promising, self.voting.free), key=lambda wake: wake.name))
 
     @cached_property
     def text(self) -> str:
@@ -95,7 +105,8 @@ class OutageObligations(Obligations):
             + "(check-sat)\n(pop 1)\n"
             for name, asserted in self._blocks
         )
-        return "".join((self._head(), start, f"\n(assert {INVARIANT})\n(assert {_STANDS})\n", *others))
+        given = f"(assert {STANDING})\n" if self._persistent else ""
+        return "".join((self._head(), start, f"\n(assert {INVARIANT})\n(assert {_STANDS})\n{given}", *others))
 
     def _head(self) -> str:
         net = self.voting.cut.net.name
@@ -112,6 +123,10 @@ class OutageObligations(Obligations):
         for group in self._groups:
             defined[self._open_round(group)] = _one_of(f"|{spelled(place)}|" for place in self._memory(group))
         lines += [f"(define-fun {name} () Bool {text})" for name, text in defined.items()]
+        if self._persistent:
+            given = "of the marking that the central net then has; the verdicts `persistent` of the same net show it."
+            votes = _all_of(map(self._sentence, self._persistent))
+            lines += [f"; Given {given}", f"(define-fun {STANDING} () Bool {votes})"]
         return "".join(f"{line}\n" for line in lines)
 
     @cached_property
@@ -135,7 +150,7 @@ class OutageObligations(Obligations):
     def _promises(self) -> dict[tuple[str, bool], set[str]]:
         """For each literal that a promise needs, the sentences that say so."""
         found: dict[tuple[str, bool], set[str]] = {}
-        for part in self.voting.all_parts:
+        for part in (part for part in self.voting.all_parts if not part.free):
             mates = {u for u in self.voting.group_of[part.whole] if u != part.whole}
             its = [p for u in mates for p in self.voting.parts[u] if p.controller == part.controller]
             moved = {place for mate in its for place in mate.writes}
@@ -154,9 +169,14 @@ class OutageObligations(Obligations):
         return sorted(self.voting.groups, key="+".join)
 
     def _memory(self, group: Iterable[str]) -> set[str]:
-        """The places of a round."""
-        of_parts = {p.at(kind) for t in group for p in self.voting.parts[t] for kind in (*MESSAGES, *MEMORY)}
-        return of_parts | {name for t in group for name in (f"asked/{t}", f"committed/{t}", self.voting.decided(t))}
+        """The places of a round, but for those that tell of votes which stand."""
+        found = set[str]()
+        for t in group:
+            found |= {self.voting.opened(t), f"committed/{t}", self.voting.decided(t)}
+            for part in self.voting.parts[t]:
+                standing = ("stands", "heard") if part.free else ()
+                found |= {part.at(kind) for kind in (*part.messages, *part.memory) if kind not in standing}
+        return found
 
     @staticmethod
     def _open_round(group: Iterable[str]) -> str:
@@ -172,8 +192,20 @@ class OutageObligations(Obligations):
         return found | ({self.voting.coordinator_down(t)} if t in self.voting.parts else set())
 
     def _obstacles(self, t: str) -> set[str]:
-        """The promises of others that a transition would disturb."""
-        return {promise for part in self._parts_of[t] for promise in self.voting.others(part)}
+        """What others have promised, or are behind with, and a transition would disturb: formulas."""
+        promises = {promise for part in self._parts_of[t] for promise in self._promising.others(part)}
+        return {self._left(self._by_promise[promise]) for promise in promises}
+
+    @cached_property
+    def _by_promise(self) -> dict[str, Part]:
+        return {part.at("promised"): part for part in self.voting.all_parts}
+
+    @staticmethod
+    def _left(part: Part) -> str:
+        """A part is promised; or it is free of promise, and its order has not been obeyed."""
+        if part.free:
+            return _text([(f"committed/{part.whole}", True), (part.at("obeyed"), False)])
+        return _text([(part.at("promised"), True)])
 
     # --- The obligations
 
@@ -204,10 +236,11 @@ class OutageObligations(Obligations):
     def _all_ways(self) -> Iterator[tuple[str, list[str]]]:
         for t in sorted(self.voting.transitions, key=lambda t: t.name):
             fired = "true"
-            for step, _ in reversed(self.voting.way(t.name)):  # where every part promises, each has to be taken
-                then = _then(step, fired)
-                fired = _all_of([*(_text([need]) for need in _needs(step)), then])
-            free = [_text([(place, False)]) for place in self._without_whom_not(t.name) | self._obstacles(t.name)]
+            for step, must in reversed(self.voting.way(t.name)):
+                needs = [_text([need]) for need in _needs(step)]
+                fired = _all_of([*needs, _then(step, fired)]) if must else where_possible(step, _all_of(needs), fired)
+            free = [_text([(place, False)]) for place in self._without_whom_not(t.name)]
+            free += [f"(not {obstacle})" for obstacle in self._obstacles(t.name)]
             if t.name in self.voting.parts:
                 free.append(f"(not {self._open_round(self.voting.group_of[t.name])})")
             can = _text((central(place), full) for place, full in _eq1(t))
@@ -221,21 +254,22 @@ class OutageObligations(Obligations):
         others = {*self.voting.coordinators_down, *(f"down/{subnet.name}" for subnet in self.voting.cut.subnets)}
         rest = [f"(not {self._open_round(group)})" for group in self._groups if wake.rests(group)]
         rest += [_text([(place, False)]) for place in others - {wake.down}]
-        held = {place: part.at("promised") for place, part in wake.promises.items()}
+        parts = {place: self._by_promise[part.at("promised")] for place, part in wake.promises.items()}
+        held = {place: self._left(part) for place, part in parts.items()}
         left = {t.name: t for t in wake.net.transitions}
         kept = []
         for t in (t.name for t in self.voting.transitions if t.name not in wake.held_up):
-            seen = [_text([(held[place], False)]) for place in left[t].inhibitive if place in held]
-            ways = [_text([(place, True)]) for place in self._obstacles(t) | self._without_whom_not(t)]
+            seen = [f"(not {held[place]})" for place in left[t].inhibitive if place in held]
+            ways = [*self._obstacles(t), *(_text([(place, True)]) for place in self._without_whom_not(t))]
             ways += [self._open_round(self.voting.group_of[t])] if t in self.voting.parts else []
             kept.append(_all_of([*seen, _one_of(ways)]))
         if kept:
             yield f"undisturbed.{who}", [dead, _all_of(rest), _one_of(kept)]
-        of = held | {place.name: central(place.name) for place in self.voting.cut.net.places}
+        of = held | {place.name: _text([(central(place.name), True)]) for place in self.voting.cut.net.places}
         for place, promise in sorted(held.items()):
             name, may = place.removeprefix("held/"), []
-            for act in ("hold", "behind"):
+            for act in ("behind",) if parts[place].free else ("hold", "behind"):
                 holding = left[f"{act}/{name}"]
-                guard = [*((p, True) for p in holding.permissive), *((p, False) for p in holding.inhibitive)]
-                may.append(_text((of[p], full) for p, full in guard if p in of))
-            yield f"promised.{who}.{name}", [_text([(promise, True)]), f"(not {_one_of(may)})"]
+                guard = [of[p] for p in holding.permissive if p in of]
+                may.append(_all_of([*guard, *(f"(not {of[p]})" for p in holding.inhibitive if p in of)]))
+            yield f"promised.{who}.{name}", [promise, f"(not {_one_of(may)})"]

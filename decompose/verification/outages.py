@@ -4,7 +4,8 @@ The second text of the division in `firable.decompose.protocol.outages`: what is
 (`bereft`), and what the answers come to. The answers are those of the document of each verdict, which says what it
 shows as any does; which questions there are follows from them, one after the other, and no other may be there. That
 this net stands for the protocol without the dead is shown by `dead.smt2`, which is stated anew, too
-(`outage_obligations`). Whoever is dead has a verdict, where the bundle speaks of faults at all.
+(`outage_obligations`). Whoever is dead has a verdict, where the bundle speaks of faults at all. It may say that it is
+not known; then the file may hold obligations on the same one that the solver refutes, and those on others stand.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Final
 from firable.decompose.verification.bereft import ALIVE, DEAD, DYING, EARLY, Wake
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.documents import answers_in, checked_document
-from firable.decompose.verification.explored import answered
+from firable.decompose.verification.explored import Found, answered, refuted
 from firable.decompose.verification.outage_obligations import FILE, OF_ONE, OutageObligations
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
@@ -41,8 +42,8 @@ def check_outages(examination: Examination, cut: Cut, answers: Answers, timeout_
     """Judge the verdicts on who is dead, if the bundle speaks of faults; raises `NotShownError`."""
     if not any(verdict.name.startswith("faults.") for verdict in examination.bundle.verdicts):
         return
-    stated = OutageObligations(Voting(cut, faults=True), frozenset(examination.bundle.decomposition.free))
-    open_: set[str] | None = None
+    stated = OutageObligations(Voting(cut, faults=True, free=frozenset(examination.bundle.decomposition.free)))
+    found: Found | None = None
     for wake in stated.wakes:
         verdict = examination.verdict(wake.name)
         sentence = _SAYS.format(wake.told)
@@ -55,20 +56,22 @@ def check_outages(examination: Examination, cut: Cut, answers: Answers, timeout_
             said = "undecided: the bundle itself does not say"
             examination.judge(verdict, shown=False, method="nothing", only_claimed=said)
             continue
-        if open_ is None:  # a file that nothing rests on is none of ours
-            open_ = answered(examination, stated, answers, timeout_ms)
-        late = _claimed(wake, open_)
+        if found is None:  # a file that nothing rests on is none of ours
+            found = answered(examination, stated, answers, timeout_ms)
+        for name, answer in found.refuted:
+            if _rests_on(wake, name):
+                raise refuted(FILE, name, answer)
+        late = next((f"the solver gave up '{name}' of '{FILE}'" for name in found.open_ if _rests_on(wake, name)), "")
         _judge(examination, wake, verdict, sentence, late, answers, timeout_ms)
 
 
-def _claimed(wake: Wake, open_: set[str]) -> str:
-    """Why it is only claimed that the net that is left stands for the protocol; empty where it is shown."""
-    who = wake.name.removeprefix("faults.")
-    for name in sorted(open_):
-        kind, _, of = name.partition(".")
-        if kind not in OF_ONE or of == who or (kind == "promised" and of.startswith(f"{who}.")):
-            return f"the solver gave up '{name}' of '{FILE}'"
-    return ""
+def _rests_on(wake: Wake, name: str) -> bool:
+    """Whether that the net that is left stands for the protocol rests on an obligation.
+
+    On those on another one who is dead it does not: of that one the bundle may say that it does not know.
+    """
+    who, (kind, _, of) = wake.name.removeprefix("faults."), name.partition(".")
+    return kind not in OF_ONE or of == who or (kind == "promised" and of.startswith(f"{who}."))
 
 
 def _judge(

@@ -119,7 +119,7 @@ def _then(step: Step, text: str) -> str:
     return f"(let ({changes}) {text})" if changes else text
 
 
-def _where_possible(step: Step, may: str, text: str) -> str:
+def where_possible(step: Step, may: str, text: str) -> str:
     """What a formula says after a step that is taken where it can be."""
     after = {place: _disjunction([_symbol(place), may]) for place in step.puts}
     after |= {place: _conjunction([_symbol(place), f"(not {may})"]) for place in step.takes}
@@ -378,7 +378,7 @@ class Obligations:
                 if must:
                     text = _conjunction([*demanded, _then(step, text)])
                 else:
-                    text = _where_possible(step, _conjunction(demanded), text)
+                    text = where_possible(step, _conjunction(demanded), text)
             can = [(central(p), True) for p in (*t.inputs, *t.permissive)]
             can += [(central(p), False) for p in (*t.outputs, *t.inhibitive)]
             yield f"way.{t.name}", [*self._ceased, _all(can), f"(not {OPEN})", f"(not {text})"]

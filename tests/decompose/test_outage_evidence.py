@@ -18,13 +18,11 @@ from support.owned_nets import owned_net
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
 from firable.analysis.evidence.document import Document, document_from_text
 from firable.decompose.protocol.bereft import Bereft, deaths
-from firable.decompose.protocol.building import protocol_net
-from firable.decompose.protocol.dead_script import DeadProof, prove_of_the_dead
-from firable.decompose.protocol.inductive import homeward
+from firable.decompose.protocol.dead_script import DeadObligations, DeadProof, prove_of_the_dead
 from firable.decompose.protocol.outages import inquests, outages, sealed_outages
 from firable.decompose.protocol.parts import Part, Parts
 from firable.decompose.protocol.shown import proved_without_exploring
-from firable.decompose.protocol.variant import ANY_FAULTS, PROTOCOL
+from firable.decompose.protocol.variant import PROTOCOL
 from firable.decompose.protocol.wrong import example
 from firable.decompose.splitting.cut import split
 from firable.decompose.verification import documents
@@ -40,6 +38,7 @@ from firable.decompose.verification.solvers import by_cvc5
 from firable.decompose.verification.voting import Voting
 from firable.nets.bundle import Bundle
 from firable.nets.catalogue import catalogue_net
+from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
 from firable.nets.interchange import net_digest
 from firable.nets.net import Controller, Net, Place, Transition
@@ -136,10 +135,10 @@ def refused(make: Callable[[], Bundle]) -> bool:
 # What is found is right
 
 
-def is_as_explored(net: Net) -> bool:
+def is_as_explored(net: Net, decomposed: Callable[[Net], Decomposition] = split) -> bool:
     """Of coordinators the same is found; of controllers no more goes on, since rounds are given up where explored."""
-    found, explored = list(outages(split(net))), list(explored_outages(split(net)))
-    for one, other in zip(found, explored, strict=True):
+    decomposition = decomposed(net)
+    for one, other in zip(outages(decomposition), explored_outages(decomposition), strict=True):
         if one != other and (
             not one.who
             or (one.who, one.at_once) != (other.who, other.at_once)
@@ -160,15 +159,8 @@ def test_what_the_dead_keep_back_is_what_exploring_the_protocol_finds(seed: int)
     assert is_as_explored(owned_net(seed))
 
 
-def kept_back_with_free_parts(net: Net) -> bool:
-    """Whether what is said to go on beside free parts is found to, where the protocol that has them is explored."""
-    decomposition = freed(split(net))
-    for one, other in zip(outages(decomposition), explored_outages(decomposition), strict=True):
-        if (one.who, set(one.at_once)) != (other.who, set(other.at_once)):
-            return False
-        if not set(one.goes_on) <= set(other.goes_on) or not set(one.running) <= set(other.running):
-            return False
-    return True
+def with_free_parts(net: Net) -> Decomposition:
+    return freed(split(net))
 
 
 @pytest.mark.parametrize(
@@ -177,13 +169,13 @@ def kept_back_with_free_parts(net: Net) -> bool:
 def test_what_goes_on_beside_free_parts_goes_on_where_their_protocol_is_explored(
     make: Callable[[int], Net], seed: int
 ) -> None:
-    assert kept_back_with_free_parts(make(seed))
+    assert is_as_explored(make(seed), with_free_parts)
 
 
 @pytest.mark.parametrize("make", [cells_in_a_line, gated])
 def test_what_goes_on_beside_free_parts_in_layers_and_behind_gates_is_explored(make: Callable[[], Net]) -> None:
-    assert kept_back_with_free_parts(make())
-    assert kept_back_with_free_parts(overtaken())
+    assert is_as_explored(make(), with_free_parts)
+    assert is_as_explored(overtaken(), with_free_parts)
 
 
 def test_a_part_whose_order_never_comes_keeps_back_what_needs_its_tokens_after_others_have_gone_on() -> None:
@@ -318,17 +310,31 @@ def is_same(make: Callable[[], Bundle], bundle: Bundle) -> bool:
 def test_what_ties_the_nets_that_are_left_to_the_protocol_is_proved_and_both_texts_state_it(
     make: Callable[[int], Net],
 ) -> None:
-    for net in (cells_in_a_line(), overtaken(), gated(), catalogue_net("two_robots_shared"), *map(make, range(12))):
-        proof = prove_of_the_dead(split(net), TIMEOUT_MS)
-        assert proof.open_ == ()
-        assert OutageObligations(Voting(Cut(net), faults=True)).text == proof.text
+    for decomposition in (*map(split, map(make, range(6))), *map(with_free_parts, map(make, range(6)))):
+        assert_tied(decomposition)
+
+
+def test_of_nets_in_layers_and_of_cells_it_is_proved_with_free_parts_and_without() -> None:
+    for net in (cells_in_a_line(), overtaken(), gated(), catalogue_net("two_robots_shared")):
+        assert_tied(split(net))
+        assert_tied(with_free_parts(net))
+
+
+def assert_tied(decomposition: Decomposition) -> None:
+    proof = prove_of_the_dead(decomposition, TIMEOUT_MS)
+    assert proof.open_ == ()
+    assert stated(decomposition).text == proof.text
+
+
+def stated(decomposition: Decomposition) -> OutageObligations:
+    return OutageObligations(Voting(Cut(decomposition.net), faults=True, free=frozenset(decomposition.free)))
 
 
 def test_both_texts_state_what_a_step_without_arcs_changes() -> None:
     net = replace(gated(), transitions=(*gated().transitions, Transition("idle", permissive=("a.up",))))
     proof = prove_of_the_dead(split(net), TIMEOUT_MS)
     assert proof.open_ == ()
-    assert OutageObligations(Voting(Cut(net), faults=True)).text == proof.text
+    assert stated(split(net)).text == proof.text
 
 
 def unsound(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -341,7 +347,7 @@ def unsound(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
         holding = Bereft._holding
 
         def firable(self: Bereft, part: Part, held: dict[Part, str]) -> Iterator[Transition]:
-            hold, behind = holding(self, part, held)
+            behind, hold = holding(self, part, held)
             yield from (hold, replace(hold, name=behind.name))
 
         monkeypatch.setattr(Bereft, "_holding", firable)
@@ -372,18 +378,75 @@ def test_a_net_that_is_left_and_says_too_much_is_not_tied_to_the_protocol(
     assert {name.partition(".")[0] for name in open_} == {how.partition(":")[0]}
 
 
-def test_what_ties_them_leans_on_no_file_of_a_protocol_in_which_parts_are_free() -> None:
-    # A bundle's `faults.smt2` is of the protocol with its free parts, and not of steps that only promises have.
-    decomposition = freed(split(overtaken()))
-    assert decomposition.free
-    steps = {one.step.name for one in homeward(protocol_net(replace(decomposition, free=()), PROTOCOL, ANY_FAULTS))}
-    of_free = {one.step.name for one in homeward(protocol_net(decomposition, PROTOCOL, ANY_FAULTS))}
-    text = prove_of_the_dead(decomposition, TIMEOUT_MS).text
-    stated = set(OutageObligations(Voting(Cut(decomposition.net), faults=True), frozenset(decomposition.free)).names)
-    for step in steps:
-        assert f'(echo "homeward.{step}")' in text
-        assert f"homeward.{step}" in stated
-    assert steps - of_free
+def chute() -> Net:
+    """`a` drops into the chute of `b`, whose door may be shut before `b` has heard of it; all parts may be free."""
+    marked = ("a.part", "b.door", "b.empty")
+    names = (*marked, "a.gone", "a.done", "b.shut", "b.full", "b.out")
+    transitions = (
+        Transition("drop", ("a.part", "b.empty"), ("a.gone", "b.full"), permissive=("b.door",)),
+        Transition("shut", ("a.gone", "b.door"), ("a.done", "b.shut")),
+        Transition("clear", ("b.full",), ("b.out",)),
+    )
+    places = tuple(Place(name, name[0], marked=name in marked) for name in names)
+    return Net("chute", places, transitions, controllers=(Controller("a"), Controller("b")))
+
+
+def unsound_of_free(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make the net that is left say more of free parts than it may, or the obligations be given less."""
+    if how == "promised: a part is behind while its gates are open":
+        holding = Bereft._holding
+
+        def gated_parts(self: Bereft, part: Part, held: dict[Part, str]) -> Iterator[Transition]:
+            for t in holding(self, part, held):
+                yield replace(t, permissive=tuple(sorted({*t.permissive, *part.permissive})))
+
+        monkeypatch.setattr(Bereft, "_holding", gated_parts)
+    elif how == "undisturbed: no part is behind":
+        monkeypatch.setattr(Bereft, "left", ())
+    elif how == "way: a part that is behind is in nobody's way":
+        monkeypatch.setattr(DeadObligations, "_in_the_way", lambda *_: set())
+    else:
+        monkeypatch.setattr("firable.decompose.protocol.inductive_script.persistent", lambda _: iter(()))
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        "promised: a part is behind while its gates are open",
+        "undisturbed: no part is behind",
+        "way: a part that is behind is in nobody's way",
+        "keeps: votes need not stand",
+    ],
+)
+def test_a_net_that_is_left_and_says_too_much_of_free_parts_is_not_tied_to_the_protocol(
+    how: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decomposition = with_free_parts(chute())
+    assert ("drop", "b") in decomposition.free
+    assert prove_of_the_dead(decomposition, TIMEOUT_MS).open_ == ()
+    unsound_of_free(how, monkeypatch)
+    open_ = prove_of_the_dead(decomposition, TIMEOUT_MS).open_
+    assert {name.partition(".")[0] for name in open_} == {how.partition(":")[0]}
+
+
+def test_behind_a_dead_coordinator_a_free_part_is_behind_and_promises_nothing() -> None:
+    decomposition = with_free_parts(chute())
+    promising = Parts(replace(decomposition, free=()), PROTOCOL)
+    (dead,) = (one for one in deaths(promising, decomposition.free) if not one.who)
+    assert [t.name for t in dead.net.transitions if t.name.startswith(("hold/", "behind/"))] == ["behind/drop/b"]
+    assert is_as_explored(chute(), with_free_parts)
+
+
+def test_what_is_shown_of_the_protocol_in_which_every_part_promises_shows_nothing_of_the_one_with_free_parts() -> None:
+    decomposition = with_free_parts(chute())
+    verdicts, files = sealed_outages(decomposition)
+    bundle, cut = Bundle(decomposition, verdicts, files), Cut(decomposition.net)
+    examination = Examination(bundle)
+    check_outages(examination, cut, asked, TIMEOUT_MS)
+    assert [one.shown for one in examination.checked.values()] == [True, True, True]
+    promising = prove_of_the_dead(split(chute()), TIMEOUT_MS).text
+    with pytest.raises(NotShownError, match=r"dead\.smt2"):
+        check_outages(Examination(replace(bundle, evidence={**files, "dead.smt2": promising})), cut, asked, TIMEOUT_MS)
 
 
 def test_steps_that_leave_no_less_to_be_done_leave_nobody_shown(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -410,8 +473,8 @@ def test_a_step_that_the_solver_gives_up_leaves_nobody_shown() -> None:
 def test_every_change_of_a_line_that_ties_them_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     bundle, count = bundled(gated), 0
     cut = Cut(bundle.net)
-    stated = OutageObligations(Voting(cut, faults=True))  # once: it depends on the net alone
-    monkeypatch.setattr(checked_outages, "OutageObligations", lambda *_: stated)
+    once = stated(bundle.decomposition)
+    monkeypatch.setattr(checked_outages, "OutageObligations", lambda *_: once)
     check_outages(Examination(bundle), cut, asked, TIMEOUT_MS)
     for _, changed in line_mutants(bundle.evidence["dead.smt2"]):
         count += 1
@@ -433,6 +496,29 @@ def test_an_obligation_on_one_who_is_dead_that_the_solver_gives_up_leaves_the_ot
     check_explored(examination, cut, "cvc5", asked, TIMEOUT_MS)
     check_outages(examination, cut, tired, TIMEOUT_MS)
     assert [name for name, one in examination.checked.items() if not one.shown] == ["faults.dead.a"]
+
+
+def refuting(text: str, timeout_ms: int) -> tuple[str, ...]:
+    """cvc5, to which `at-once.dead.a` does not hold."""
+    said = list(asked(text, timeout_ms))
+    if "at-once.dead.a" in said:
+        said[said.index("at-once.dead.a") + 1] = "sat"
+    return tuple(said)
+
+
+def test_an_obligation_that_is_refuted_leaves_the_others_shown_where_the_bundle_says_that_it_does_not_know() -> None:
+    bundle = bundled(gated)
+    with pytest.raises(NotShownError, match=r"'at-once\.dead\.a' of 'dead\.smt2' is refuted"):
+        check_outages(Examination(bundle), Cut(bundle.net), refuting, TIMEOUT_MS)
+    (said,) = (verdict for verdict in bundle.verdicts if verdict.name == f"{PREFIX}.a")
+    doubted = replace(said, status=Status.UNKNOWN, evidence=(), subjects=(), hint="", bound="z3 refutes it")
+    verdicts = tuple(doubted if verdict is said else verdict for verdict in bundle.verdicts)
+    honest = replace(
+        bundle, verdicts=verdicts, evidence={f: t for f, t in bundle.evidence.items() if f != said.evidence[0]}
+    )
+    examination = Examination(honest)
+    check_outages(examination, Cut(bundle.net), refuting, TIMEOUT_MS)
+    assert {name for name, one in examination.checked.items() if one.shown} == {f"{PREFIX}.b", f"{PREFIX}-coordinator"}
 
 
 def documents_of(bundle: Bundle) -> dict[str, str]:
