@@ -22,14 +22,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 from firable.analysis.induction.smt import Term, Terms
 from firable.decompose.proofs.obligation import Obligation, claimed, equation, facts
 from firable.decompose.proofs.sides import Sides, holds, signals
 from firable.nets.contention import contentions
 from firable.nets.layers import Layers
-from firable.nets.net import Net, Transition
+from firable.nets.net import Net
 from firable.semantics.firing import enabled
 
 
@@ -53,9 +53,9 @@ def apart(sides: Sides) -> Iterator[Obligation]:
     at = {row.name: row.at or tree.root for row in sides.decomposition.coordinated}
     never: list[Term] = []
     for subnet in sides.subnets:
-        its = [(at[whole], t) for t in range(len(subnet.transitions)) if (whole := sides.whole_of(subnet, t)) in at]
-        for (one, t), (other, u) in combinations(its, 2):
-            if one != other and _disturb(subnet, subnet.transitions[t], subnet.transitions[u]):
+        its = {t: at[whole] for t in range(len(subnet.transitions)) if (whole := sides.whole_of(subnet, t)) in at}
+        for t, u in _disturbing(subnet, its):
+            if its[t] != its[u]:
                 never.append(terms.negation(terms.conjunction([_yes(terms, subnet, t), _yes(terms, subnet, u)])))
     yield claimed(
         terms,
@@ -65,18 +65,23 @@ def apart(sides: Sides) -> Iterator[Obligation]:
     )
 
 
-def _disturb(subnet: Net, t: Transition, u: Transition) -> bool:
-    """Whether firing one part could change what the other one reads (O1)."""
+def _disturbing(subnet: Net, its: Iterable[int]) -> list[tuple[int, int]]:
+    """The pairs of these parts of which firing one could change what the other one reads (O1).
 
-    def moved(part: Transition) -> set[str]:
+    Cost: those that meet at a place or a signal, not all pairs.
+    """
+    moving: dict[str, set[int]] = {}
+    reading: dict[str, set[int]] = {}
+    for t in its:
+        part = subnet.transitions[t]
         cleared = (signal for place in part.outputs for signal in subnet.place(place).cleared)
-        return {*part.inputs, *part.outputs, *cleared}
-
-    def read(part: Transition) -> set[str]:
+        for name in (*part.inputs, *part.outputs, *cleared):
+            moving.setdefault(name, set()).add(t)
         gates = (gate.signal for gate in part.external)
-        return {*part.inputs, *part.outputs, *part.permissive, *part.inhibitive, *gates}
-
-    return not (moved(t).isdisjoint(read(u)) and moved(u).isdisjoint(read(t)))
+        for name in (*part.inputs, *part.outputs, *part.permissive, *part.inhibitive, *gates):
+            reading.setdefault(name, set()).add(t)
+    pairs = ((t, u) for name, some in moving.items() for t in some for u in reading.get(name, ()) if t != u)
+    return sorted({(min(pair), max(pair)) for pair in pairs})
 
 
 def _votes(sides: Sides, tree: Layers, name: str, at: str, owners: Sequence[str]) -> Obligation:

@@ -14,10 +14,10 @@ text of these definitions; the first one, `firable.decompose.splitting`, is what
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations, count
+from itertools import count
 
 from firable.decompose.verification.refusal import NotShownError
 from firable.nets.decomposition import ArbitrationGroup, Coordinated, Decomposition, Part
@@ -164,34 +164,48 @@ class Cut:
         """The coordinator of each transition that is global, or competes with one that is."""
         alone = [(t.name,) for t in self.net.transitions if t.name not in self.competes_for]
         classes = [set(names) for names in (*self.components, *alone) if any(map(self.is_global, names))]
-        pairs = self.standing_in_the_way({name for names in classes for name in names}) if self.in_layers else ()
-        for one, other in pairs:
-            met = [names for names in classes if one in names or other in names]
-            if len(met) > 1:
-                classes = [names for names in classes if names not in met] + [met[0] | met[1]]
-        decided = ((names, self.lowest_above(sorted(names))) for names in classes)
+        class_of = {name: names for names in classes for name in names}
+        for one, other in self.standing_in_the_way(set(class_of)) if self.in_layers else ():
+            larger, smaller = sorted((class_of[one], class_of[other]), key=len, reverse=True)
+            if larger is not smaller:
+                larger |= smaller
+                class_of |= dict.fromkeys(smaller, larger)
+        distinct = {id(names): names for names in class_of.values()}.values()
+        decided = ((names, self.lowest_above(sorted(names))) for names in distinct)
         return {name: at for names, at in decided for name in names}
 
     def standing_in_the_way(self, among: set[str]) -> Iterator[tuple[str, str]]:
         """The pairs of these that disturb each other at a controller where the arcs let both be promised."""
         for subnet in self.subnets:
-            its = [(whole, part) for whole, part in self.parts_at(subnet) if whole in among]
-            for (one, t), (other, u) in combinations(its, 2):
-                if self.disturb(t, u) and not any(self.wants(t).get(x, w) != w for x, w in self.wants(u).items()):
+            for (one, t), (other, u) in self.disturbing(subnet, among):
+                if not any(self.wants(t).get(x, w) != w for x, w in self.wants(u).items()):
                     yield one, other
 
-    def parts_at(self, subnet: Net) -> Iterator[tuple[str, Transition]]:
-        """The parts in a subnet, each with the transition that it is of."""
-        whole = {part.name: t for t, its in self.parts.items() for part in its if part.controller == subnet.name}
-        return ((whole[part.name], part) for part in subnet.transitions)
+    def disturbing(
+        self, subnet: Net, among: Container[str]
+    ) -> Iterator[tuple[tuple[str, Transition], tuple[str, Transition]]]:
+        """The pairs of parts in a subnet of which one changes what the other reads, each with what it is part of."""
+        whole = self._whole[subnet.name]
+        its = [(whole[part.name], part) for part in subnet.transitions if whole[part.name] in among]
+        readers: dict[str, list[int]] = {}
+        for j, (_, part) in enumerate(its):
+            for read in self.wants(part):
+                readers.setdefault(read, []).append(j)
+        pairs = set[tuple[int, int]]()
+        for i, (_, part) in enumerate(its):
+            cleared = (signal for place in part.outputs for signal in self.net.place(place).cleared)
+            for changed in (*part.inputs, *part.outputs, *cleared):
+                pairs |= {(min(i, j), max(i, j)) for j in readers.get(changed, ()) if j != i}
+        return ((its[i], its[j]) for i, j in sorted(pairs))
 
-    def disturb(self, t: Transition, u: Transition) -> bool:
-        """Whether one of two parts changes what the other one reads."""
-        for one, other in ((t, u), (u, t)):
-            changed = {*one.inputs, *one.outputs, *(s for p in one.outputs for s in self.net.place(p).cleared)}
-            if changed & {*self.wants(other)}:
-                return True
-        return False
+    @cached_property
+    def _whole(self) -> dict[str, dict[str, str]]:
+        """For each controller, the transition of each of its parts."""
+        found: dict[str, dict[str, str]] = {controller.name: {} for controller in self.net.controllers}
+        for t, its in self.parts.items():
+            for part in its:
+                found[part.controller][part.name] = t
+        return found
 
     @staticmethod
     def wants(part: Transition) -> dict[str, bool]:

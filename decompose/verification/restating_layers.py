@@ -7,7 +7,7 @@ Nothing is to be shown where there is one layer. docs/bundle.md has the sentence
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations, pairwise
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from firable.decompose.verification.formulas import Formula
@@ -36,9 +36,8 @@ def apart(of: Restated) -> Iterator[Stated]:
     at = {row.name: row.at or of.cut.root for row in of.decomposition.coordinated}
     never = []
     for subnet in of.decomposition.subnets:
-        its = [(at[whole], part) for whole, part in of.cut.parts_at(subnet) if whole in at]
-        for (one, t), (other, u) in combinations(its, 2):
-            if one != other and of.cut.disturb(t, u):
+        for (one, t), (other, u) in of.cut.disturbing(subnet, at):
+            if at[one] != at[other]:
                 both = of.of.all_of([_yes(of, t), _yes(of, u)])
                 never.append(of.of.negation(both))
     sentence = "no two coordinators ask one controller for parts that could both be promised and disturb each other"
