@@ -210,6 +210,10 @@ class _Reading:
     def step(self, name: str, step: doc.StepDocument, path: _Path) -> Step:
         send = step.send
         command = None
+        if step.until and not send:
+            message = f"the step '{name}' waits until '{step.until}' but sends no command that could complete"
+            hint = "add `send`, or declare the signal under `inputs` and write it as `if` of the move"
+            self.problem("F2014", message, hint, (*path, "until"))
         if send:
             at = (*path, "send")
             command = Command(

@@ -112,6 +112,7 @@ REFUSALS = (
     ("a move from nowhere", "{from: robot.go, to", "{to", "F1009 16:7"),
     ("an unknown word", '"{source}_held"', '"{sorce}_held"', "F2026 13:25"),
     ("a key of a parameter", '"{speed}"', '"{speed.max}"', "F2026 9:70"),
+    ("until without a command", '{place: "{source}_held"}', '{until: "{source}_held"}', "F2014 13:25"),
     ("a brace alone", '"{source}_held"', '"{source_held"', "F2026 13:25"),
 )
 
