@@ -151,7 +151,7 @@ def show(answered: Answered) -> None:
         click.echo(f"\n{click.style('the protocol', bold=True)}")
         width = max(len(verdict.name) for verdict in shown)
         for verdict in shown:
-            click.echo(text.verdict_line(verdict, width))
+            click.echo(text.verdict_line(verdict, width, fold=True))
         cost = shown[0].cost
         if cost.markings is not None:
             told = f"; {text.counted(answered.free, 'part')} without a promise" if answered.free else ""
@@ -160,7 +160,7 @@ def show(answered: Answered) -> None:
         from firable.decompose.protocol.outages import outage_text
 
         click.echo(f"\n{click.style('what may stand still while somebody is dead', bold=True)}")
-        for line in outage_text(answered.outages).splitlines():
+        for line in outage_text(answered.outages, text.columns() - 2).splitlines():
             click.echo(f"  {line}")
     if answered.refutations:
         click.echo(f"\n{click.style('what this cell lives on', bold=True)}")

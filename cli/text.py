@@ -8,7 +8,10 @@ NO_COLOR; the words say everything that the colours say.
 from __future__ import annotations
 
 import re
+import shutil
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -26,6 +29,8 @@ WORDS: Mapping[str, str] = {"proved": "proved", "unknown": "unknown"}
 _HEADINGS = {"required": "must hold", "warning": "warnings", "information": "for information"}
 
 
+COLUMNS: Final = 120
+"""How wide long lists are folded where the output goes to no terminal."""
 ALIKE_SHOWN: Final = 2
 """Of how many errors with one cause each is told in full; of more, the first is, and the others are counted."""
 _NAMES_SHOWN: Final = 4
@@ -111,10 +116,15 @@ def show_verdicts(
                 click.echo(f"      {line}")
 
 
-def verdict_line(verdict: Verdict, width: int = 0, words: Mapping[str, str] = WORDS) -> str:
-    """The line of a verdict: symbol, word, name, statement."""
+def verdict_line(verdict: Verdict, width: int = 0, words: Mapping[str, str] = WORDS, *, fold: bool = False) -> str:
+    """The line of a verdict: symbol, word, name, statement; with `fold` a long statement goes on under itself."""
     symbol, word, colour = mark(verdict, words)
-    return f"  {click.style(f'{symbol} {word:<8}', fg=colour)}  {verdict.name:<{width}}  {verdict.statement}"
+    said = verdict.statement
+    if fold:
+        hang = len(f"  {symbol} {word:<8}  {verdict.name:<{width}}  ")
+        lines = wrap(said, max(columns() - hang, 40), break_long_words=False, break_on_hyphens=False)
+        said = f"\n{'':{hang}}".join(lines)
+    return f"  {click.style(f'{symbol} {word:<8}', fg=colour)}  {verdict.name:<{width}}  {said}"
 
 
 def mark(verdict: Verdict, words: Mapping[str, str] = WORDS) -> tuple[str, str, str | None]:
@@ -238,6 +248,11 @@ def show_summary(report: Report) -> None:
     word, colour = {0: (good, "green"), 1: ("violated", "red")}.get(report.exit_code, ("not decided", "yellow"))
     click.echo(f"\n{click.style(word, fg=colour, bold=True)}: {', '.join(parts) or 'there is nothing to hold'}")
     show_page(report)
+
+
+def columns() -> int:
+    """How wide long lists are folded: as the terminal is, and 120 where the output goes elsewhere."""
+    return shutil.get_terminal_size((COLUMNS, 24)).columns if sys.stdout.isatty() else COLUMNS
 
 
 def show_page(report: Report) -> None:

@@ -119,7 +119,9 @@ def _counts_of(verdicts: Sequence[Verdict]) -> Iterator[tuple[int, str]]:
 
 
 def _overall_badge(verdicts: Sequence[Verdict]) -> Markup:
-    """How all together ended."""
+    """How all together ended; a report that only tells what follows has nothing that could fail."""
+    if not any(verdict.matters for verdict in verdicts):
+        return tag("span", "· for information: nothing has to hold", cls=classes(TONES["·"]))
     status = overall(verdicts)
     word = {Status.PROVED: "✓ all hold", Status.VIOLATED: "✗ violated", Status.UNKNOWN: "? not decided"}[status]
     return tag("span", word, cls=classes(TONES[word[0]]))

@@ -272,13 +272,14 @@ def _reasons(decomposition: Decomposition | None) -> Iterator[tuple[str, str]]:
     from firable.nets.knowledge import Because, reasons
 
     for reason in reasons(decomposition) if decomposition else ():
-        match reason.because:
-            case Because.ARCS:
-                yield reason.transition, "its arcs"
-            case Because.GATE:
-                yield reason.transition, f"gates on {', '.join(reason.gates)}"
-            case Because.CONFLICT:
-                yield reason.transition, f"its conflict with {reason.rival} at {reason.place}"
+        words = {
+            Because.ARCS: "its arcs",
+            Because.GATE: f"gates on {', '.join(reason.gates)}",
+            Because.CONFLICT: f"its conflict with {reason.rival} at {reason.place}",
+        }[reason.because]
+        if reason.lifted_from:
+            words += f"; decided above {reason.lifted_from}, as it competes with {reason.rival} at {reason.place}"
+        yield reason.transition, words
 
 
 def _groups(report: Report) -> Markup | None:

@@ -35,6 +35,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from textwrap import wrap
 from typing import Any, Final
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
@@ -65,6 +66,7 @@ WHILE_FAULTS: Final = "while messages are lost and doubled, and controllers and 
 METHOD: Final = "the central net, without what the dead may hold up"
 EVIDENCE_SECONDS: Final = 60.0
 TIMEOUT_MS: Final = 10_000
+COLUMNS: Final = 120
 RESUMES: Final = "when faults have ceased, whatever the central net may fire next, the protocol can fire next"
 
 
@@ -261,8 +263,10 @@ def outage_verdict(outage: Outage) -> Verdict:
     )
 
 
-def outage_text(found: Sequence[Outage]) -> str:
-    """The outages as a text: a paragraph for each, a line for each kind; `goes on` is what a person looks for.
+def outage_text(found: Sequence[Outage], columns: int = COLUMNS) -> str:
+    """The outages as a text: a paragraph for each, a row for each kind; `goes on` is what a person looks for.
+
+    Rows are folded to so many columns, under their names; no name is broken.
 
     >>> print(outage_text([Outage("robot", ("move",), ("load",), ("mill",), ("arm",), ("mill",))]), end="")
     robot dead
@@ -285,5 +289,14 @@ def outage_text(found: Sequence[Outage]) -> str:
             ("machines that may stand", outage.still),
             ("machines running", outage.running),
         )
-        lines += [f"  {title:<24} {', '.join(names) or '-'}" for title, names in rows]
+        for title, names in rows:
+            start = f"  {title:<24} "
+            lines += wrap(
+                ", ".join(names) or "-",
+                max(columns, 2 * len(start)),
+                initial_indent=start,
+                subsequent_indent=" " * len(start),
+                break_long_words=False,
+                break_on_hyphens=False,
+            )
     return "".join(f"{line}\n" for line in lines)

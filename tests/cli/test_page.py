@@ -310,6 +310,9 @@ def test_the_page_of_a_layered_net_says_of_each_row_who_decides_it(tmp_path: Pat
     words = page_written(tmp_path, "split", "catalogue:two_cells").words
     assert "t1-11 t2-12 t3-13 t4-14 line its arcs" in words
     assert "t2-32 t3-33 t4-34 cell_a its arcs" in words
+    assert "t2-42 t3-43 t4-44 line its arcs; decided above cell_a, as it competes with load_a at robot_a.free" in words
+    assert "· for information: nothing has to hold" in words
+    assert "all hold" not in words
 
 
 def test_verdicts_that_are_alike_are_one_line_that_unfolds(tmp_path: Path) -> None:

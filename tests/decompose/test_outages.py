@@ -190,6 +190,15 @@ def test_outage_is_not_known_where_time_is_over(monkeypatch: pytest.MonkeyPatch)
     assert "not known: " in outage_text(found)
 
 
+def test_long_rows_of_an_outage_are_folded_under_their_names() -> None:
+    many = tuple(f"cell-{i}.transition" for i in range(40))
+    lines = outage_text([Outage("robot", many)], 80).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[1].startswith("  stands still at once     cell-0.transition, ")
+    assert lines[2].startswith(f"{'':27}cell-")
+    assert " ".join(" ".join(lines).split()).count("cell-") == 40
+
+
 def test_evidence_for_the_protocol_is_checked_by_who_knows_nothing_of_protocols() -> None:
     found = protocol_verdicts(split(load_net("ring")))
     text = document(found.explorations["explored"]).to_text()
