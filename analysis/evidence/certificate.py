@@ -256,7 +256,8 @@ class TheoremName(StrEnum):
 class Theorem:
     """A theorem on a class of contact-free nets; `contact` shows that the net is one.
 
-    Where the premise is that every siphon contains a marked trap, one of the `traps` is in each.
+    Where the premise is that every siphon contains a marked trap, one of the `traps` is in each; without any of them
+    the checker asks for it by ranks (`firable.analysis.evidence.checking.siphons`).
     """
 
     name: TheoremName

@@ -50,6 +50,7 @@ from firable.analysis.evidence.checking.obligations import (
 from firable.analysis.evidence.checking.progress import check_progress
 from firable.analysis.evidence.checking.reduced import left_of
 from firable.analysis.evidence.checking.runs import check_refuting_run, check_unanswered_run, holds
+from firable.analysis.evidence.checking.siphons import of_siphons
 from firable.analysis.evidence.checking.stubborn import Stubborn
 from firable.analysis.evidence.checking.theorems import check_premises
 from firable.analysis.evidence.checking.unfolding import Unfolding
@@ -209,14 +210,10 @@ class _Checker:
                 listed = self._listed(evidence, space)
                 check_progress(listed, claim, certificate)
                 return Checked(shown=True, method=f"{listed.method}, and their ranks looked through")
-            case Theorem(name, _, traps):
+            case Theorem(name):
                 check_premises(net, discipline, claim, certificate)
                 premise = self.check(contact_free(evidence))
-                siphons = (
-                    [one for one in obligations(evidence, self.deadline) if one.name == "siphons"] if traps else []
-                )
-                if traps == () and name.value != "marked-graph":
-                    refuse("the theorem wants a marked trap in every siphon")
+                siphons = of_siphons(net, certificate, TimedTerms(deadline=self.deadline))
                 late = self._unsolved(evidence, siphons)
                 words = f"premises of the theorem on nets of the class '{name}' checked; {premise.method}"
                 if premise.shown is None or late:

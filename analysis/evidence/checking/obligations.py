@@ -12,12 +12,8 @@ transition relation of the discipline:
 
 A set of markings is an invariant too, "it is one of these" or "the diagram leads to its end", and has the same
 obligations where it is small enough to be written as a formula; a diagram's is linear in its nodes. Of a continuation
-they are those of the net that starts where its firings end. That every siphon contains one of some traps is one
-question:
-
-    siphons   a set of places that is not empty, a siphon, and lacks a place of each trap
-
-Of a reduction they are those of the net that is left, and one more:
+they are those of the net that starts where its firings end. That every siphon contains a marked trap is one question
+(`firable.analysis.evidence.checking.siphons`). Of a reduction they are those of the net that is left, and one more:
 
     weaker    the goal of the net, with what the steps say of its places, and not the goal of what is left
 
@@ -48,6 +44,7 @@ from firable.analysis.evidence.certificate import (
 )
 from firable.analysis.evidence.checking.obligation import Evidence, Obligation, TimedTerms, comments
 from firable.analysis.evidence.checking.reduced import left_of
+from firable.analysis.evidence.checking.siphons import of_siphons
 from firable.analysis.evidence.claims import Claim, ClaimKind, without_start
 from firable.analysis.evidence.meaning import contact
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse
@@ -80,8 +77,8 @@ def obligations(evidence: Evidence, deadline: Deadline = NEVER) -> tuple[Obligat
             return (*left.obligations, *rest)
         case Continuation():
             return obligations(continued(evidence), deadline)
-        case Theorem(_, _, traps):
-            siphons = (_of_siphons(evidence.net, traps, TimedTerms(deadline=deadline)),) if traps else ()
+        case Theorem() as theorem:
+            siphons = of_siphons(evidence.net, theorem, TimedTerms(deadline=deadline))
             return (*obligations(contact_free(evidence), deadline), *siphons)
         case _:
             return ()
@@ -197,18 +194,6 @@ def diagram_term(terms: Terms, net: Net, of: Diagram, holds: Valuation[Term]) ->
         values.append(terms.disjunction([without, terms.conjunction([full, below(hi, level)])]))
         levels.append(level)
     return below(of.roots[0], len(places) + 1)
-
-
-def _of_siphons(net: Net, traps: Iterable[Iterable[str]], terms: Terms) -> Obligation:
-    """That there is no siphon without one of the traps; a place of the net stands for "it is in the siphon"."""
-    joined = dict.fromkeys(name for t in net.transitions for name in (*t.inputs, *t.outputs, *t.permissive))
-    asserted = [terms.disjunction(map(terms.variable, joined))]
-    for t in net.transitions:
-        taken = terms.disjunction(terms.variable(name) for name in dict.fromkeys((*t.inputs, *t.permissive)))
-        put = (terms.variable(name) for name in dict.fromkeys((*t.outputs, *t.permissive)))
-        asserted += [terms.implies(place, taken) for place in put]
-    asserted += [terms.disjunction(terms.negation(terms.variable(name)) for name in trap) for trap in traps]
-    return Obligation("siphons", "every siphon contains one of the marked traps", tuple(asserted))
 
 
 def _clause(terms: Terms, net: Net, clause: Clause, holds: Valuation[Term]) -> Term:

@@ -3,9 +3,9 @@
 A net of one of these classes is understood without a look at its markings, and may have more of them than anybody can
 hold. What the checker reads off the arcs again: that no transition contradicts itself, that there are no inhibitive
 gates, that the net is of the class. What it is given: an invariant that excludes contact (so that the net behaves as an
-ordinary one and is 1-safe), and traps that are marked, of which every siphon contains one. That no siphon lacks all of
-them is one question to a solver (`firable.analysis.evidence.checking.obligations`), instead of a list of siphons, which
-may be exponential. Permissive gates are reads: the place counts as taken and put back.
+ordinary one and is 1-safe), and traps that are marked, of which every siphon contains one, or none of them. That no
+siphon is without a marked trap is one question to a solver (`firable.analysis.evidence.checking.siphons`), instead of a
+list of siphons, which may be exponential. Permissive gates are reads: the place counts as taken and put back.
 
 - *Marked graph*, each place with one producer and one consumer, in which every circuit holds a token: live, reversible,
   so with home markings (Commoner, Holt, Even, Pnueli 1971; Genrich and Lautenbach 1973).

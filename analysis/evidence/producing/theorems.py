@@ -32,7 +32,7 @@ def theorem_on(net: Net, exclude_contact: Callable[[], NeverCertificate | None],
     if marked_graph:
         return Theorem(TheoremName.MARKED_GRAPH, contact_excluded)
     found = commoner(of, deadline=deadline)
-    if not found.holds or not found.traps:
-        raise LackingError("no list of marked traps, one in each siphon, was found")
+    if not found.holds:
+        raise LackingError("it was not found that every siphon contains a marked trap")
     names = tuple(tuple(net.places[p].name for p in trap) for trap in found.traps)
     return Theorem(TheoremName.FREE_CHOICE if free else TheoremName.ASYMMETRIC_CHOICE, contact_excluded, names)
