@@ -160,6 +160,8 @@ class Held(Protocol[Leaving]):
 
     def __iter__(self) -> Iterator[Leaving]: ...
 
+    def __len__(self) -> int: ...
+
     def remove(self, value: Leaving, /) -> None:
         """Hold something back for ever."""
         ...
@@ -174,9 +176,10 @@ def withdraw(driver: Driver, places: Iterable[Place], leaving: Held[Leaving]) ->
     never: list[str] = []
     for place in places:
         if place.command is not None:
-            waiting = [one for one in leaving if isinstance(one, Sending) and one.place == place.name]
-            for one in waiting:
-                leaving.remove(one)
-                never.append(place.name)
+            if len(leaving):
+                waiting = [one for one in leaving if isinstance(one, Sending) and one.place == place.name]
+                for one in waiting:
+                    leaving.remove(one)
+                    never.append(place.name)
             driver.withdraw(place)
     return never

@@ -77,9 +77,11 @@ class MemoryJournal:
 
     def write(self, machine: str, effects: Iterable[Effect]) -> None:
         """Take the writes of one act."""
+        of_machine = self.of.get(machine)
+        if of_machine is None:
+            of_machine = self.of[machine] = {}
         for effect in effects:
             if isinstance(effect, Keep):
-                of_machine = self.of.setdefault(machine, {})
                 if effect.value is None:
                     of_machine.pop(effect.key, None)
                 else:

@@ -143,7 +143,8 @@ class Acts:
     def hear(self, machine: str, item: Item) -> None:
         """The same, of what comes from outside the host: a signal, a message, the time."""
         self.heard = True
-        self.post(machine, item)
+        self.posted.append((machine, item))
+        self.wake()
 
     def hear_all(self, items: Collection[tuple[str, Item]]) -> None:
         """The same of several, to be done by a caller who wakes nobody."""
@@ -227,9 +228,10 @@ class Acts:
             self.act(machine, coordinator.receive(item))
             return
         controller = self.controllers[machine]
+        effects: list[Effect] = []
         match item:
-            case SignalRead(signal, value, entry):
-                self.act(machine, controller.read(signal, value, entry))
+            case SignalRead():
+                effects = controller.read(item.signal, item.value, item.entry)
             case VoteRequest() if self._withholds(item):
                 self.withheld[machine, item.round] = item
                 return
@@ -238,19 +240,28 @@ class Acts:
                 return
             case VoteRequest() | Decision() | Hello():
                 self._receive(machine, controller, item)
-            case CommandTaken(place, entry):
-                self.act(machine, controller.sent(place, entry))
+            case CommandTaken():
+                effects = controller.sent(item.place, item.entry)
             case None:
                 pass
             case unknown:
                 raise ProtocolError(f"{called(machine)} was sent {unknown!r}")
-        self._tick(machine)
-        if not self.halted and (fired := controller.fire()):
-            self.act(machine, fired)
+        # On the way of each signal it counts that what it makes is one act, as far as nobody's time comes in between.
+        if controller.timers.running or self.ticks:
+            self.act(machine, effects)
+            effects = []
             self._tick(machine)
+        if not self.halted and (fired := controller.fire()):
+            effects += fired
+            if controller.timers.running or self.ticks:
+                self.act(machine, effects)
+                effects = []
+                self._tick(machine)
             if controller.may_fire:
                 self.posted.append((machine, None))
-        self.act(machine, controller.report())
+        effects += controller.report()
+        if effects:
+            self.act(machine, effects)
 
     def _withholds(self, item: VoteRequest | Decision) -> bool:
         return self.halted and not self.is_leaving and item.coordinator not in self.coordinators
@@ -292,20 +303,20 @@ class Acts:
         if not effects:
             return
         keeps: list[Keep] = []
-        now = self.now_seconds()
+        now = self.clock.now_seconds() if self.clock is not None else self.recorder.at_seconds
         for effect in effects:
             match effect:
                 case Keep():
                     keeps.append(effect)
-                case Firing(transition):
-                    self._fired(now, machine, transition, effects)
-                case Taken(signal, value):
-                    self.recorder.signal(now, signal, value)
-                case Sending(place, again=once_more):
-                    if once_more:  # its line stands in the trace since before the restart
-                        self.recorder.note(now, "sent again", place=place)
+                case Taken():
+                    self.recorder.signal(now, effect.signal, effect.value)
+                case Firing():
+                    self._fired(now, machine, effect.transition, effects)
+                case Sending():
+                    if effect.again:  # its line stands in the trace since before the restart
+                        self.recorder.note(now, "sent again", place=effect.place)
                     else:
-                        self.recorder.sent(now, place)
+                        self.recorder.sent(now, effect.place)
                     self.outbox.add(effect)
                 case VoteRequest() | Decision() | Hello():
                     self._say(effect.controller, effect, again=again)
@@ -383,7 +394,8 @@ class Acts:
 
         Raises `InputError` where the trace cannot be written; then the process must end.
         """
-        self.recorder.flush(self.lines)
+        if self.lines:
+            self.recorder.flush(self.lines)
         return self.outbox.over()
 
     # What is open

@@ -36,13 +36,14 @@ class Dispatch:
 
     def send(self, place: str, entry: int) -> None:
         """Hand the command of a place to the driver."""
-        sender = self.run.net.place(place)
+        run = self.run
+        sender = run.net.place(place)
         if sender.completion is not None:
             self.watch(place)
-            self.run.driver.send(sender, entry)
+            run.driver.send(sender, entry)
             return
         self.untaken.add(place)
-        self.run.driver.send(sender, entry)
+        run.driver.send(sender, entry)
         if place in self.untaken:  # it waits for a line
             self.watch(place)
 
@@ -59,10 +60,13 @@ class Dispatch:
         places = self.commanding.get((controller, transition))
         if places is None:
             inputs = map(self.run.net.place, self.run.net.transition(transition).inputs)
-            places = [place for place in inputs if place.owner == controller and place.command is not None]
+            ours = [place for place in inputs if place.owner == controller and place.command is not None]
+            # A token whose command has no completion stays until its machine has it: nothing is given up with it.
+            places = [place for place in ours if place.completion is not None]
             self.commanding[controller, transition] = places
-        for name in withdraw(self.run.driver, places, self.run.acts.outbox):
-            self.run.recorder.note(self.run.now_seconds(), "withdrawn", place=name)
+        if places:
+            for name in withdraw(self.run.driver, places, self.run.acts.outbox):
+                self.run.recorder.note(self.run.now_seconds(), "withdrawn", place=name)
 
     def watch(self, place: str) -> None:
         """Await the end of a place's command from now on."""

@@ -42,7 +42,8 @@ class Groups:
         self.are_due = False
         """Whether a group is done, or about to be."""
         self.turn: asyncio.Handle | None = None
-        """In which a group is due."""
+        """In which a group is due, unless it was done before."""
+        self.is_working = False
         self.storing: asyncio.Future[None] | None = None
         """The sync that is under way on a thread."""
         self.is_given_up = False
@@ -55,20 +56,20 @@ class Groups:
 
     def wake(self) -> None:
         """Have a group done in a turn of the loop of its own, unless one is due."""
-        if not self.are_due and self.run.outcome is not None and not self.run.is_over:
+        if not self.are_due and self._goes_on():
             self.are_due = True
-            self.turn = asyncio.get_running_loop().call_soon(self._work)
+            if self.turn is None:
+                self.turn = asyncio.get_running_loop().call_soon(self._in_turn)
 
     def at_once(self) -> None:
         """Do a group now, unless one is due."""
-        if not self.are_due and self.run.outcome is not None and not self.run.is_over:
+        if not self.are_due and self._goes_on():
             self.are_due = True
             self._work()
 
     def do_due(self) -> None:
         """Do now the group that is due in a turn of the loop, if one is."""
-        if self.turn is not None:
-            self.turn.cancel()
+        if self.are_due and not self.is_working and self._goes_on():
             self._work()
 
     def commit(self) -> None:
@@ -100,12 +101,17 @@ class Groups:
             self.run.told("fault", f"{message}; {hint}")
             self.run.broken(InputError([Diagnostic("F5034", message, hint)]))
 
+    def _in_turn(self) -> None:
+        self.turn = None
+        self.do_due()
+
     def _work(self) -> None:
         """One group, and its sync; at quiescence, whether the run has ended."""
-        run, acts, self.turn = self.run, self.run.acts, None
+        run, acts = self.run, self.run.acts
+        self.is_working = True
         try:
             self._act()
-            if acts.posted and self.storing is None:
+            if acts.posted and self.storing is None:  # once more, and no oftener
                 self._act()
             if acts.firings_at_once > FIRINGS_AT_ONCE_MAX:
                 last = acts.fired_at_once[0]
@@ -120,9 +126,15 @@ class Groups:
                 run.settle()
         except Exception as error:  # a callback has no caller: it must end the run, as an error in a task does
             run.broken(error)
+        finally:
+            self.is_working = False
+
+    def _goes_on(self) -> bool:
+        run, outcome = self.run, self.run.outcome
+        return outcome is not None and run.ended is None and not outcome.done()
 
     def _act(self) -> None:
-        if not self.run.acts.is_ahead:
+        if self.storing is None or not self.run.acts.is_ahead:
             self.run.acts.group()
         self.commit()
 

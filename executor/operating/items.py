@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from firable.executor.protocol.messages import Message
+from firable.executor.protocol.record import record
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SignalRead:
     """A driver's word to a controller: a new value of one of its signals."""
 
@@ -16,7 +15,7 @@ class SignalRead:
     entry: int | None
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class CommandTaken:
     """A driver's word to a controller: the machine has the command of one of its places."""
 

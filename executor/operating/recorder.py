@@ -144,10 +144,10 @@ class Recorder:
     def keep(self) -> list[Keep]:
         """What the journal keeps, together with the acts that the unwritten lines tell."""
         now: dict[str, Stored] = {
-            "at": repr(self.at_seconds),
+            "at": self.at_seconds,
             "word": f"{self.word:x}",
             "size_bytes": self.size_bytes,
-            "lines": "".join(self.unwritten),
+            "lines": "".join(self.unwritten) if self.unwritten else "",
         }
         return [Keep(KEY, now | {"began": repr(self.began)} if self.machines else now)]
 
@@ -161,7 +161,8 @@ class Recorder:
         if not self.machines:
             self.word = self.player.transitions[transition].fire(self.word)
         self.firings[transition] += 1
-        if self._is_told(at_seconds):
+        self.at_seconds = at_seconds
+        if self.stream is not None or self.observers:
             self._write(Fired(at_seconds, (transition,), number))
 
     def voted(self, at_seconds: float, controller: str, number: int, promised: frozenset[str]) -> None:
@@ -182,15 +183,17 @@ class Recorder:
 
     def signal(self, at_seconds: float, name: str, value: bool) -> None:
         """A controller has taken a new value of a signal."""
-        bit = self.player.signal_bit(name)
+        bit = self.player.signal_bits[name]
         self.word = self.word | bit if value else self.word & ~bit
-        if self._is_told(at_seconds):
+        self.at_seconds = at_seconds
+        if self.stream is not None or self.observers:  # an event that nobody is shown is not made
             self._write(SignalChanged(at_seconds, name, value))
 
     def sent(self, at_seconds: float, place: str) -> None:
         """The command of a place was sent."""
         self.commands += 1
-        if self._is_told(at_seconds):
+        self.at_seconds = at_seconds
+        if self.stream is not None or self.observers:
             self._write(CommandSent(at_seconds, place))
 
     def note(self, at_seconds: float, note: str, **data: str) -> None:

@@ -112,34 +112,36 @@ class Commands:
     def enter(self, place: Place, *, held: bool) -> list[Effect]:
         """A token enters a place with a command: issue it or, in a controller that is held, owe it."""
         effects: list[Effect] = []
-        key = own = _place_key(place.name)
-        if place.completion is not None:
-            key = _signal_key(place.completion)
+        name = place.name
+        key = _place_key(name) if place.completion is None else _signal_key(place.completion)
         earlier = self.newest.get(key)
-        if earlier is not None and earlier.place != place.name and earlier.stage is not Stage.OVER:
-            beside = _place_key(earlier.place)
-            self.newest[beside] = earlier
-            effects.append(self._kept(beside))
-        if key != own:
-            effects += self._over(own)
+        if place.completion is not None:
+            if earlier is not None and earlier.place != name and earlier.stage is not Stage.OVER:
+                beside = _place_key(earlier.place)
+                self.newest[beside] = earlier
+                effects.append(self._kept(beside))
+            effects += self._over(_place_key(name))
         entry = earlier.entry + 1 if earlier is not None else 1
-        self.newest[key] = Command(place.name, entry, Stage.OWED if held else Stage.ISSUED)
-        effects.append(self._kept(key))
+        stage = Stage.OWED if held else Stage.ISSUED
+        self.newest[key] = Command(name, entry, stage)
+        effects.append(Keep(key, (name, entry, _STORED[stage])))
         if not held:
-            effects.append(Sending(place.name, entry))
+            effects.append(Sending(name, entry))
         return effects
 
-    def completed(self, completion: str) -> Iterator[Effect]:
+    def completed(self, completion: str) -> list[Effect]:
         """The completion signal of the newest command has been taken into the process image."""
-        yield from self._over(_signal_key(completion))
+        effects = self._over(_signal_key(completion))
         for key in self.beside.get(completion, ()):
-            yield from self._over(key)
+            effects += self._over(key)
+        return effects
 
-    def sent(self, place: str, entry: int) -> Iterator[Effect]:
+    def sent(self, place: str, entry: int) -> list[Effect]:
         """The driver has taken a command: one without a completion signal is over with that."""
-        key = self._key(place)
-        if self.subnet.place(place).completion is None and self._is_newest(key, entry):
-            yield from self._over(key)
+        newest = self.newest.get(_place_key(place))
+        if newest is None or newest.entry != entry or self.subnet.place(place).completion is not None:
+            return []
+        return self._over(_place_key(place))
 
     def answer(self, place: str, entry: int, answer: Answer) -> bool:
         """Take what is said of a command issued before the restart; False where it is not asked after (any more)."""
@@ -170,13 +172,6 @@ class Commands:
             return []
         command.stage, command.answer = Stage.OVER, None
         return [self._kept(key)]
-
-    def _is_newest(self, key: str, entry: int) -> bool:
-        return key in self.newest and self.newest[key].entry == entry
-
-    def _key(self, place: str) -> str:
-        completion = self.subnet.place(place).completion
-        return _place_key(place) if completion is None else _signal_key(completion)
 
     def _kept(self, key: str) -> Keep:
         command = self.newest[key]

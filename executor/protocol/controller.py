@@ -219,7 +219,7 @@ class LocalController:
 
     def sent(self, place: str, entry: int) -> list[Effect]:
         """Take the driver's word that it has the command of a place."""
-        effects = list(self.commands.sent(place, entry))
+        effects = self.commands.sent(place, entry)
         if effects:
             self.unsent &= ~(1 << self.subnet.place_index[place])
         return effects
@@ -249,7 +249,8 @@ class LocalController:
         enabled = self.enabled.at(self.word) & self.local_mask & ~self.forgone
         if not enabled:
             return []
-        found = self.arbiter.following(enabled, self._is_free) if self._is_bound() else self.arbiter.following(enabled)
+        is_bound = self.promises or self.untold or self.unsent  # by more than the word
+        found = self.arbiter.following(enabled, self._is_free if is_bound else None)
         if found is None:
             return []
         chosen = self.transitions[found]
@@ -266,6 +267,8 @@ class LocalController:
 
     def report(self) -> list[Effect]:
         """Tell each coordinator which parts are enabled, if that has changed since it was last told."""
+        if not self.above:
+            return []  # nobody decides anything here, as of most cells with one controller
         return [self._report(above) for above in self.above.values() if self._readiness(above).sequence > above.told]
 
     def resend(self) -> list[Effect]:
@@ -366,16 +369,17 @@ class LocalController:
         before = self.word
         self.word = transition.fire(before)
         effects: list[Effect] = self._keep_word()
-        for name in self.player.entered(transition.name):
-            place = self.subnet.place(name)
-            for signal in self.player.cleared[name]:
+        for entered in self.player.entered[transition.name]:
+            for signal, bit in entered.cleared:
                 self.latched.pop(signal, None)  # a value from before the command
-                if before & self.player.signal_bit(signal):
+                if before & bit:
                     effects.append(Taken(signal, value=False))
-            self.timers.enter(name)
+            place = entered.place
+            if place.within is not None:
+                self.timers.enter(place.name)
             effects += self.commands.enter(place, held=self.held)
             if place.completion is None:
-                self.unsent |= 1 << self.subnet.place_index[name]
+                self.unsent |= entered.bit
         return effects
 
     def _release(self) -> Iterator[Effect]:
@@ -391,16 +395,16 @@ class LocalController:
 
     def _take(self, signal: str, value: bool) -> list[Effect]:
         effects: list[Effect] = []
-        bit = self.player.signal_bit(signal)
+        bit = self.player.signal_bits[signal]
         # What a sensor shows first after a restart is told even if it is nothing new: the image may be newer than what
         # was kept of it, and who follows the trace saw the newer one.
         if bool(self.word & bit) != value or bit & self.untold:
             self.word = self.word | bit if value else self.word & ~bit
             self.untold &= ~bit
             effects.append(Taken(signal, value))
-            if self.subnet.signal(signal).kind is SignalKind.COMPLETION:
+            if bit & self.player.completing:
                 effects += self._keep_word()
-        if value:
+        if value and bit & self.player.completing:
             effects += self.commands.completed(signal)
         return effects
 
@@ -408,7 +412,7 @@ class LocalController:
         if self.word == self.kept_word:
             return []
         before, self.kept_word = self.kept_word, self.word
-        return list(changed_pieces(before, self.word))
+        return [*changed_pieces(before, self.word)]
 
     def _is_enabled(self, transition: Compiled) -> bool:
         """Enabled by what is known.
@@ -424,10 +428,6 @@ class LocalController:
 
     def _mark_unsent(self) -> None:
         self.unsent = sum(1 << self.subnet.place_index[place] for place in self.commands.unsent)
-
-    def _is_bound(self) -> bool:
-        """Whether anything but the word decides what may fire."""
-        return bool(self.promises or self.untold or self.unsent)
 
     def _is_free(self, t: int) -> bool:
         transition = self.transitions[t]

@@ -7,13 +7,19 @@ of Rete (Forgy, 1982) for rules whose conditions are sets of bits, with one leve
 The set is itself a mask, bit t for transition t, so that it is compared, cut and searched in a few machine words.
 Whoever asks says the word of now, and what has changed since the last question is seen by comparison: so no change
 can be forgotten by those who make it. Rejected: to be told of each change, which is as fast and can be forgotten.
+
+A cell goes round, and asks again and again of the same words: the answers to the last `KNOWN_MAX` of them are known.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 Word = int
+
+KNOWN_MAX: Final = 1024
+"""So many words are remembered; then all are forgotten."""
 
 
 class EnabledSet:
@@ -32,6 +38,7 @@ class EnabledSet:
         """
         self._word = 0
         self._mask = 0
+        self._known: dict[Word, int] = {}
         for t, (needs, forbids) in enumerate(conditions):
             condition = (1 << t, needs | forbids, needs if not needs & forbids else -1)
             for bit in bits(needs | forbids):
@@ -41,9 +48,9 @@ class EnabledSet:
 
     def at(self, word: Word) -> int:
         """The mask of those enabled at a word; time linear in those that read a bit that has changed."""
-        changed = self._word ^ word
-        if changed:
-            mask, readers, bit = self._mask, self._readers, -1
+        mask = self._known.get(word)
+        if mask is None:
+            changed, mask, readers, bit = self._word ^ word, self._mask, self._readers, -1
             while changed:  # `bits`, written out: it is on the way of each signal
                 skipped = (changed & -changed).bit_length()
                 bit += skipped
@@ -51,8 +58,11 @@ class EnabledSet:
                 for own, read, needs in readers.get(bit, ()):
                     if (word & read == needs) is not (mask & own != 0):
                         mask ^= own
-            self._word, self._mask = word, mask
-        return self._mask
+            if len(self._known) >= KNOWN_MAX:
+                self._known.clear()
+            self._known[word] = mask
+        self._word, self._mask = word, mask
+        return mask
 
 
 def bits(mask: int) -> Iterator[int]:

@@ -37,19 +37,19 @@ each keeps in stable storage, and why that is enough.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from firable.executor.protocol.deciders import TOP
+from firable.executor.protocol.record import record
 
 EPOCH_BITS: Final = 32
 """A number is `epoch << EPOCH_BITS` and a count: 4 thousand million rounds before an epoch would run into the next."""
 
-Stored = bool | int | str | Sequence["Stored"] | Mapping[str, "Stored"]
+Stored = bool | int | float | str | Sequence["Stored"] | Mapping[str, "Stored"]
 """What stable storage holds under a key: JSON, without null, which deletes."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Readiness:
     """The coordinated transitions whose parts are enabled in a controller now; a larger sequence number is newer.
 
@@ -61,7 +61,7 @@ class Readiness:
     epoch: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Report:
     """A controller's readiness has changed.
 
@@ -74,7 +74,7 @@ class Report:
     last: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class VoteRequest:
     """The coordinator asks a controller to promise its parts of these transitions, as far as they are enabled."""
 
@@ -87,7 +87,7 @@ class VoteRequest:
     coordinator: str = TOP
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Vote:
     """The answer: yes (a promise) for the parts of `promised`, no for the others asked for."""
 
@@ -98,7 +98,7 @@ class Vote:
     coordinator: str = TOP
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Decision:
     """The round is decided: `committed` fires, or nothing does where it is None; all promises of the round end."""
 
@@ -111,7 +111,7 @@ class Decision:
     coordinator: str = TOP
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Hello:
     """The coordinator has restarted, and knows nothing of this controller: which of its parts are enabled?
 
@@ -125,7 +125,7 @@ class Hello:
     coordinator: str = TOP
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Acknowledgement:
     """The controller has applied the decision of the round."""
 
@@ -144,14 +144,14 @@ ToCoordinator = Report | Vote | Acknowledgement
 Message = ToController | ToCoordinator
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Firing:
     """A transition of the central net fires now: a local one in its controller, another at the coordinator's commit."""
 
     transition: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Taken:
     """A controller takes a new value of a signal into its process image; from now on gates read it."""
 
@@ -159,7 +159,7 @@ class Taken:
     value: bool
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Sending:
     """The command of `place` goes to its machine; `entry` counts the commands that share its completion signal.
 
@@ -171,7 +171,7 @@ class Sending:
     again: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Keep:
     """A write to stable storage; None deletes.
 

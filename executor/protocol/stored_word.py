@@ -8,7 +8,7 @@ changed. The pieces of one act are one batch, like all that it keeps.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 from firable.executor.protocol.messages import Keep, Stored
@@ -17,19 +17,23 @@ from firable.executor.protocol.token_player import Word
 PIECE_BITS: Final = 512
 
 
-def changed_pieces(before: Word, after: Word) -> Iterator[Keep]:
+def changed_pieces(before: Word, after: Word) -> list[Keep]:
     """What is to be kept of a word so that, with what was kept of it before, all of it is.
 
     >>> [(keep.key, keep.value) for keep in changed_pieces(0b101, 0b111 | 1 << 512)]
     [('word', '7'), ('word/1', '1')]
     """
     changed, piece = before ^ after, 0
+    if changed <= _PIECE:  # most nets have but one
+        return [Keep("word", f"{after & _PIECE:x}")] if changed else []
+    kept: list[Keep] = []
     while changed:
         skipped = ((changed & -changed).bit_length() - 1) // PIECE_BITS
         piece += skipped
-        yield Keep(_key(piece), f"{after >> piece * PIECE_BITS & _PIECE:x}")
+        kept.append(Keep(_key(piece), f"{after >> piece * PIECE_BITS & _PIECE:x}"))
         changed >>= (skipped + 1) * PIECE_BITS
         piece += 1
+    return kept
 
 
 def stored_word(kept: Mapping[str, Stored], initial: Word) -> Word:

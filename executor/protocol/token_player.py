@@ -19,7 +19,7 @@ from typing import Self
 
 from firable.executor.protocol.enabled import bits, bits_behind
 from firable.nets.decomposition import ArbitrationGroup
-from firable.nets.net import Marking, Net
+from firable.nets.net import Marking, Net, Place, SignalKind
 from firable.semantics.arbitration import Arbitration, Group, Turns
 from firable.semantics.conflict import conflicts
 
@@ -69,6 +69,15 @@ class Compiled:
         return bool(self.writes & reads or self.reads & writes)
 
 
+@dataclass(frozen=True, slots=True)
+class Entered:
+    """A place with a command, the signals that a token clears when it enters, with their bits, and its own bit."""
+
+    place: Place
+    cleared: tuple[tuple[str, Word], ...]
+    bit: Word
+
+
 @dataclass(frozen=True)
 class TokenPlayer:
     """The compiled transitions of a net, by name in the order of the net."""
@@ -107,26 +116,29 @@ class TokenPlayer:
 
     def signal_bit(self, signal: str) -> Word:
         """The bit of a signal; `KeyError` where there is none."""
-        return self._signal_bits[signal]
+        return self.signal_bits[signal]
 
     @cached_property
-    def _signal_bits(self) -> dict[str, Word]:
+    def signal_bits(self) -> dict[str, Word]:
+        """The bit of each signal."""
         return {signal.name: 1 << len(self.net.places) + j for j, signal in enumerate(self.net.signals)}
 
-    def entered(self, transition: str) -> tuple[str, ...]:
-        """The places with a command that a firing of the transition enters, in the order of the net."""
-        return self._entered[transition]
+    @cached_property
+    def completing(self) -> Word:
+        """The bits of the completion signals."""
+        return sum(self.signal_bits[s.name] for s in self.net.signals if s.kind is SignalKind.COMPLETION)
 
     @cached_property
-    def cleared(self) -> dict[str, tuple[str, ...]]:
-        """The signals that a token clears when it enters a place."""
-        return {place.name: place.cleared for place in self.net.places}
-
-    @cached_property
-    def _entered(self) -> dict[str, tuple[str, ...]]:
+    def entered(self) -> dict[str, tuple[Entered, ...]]:
+        """The places with a command that a firing of each transition enters, in the order of the net."""
+        commanding = {
+            place.name: Entered(place, tuple((s, self.signal_bits[s]) for s in place.cleared), 1 << i)
+            for i, place in enumerate(self.net.places)
+            if place.command
+        }
         order = self.net.place_index.__getitem__
         return {
-            transition.name: tuple(sorted((p for p in transition.outputs if self.net.place(p).command), key=order))
+            transition.name: tuple(commanding[p] for p in sorted(transition.outputs, key=order) if p in commanding)
             for transition in self.net.transitions
         }
 

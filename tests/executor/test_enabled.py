@@ -12,6 +12,7 @@ from support.owned_nets import owned_net, owned_nets
 from firable.decompose.splitting.cut import split
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import is_deadlock
+from firable.executor.protocol import enabled
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.enabled import EnabledSet, bits
 from firable.executor.protocol.messages import Firing
@@ -86,6 +87,8 @@ def test_deadlock_that_the_recorder_knows_is_that_of_the_net() -> None:
 
 
 def test_firing_looks_only_at_the_transitions_that_it_touches(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(enabled, "KNOWN_MAX", 0)  # words of before are not known
+
     def looked_at(n_rings: int) -> int:
         places = [Place(f"a.{r}.{i}", "a", marked=not i) for r in range(n_rings) for i in range(3)]
         moves = [
