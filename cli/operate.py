@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from firable.executor.operating.control import Page
     from firable.executor.operating.service import Service
     from firable.nets.diagnostics import InputError
+    from firable.nets.machines.plant_file import PlantModel
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -38,8 +39,8 @@ class ServeOptions:
     open: bool = False
     """Whether the page of the run is opened in a browser."""
 
-    def service(self) -> Service | None:
-        """The endpoint, whose address and token are told when it is there, or None.
+    def service(self, plant: PlantModel | None = None) -> Service | None:
+        """The endpoint, whose address and token are told when it is there, or None; `plant` is what its page shows.
 
         Raises `InputError` F5060, F5062, and F1017 for a token that cannot be kept.
         """
@@ -59,7 +60,7 @@ class ServeOptions:
         tls = None if self.serve_tls is None else tls_context(*self.serve_tls, self.operators)
         token = new_token() if self.token_file is None else _token_kept(Path(self.token_file))
         endpoint = Endpoint(host.strip("[]"), int(port), token, tls)
-        return Service(endpoint, partial(self._served, token), _page)
+        return Service(endpoint, partial(self._served, token), partial(_page, plant=plant))
 
     def _served(self, token: str, address: str) -> None:
         _tell_served(token, self.token_file, address)
@@ -69,10 +70,10 @@ class ServeOptions:
             show(f"{address}/#token={token}", open_it=not os.environ.get(NO_BROWSER))
 
 
-def _page(host: Host) -> Page:
+def _page(host: Host, plant: PlantModel | None) -> Page:
     from firable.cli.view.live import LivePage
 
-    return LivePage(host)
+    return LivePage(host, plant)
 
 
 def serve_options(command: F) -> F:

@@ -144,10 +144,10 @@ def run(
         secrets = (token_file, operators, *(serve_tls or ()), *(options.tls or ()))
         read = [path for path in (bundle, options.bind, plant_file, *trust, *secrets) if path is not None]
         _refuse_to_overwrite(trace, log, *read, *_files_beside(options.journal))
-        service = served.service()
+        model = None if plant_file is None else read_plant(plant_file)
+        service = served.service(model)
         if options.is_one_of_several:
             said = _said(loaded.net, say, options.journal)
-            model = None if plant_file is None else read_plant(plant_file)
             return run_host_of(
                 bundle, loaded, options, trace, said, service, log_to(log), plant=model, watch=Watch(watch)
             )
@@ -161,14 +161,14 @@ def run(
                 options.journal,
                 _said(loaded.net, say, options.journal),
                 resume=options.resume,
-                plant=None if plant_file is None else read_plant(plant_file),
+                plant=model,
                 watch=Watch(watch),
                 service=service,
                 log=log_to(log),
             )
         report = run_bundle(
             loaded,
-            read_plant(plant_file or _plant_file(loaded, plant)),
+            model or read_plant(_plant_file(loaded, plant)),
             workpieces=workpieces,
             seed=seed,
             speed=_SPEEDS[speed],

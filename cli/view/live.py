@@ -27,14 +27,17 @@ from aiohttp import web
 from firable.cli.view import moment
 from firable.cli.view.lanes import Lanes
 from firable.cli.view.moment import Moment
+from firable.cli.view.scene import Stage
 from firable.cli.view.site import PUBLIC, answering, file_routes
+from firable.cli.view.top_view import top_of
 from firable.cli.view.votes import votes
 from firable.executor import Host
 from firable.executor.protocol.token_player import TokenPlayer, Word
 from firable.nets.drawing import draw_net
+from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.nets.net import Net
 from firable.semantics.joining import APPLIED, STANDS, VOTED
-from firable.semantics.trace import CommandSent, Event, Fired, Noted
+from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged
 
 FRAMES_PER_SECOND: Final = 20.0
 HEARTBEAT_SECONDS: Final = 0.5
@@ -45,7 +48,7 @@ HAPPENED_MAX: Final = 300
 class LivePage:
     """The page of a host, or of a whole run."""
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: Host, plant: PlantModel | None = None) -> None:
         self.host = host
         self.owners = None if host.is_whole else frozenset(host.controllers)
         self.net = host.net if self.owners is None else own_part(host.net, self.owners)
@@ -54,6 +57,8 @@ class LivePage:
         self.followers: set[_Follower] = set()
         self.word: Word = -1
         self.states: dict[str, dict[str, Any]] = {}
+        self.stage, self.why_no_view = self._stage(plant)
+        self.scene = None if self.stage is None else self.stage.begin()
         host.recorder.observers.append(self.seen)
 
     @property
@@ -76,11 +81,34 @@ class LivePage:
             "coordinators": [name or "the coordinator" for name in self.host.coordinators],
             "net": moment.structure(self.net),
             "picture": draw_net(self.net, marking=0),
+            "top": top_of(self.stage, self.why_no_view),
         }
+
+    def _stage(self, plant: PlantModel | None) -> tuple[Stage | None, str]:
+        if self.owners is not None:
+            return None, "this host knows of its own machines alone"
+        if plant is None:
+            return None, "no plant file says what the cell is made of: name it with --plant"
+        problems = misfits(plant, self.net)
+        return (None, problems[0].message) if problems else (Stage(self.net, plant), "")
+
+    def _play(self, event: Event) -> None:
+        """Change the scene as an event has changed the cell."""
+        stage, scene = self.stage, self.scene
+        if stage is None or scene is None:
+            return
+        match event:
+            case CommandSent(_, name) if name in self.net.place_index:
+                self.scene = stage.sent(scene, name)
+            case SignalChanged(_, signal, True):
+                self.scene = stage.signal(scene, signal)
+            case Fired(_, names):
+                self.scene = stage.fired(scene, names, sends=False)
 
     def seen(self, event: Event) -> None:
         """An event of the run, for all who follow it."""
         self.lanes.seen(event)
+        self._play(event)
         for follower in self.followers:
             follower.take(event)
 
@@ -123,11 +151,18 @@ class LivePage:
             "waits": [str(one) for one in situation.blocked],
             "lanes": list(follower.news("lane", {lane["machine"]: lane for lane in lanes}).values()),
             "votes": list(follower.news("votes", {row["name"]: row for row in votes(host)}).values()),
+            "top": self._top(follower),
             "unreached": sorted(host.peers.names - host.peers.connected_to),
             "paused": host.paused,
             "ended": ended,
             **follower.happened(),
         }
+
+    def _top(self, follower: _Follower) -> dict[str, Any] | None:
+        """How the cell looks, where that is news."""
+        if self.stage is None or self.scene is None:
+            return None
+        return follower.news("top", {"": self.stage.told(self.scene)}).get("")
 
     def now(self) -> Moment:
         """The marking and the signals, of the whole or of this host."""

@@ -14,21 +14,25 @@ from aiohttp import web
 
 from firable.cli.view import moment
 from firable.cli.view.runs import Run, checked, verdict_json
+from firable.cli.view.scene import Stage
 from firable.cli.view.site import BODY_BYTES_MAX, PUBLIC, answering, file_routes, refusal
+from firable.cli.view.top_view import top_of
 from firable.executor.operating.control import Endpoint, admission
 from firable.nets.drawing import draw_net
 from firable.nets.loading import Loaded
+from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.semantics.player import Player
 
 
 class Playing:
     """A net that the page plays with, and the runs of it that are known."""
 
-    def __init__(self, loaded: Loaded, file: str, runs: Iterable[Run] = ()) -> None:
+    def __init__(self, loaded: Loaded, file: str, runs: Iterable[Run] = (), plant: PlantModel | str = "") -> None:
         self.loaded = loaded
         self.file = file
         self.runs = list(runs)
         self.editable = False
+        self.plant = plant
         self.player = Player(loaded.net)
         self.verdicts: list[dict[str, Any]] | None = None
         self.checking = asyncio.Lock()
@@ -39,6 +43,19 @@ class Playing:
         self.player = Player(loaded.net)
         self.verdicts = None
         self.runs = [run for run in self.runs if run.is_given]
+
+    @property
+    def stage(self) -> Stage | None:
+        """The net with its machines, if a plant file says what they are and fits the net."""
+        return None if isinstance(self.plant, str) or self.misfit else Stage(self.player.net, self.plant)
+
+    @property
+    def misfit(self) -> str:
+        """Why there is no top view: no plant file, or one of another cell."""
+        if isinstance(self.plant, str):
+            return self.plant
+        problems = misfits(self.plant, self.player.net)
+        return problems[0].message if problems else ""
 
     @property
     def public(self) -> Collection[str]:
@@ -56,7 +73,7 @@ class Playing:
 
     async def page(self, _: dict[str, Any]) -> dict[str, Any]:
         """What is shown at first."""
-        net = self.loaded.net
+        net, stage = self.loaded.net, self.stage
         return {
             "mode": "play",
             "file": self.file,
@@ -66,18 +83,28 @@ class Playing:
             "moment": moment.told(self.player, moment.begin(net)),
             "runs": [run.summary() for run in self.runs],
             "verdicts": self.verdicts,
+            "top": top_of(stage, self.misfit),
         }
 
     async def moment(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """What may fire at a moment."""
-        return moment.told(self.player, moment.moment_of(self.player.net, asked))
+        """What may fire at a moment, and how the cell looks once a signal that `became` names has become 1."""
+        now = moment.moment_of(self.player.net, asked)
+        stage = self.stage
+        if stage is None or asked.get("scene") is None:
+            return moment.told(self.player, now)
+        scene = stage.of_json(asked["scene"])
+        if (became := asked.get("became")) in now.signals:
+            scene = stage.signal(scene, str(became))
+        return {**moment.told(self.player, now), "top": stage.told(scene)}
 
     async def fire(self, asked: dict[str, Any]) -> dict[str, Any]:
         """The moment after a firing."""
-        after, done = moment.fired(
-            self.player, moment.moment_of(self.player.net, asked), str(asked.get("transition", ""))
-        )
-        return {**moment.told(self.player, after), **done}
+        name, stage = str(asked.get("transition", "")), self.stage
+        after, done = moment.fired(self.player, moment.moment_of(self.player.net, asked), name)
+        shown = {**moment.told(self.player, after), **done}
+        if stage is not None and asked.get("scene") is not None:
+            shown["top"] = stage.told(stage.fired(stage.of_json(asked["scene"]), (name,), sends=True))
+        return shown
 
     async def check(self, _: dict[str, Any]) -> dict[str, Any]:
         """Check the net, once: a net that is not edited gets the same verdicts."""
@@ -96,7 +123,7 @@ class Playing:
         """The frames of a run, by its name."""
         for run in self.runs:
             if run.name == asked.get("name"):
-                return run.to_json(self.player.net)
+                return run.to_json(self.player.net, self.stage)
         raise refusal("the page asks for a run that is not known")
 
 

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
+from firable.cli.view.scene import Stage
 from firable.nets.net import Net
 from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.replaying import Replayer
@@ -42,9 +43,13 @@ class Run:
         firings = sum(isinstance(event, Fired) for event in self.trace.events)
         return {"name": self.name, "says": self.says, "firings": firings}
 
-    def to_json(self, net: Net) -> dict[str, Any]:
-        """All frames; raises `InputError` F5004 where it is no run of the net."""
+    def to_json(self, net: Net, stage: Stage | None = None) -> dict[str, Any]:
+        """All frames, each with how the cell looks where that has changed; raises `InputError` F5004 where it is no run
+        of the net.
+        """
         frames = list(self._frames(net))
+        if stage is not None:
+            _look(frames, self.trace, stage)
         return {
             **self.summary(),
             "note": self.note,
@@ -73,6 +78,27 @@ class Run:
             }
         if self.trace.end is not None:
             replayer.end(self.trace.end)
+
+
+def _look(frames: list[dict[str, Any]], trace: Trace, stage: Stage) -> None:
+    """Give the frames of a trace their scenes: what happens between two of them shows in the later one."""
+    scene = stage.begin()
+    frames[0]["scene"] = scene.to_json()
+    sends = not any(isinstance(event, CommandSent) for event in trace.events)
+    told = iter(frames[1:])
+    for event in trace.events:
+        before = scene
+        match event:
+            case Fired(_, names):
+                scene = stage.fired(scene, names, sends=sends)
+            case CommandSent(_, place):
+                scene = stage.sent(scene, place)
+            case SignalChanged(_, signal, True):
+                scene = stage.signal(scene, signal)
+        if _words(stage.net, event) is not None:
+            frame = next(told)
+            if scene != before:
+                frame["scene"] = scene.to_json()
 
 
 def _words(net: Net, event: Fired | SignalChanged | CommandSent | Noted) -> dict[str, Any] | None:

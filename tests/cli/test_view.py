@@ -129,6 +129,26 @@ def test_a_counterexample_is_played_with_a_slider(chromium: Browser, late: str) 
 
 
 @needs_browser
+def test_the_top_view_shows_workpieces_where_commands_take_them(chromium: Browser, late: str) -> None:
+    with page_at(chromium, late, reduced_motion="reduce") as page:
+        page.get_by_role("switch", name="Gates free").click()
+        page.get_by_role("tab", name="The net").focus()
+        page.keyboard.press("ArrowRight")
+        expect(page.get_by_role("tab", name="Top view", selected=True)).to_be_focused()
+        top = page.get_by_role("tabpanel", name="Top view")
+        expect(top.locator(".piece")).to_have_count(0)
+        page.locator("[data-transition=G1]").click()
+        expect(top.locator("[data-machine=CV1]")).to_contain_class("busy")
+        expect(top).to_contain_text("CV1: RUN, with a raw workpiece")
+        for name in ("G2", "t1-a", "G3"):
+            page.locator(f"[data-transition={name}]").click()
+        expect(top).to_contain_text("R: MOVE to=MC, its hand at CV1, with a raw workpiece")
+        expect(top.locator(".piece")).to_have_count(1)
+        page.get_by_role("button", name="Undo").click()
+        expect(top).to_contain_text("R: GRASP at=CV1, its hand at CV1")
+
+
+@needs_browser
 def test_all_is_done_by_the_keyboard_alone(chromium: Browser, late: str) -> None:
     with page_at(chromium, late) as page:
         page.get_by_role("switch", name="Gates free").focus()

@@ -152,6 +152,8 @@ def test_what_is_no_net_is_shown_at_its_line_and_not_written(
     chromium: Browser, served: tuple[str, Path], file: Path
 ) -> None:
     with page_at(chromium, served[0]) as page:
+        page.get_by_role("tab", name="Top view").click()
+        expect(page.get_by_role("tabpanel")).to_contain_text("There is no top view: no plant file says")
         begin(page)
         page.locator('[id="place:robot.free"]').focus()
         page.keyboard.press("Enter")

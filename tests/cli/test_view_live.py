@@ -55,6 +55,8 @@ def test_a_run_is_followed_paused_stepped_resumed_and_stopped(chromium: Browser,
         expect(page.locator(".lanes .machine")).to_have_text(["R", "MC", "CV1", "CV2"])
         expect(page.locator(".lanes .bar.done").first).to_be_attached()
         expect(page.locator(".votes tbody th").first).to_contain_text("G1")
+        page.get_by_role("tab", name="Top view").click()
+        expect(page.locator(".topview .piece").first).to_be_visible()
         page.get_by_role("button", name="Pause").click()
         state(page, "paused")
         fired = page.locator(".events .fired").count()

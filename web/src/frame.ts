@@ -4,6 +4,7 @@
 import { h } from "./dom";
 import { Picture } from "./picture";
 import { ask } from "./server";
+import type { TopView } from "./top_view";
 
 export interface Frame {
   tools: HTMLElement;
@@ -19,7 +20,30 @@ export interface Frame {
 
 let shown = new AbortController();
 
-export function frame(title: string, says: string, kind: string, picture: Picture): Frame {
+/** The net and the cell from above, as two tabs of one place. */
+function tabs(picture: Picture, top: TopView): HTMLElement {
+  const panels = [picture.element, top.element];
+  const made = [["net", "The net"], ["top", "Top view"]].map(([id, words], i) =>
+    h("button", { type: "button", role: "tab", id: `tab-${id}`, "aria-controls": id!, "aria-selected": String(i === 0), tabindex: i === 0 ? 0 : -1, click: () => choose(i) }, words!));
+  const choose = (chosen: number): void => {
+    made.forEach((one, i) => {
+      one.setAttribute("aria-selected", String(i === chosen));
+      one.tabIndex = i === chosen ? 0 : -1;
+      panels[i]!.hidden = i !== chosen;
+    });
+    made[chosen]!.focus();
+    if (chosen === 0) picture.fit();
+  };
+  const row = h("div", { class: "tabs", role: "tablist", "aria-label": "What is shown", keydown: (event: KeyboardEvent) => {
+    const at = made.indexOf(event.target as HTMLButtonElement);
+    if (at < 0 || !["ArrowLeft", "ArrowRight"].includes(event.key)) return;
+    event.preventDefault();
+    choose(1 - at);
+  } }, ...made);
+  return row;
+}
+
+export function frame(title: string, says: string, kind: string, picture: Picture, top?: TopView): Frame {
   shown.abort();
   shown = new AbortController();
   const gone = shown.signal;
@@ -48,13 +72,14 @@ export function frame(title: string, says: string, kind: string, picture: Pictur
     h(
       "main",
       {},
-      h("section", { class: "stage", "aria-label": "The net" }, h("div", { class: "bar-above" }, tools, zoom), picture.element, hint, below),
+      h("section", { class: "stage", "aria-label": "The cell" }, h("div", { class: "bar-above" }, tools, top ? tabs(picture, top) : null, zoom), picture.element, top?.element, hint, below),
       side,
     ),
     h("p", { id: "said", class: "unseen", role: "status", "aria-live": "polite" }),
   );
   picture.element.tabIndex = 0;
-  picture.element.setAttribute("role", "region");
+  picture.element.id = "net";
+  picture.element.setAttribute("role", top ? "tabpanel" : "region");
   picture.element.setAttribute("aria-label", "Picture of the net; scrolls");
   requestAnimationFrame(() => picture.fit());
   let width = innerWidth;

@@ -7,6 +7,7 @@ import { banner, frame, panel, type Frame } from "./frame";
 import { Lanes, type Lane } from "./lanes";
 import { Picture } from "./picture";
 import { ask, follow, Refused, type Net, type Wait } from "./server";
+import { TopView, type Top, type TopStart } from "./top_view";
 
 export interface LiveStart {
   mode: "live";
@@ -14,6 +15,7 @@ export interface LiveStart {
   coordinators: string[];
   net: Net;
   picture: string;
+  top: TopStart;
 }
 
 interface Votes {
@@ -35,6 +37,7 @@ interface Now {
   lanes: Lane[];
   votes: Votes[];
   unreached: string[];
+  top: Top | null;
   paused: boolean;
   ended: boolean;
   events: { at: number; kind: string; what: string }[];
@@ -52,6 +55,7 @@ const SIGNS: Record<string, [string, string]> = {
 
 export class Live {
   private readonly picture: Picture;
+  private readonly top: TopView;
   private readonly frame: Frame;
   private readonly lanes = new Lanes();
   private readonly waits = h("ul", { class: "list" });
@@ -69,8 +73,9 @@ export class Live {
 
   constructor(start: LiveStart) {
     this.picture = new Picture(start.net, start.picture, { pointed: (name) => this.picture.mark(name) });
+    this.top = new TopView(start.top);
     const says = start.here ? `on this host: ${start.here}` : start.net.description;
-    this.frame = frame(start.net.name || "the cell", says, "Operating", this.picture);
+    this.frame = frame(start.net.name || "the cell", says, "Operating", this.picture, this.top);
     const button = (words: string, path: string, title: string, kind = ""): HTMLButtonElement => {
       const made = h("button", { type: "button", class: kind, title, click: () => void this.command(made.dataset.path ?? path, words) }, words);
       this.frame.tools.append(made);
@@ -147,6 +152,7 @@ export class Live {
     this.now = now;
     this.picture.show(now);
     this.picture.fly(flying);
+    if (now.top) this.top.show(now.top, 0.2, now.speed);
     this.lanes.take(now.lanes);
     this.lanes.draw(now.at);
     this.showState(now);

@@ -4,7 +4,8 @@ import { announce, counted, h } from "./dom";
 import { banner, frame, panel, watchFile, type Frame } from "./frame";
 import { Picture } from "./picture";
 import { Playback } from "./playback";
-import { ask, Refused, type EditState, type Fired, type Moment, type PlayPage, type Run, type RunSummary, type Verdict } from "./server";
+import { ask, Refused, type At, type EditState, type Fired, type Moment, type PlayPage, type Run, type RunSummary, type Verdict } from "./server";
+import { TopView } from "./top_view";
 
 interface Step {
   what: string;
@@ -16,6 +17,7 @@ const STEPS_SHOWN = 200;
 
 export class Play {
   private readonly picture: Picture;
+  private readonly top: TopView;
   private readonly frame: Frame;
   private steps: Step[];
   private undone: Step[] = [];
@@ -47,8 +49,9 @@ export class Play {
       signal: (name) => void this.toggle(name),
       pointed: (name) => this.picture.mark(name ?? this.explained),
     });
-    this.frame = frame(page.net.name || "the net", page.net.description, "Playing", this.picture);
-    this.steps = [{ what: "the initial marking", moment: page.moment }];
+    this.top = new TopView(page.top);
+    this.frame = frame(page.net.name || "the net", page.net.description, "Playing", this.picture, this.top);
+    this.steps = [{ what: "the initial marking", moment: "scene" in page.top ? { ...page.moment, top: page.top } : page.moment }];
     const editButton = this.button("Edit", "Edit the net file", () => void this.beginEdit());
     this.frame.tools.append(this.undoButton, this.redoButton, this.resetButton, this.gatesSwitch, editButton);
     if (page.editable) watchFile(this.frame, this.reload);
@@ -98,8 +101,8 @@ export class Play {
     }
   }
 
-  private at(moment: Moment): Pick<Moment, "marking" | "signals" | "free"> {
-    return { marking: moment.marking, signals: moment.signals, free: moment.free };
+  private at(moment: Moment): At {
+    return { marking: moment.marking, signals: moment.signals, free: moment.free, scene: moment.top?.scene };
   }
 
   private add(what: string, moment: Moment): void {
@@ -149,7 +152,7 @@ export class Play {
     return this.doing(async () => {
       const on = !this.now.signals.includes(signal);
       const signals = on ? [...this.now.signals, signal] : this.now.signals.filter((name) => name !== signal);
-      const after = await ask<Moment>("api/moment", { ...this.at(this.now), signals });
+      const after = await ask<Moment>("api/moment", { ...this.at(this.now), signals, became: on ? signal : null });
       this.add(`${signal} becomes ${on ? 1 : 0}`, after);
       announce(`${signal} is ${on ? 1 : 0}. ${this.summary(after)}`);
     });
@@ -236,6 +239,7 @@ export class Play {
   private show(): void {
     const moment = this.now;
     this.picture.show(moment);
+    if (moment.top) this.top.show(moment.top);
     sessionStorage.setItem(KEPT, JSON.stringify({ net: this.page.net.name, ...this.at(moment) }));
     this.undoButton.disabled = this.steps.length < 2;
     this.redoButton.disabled = this.undone.length === 0;
@@ -335,7 +339,11 @@ export class Play {
     await this.doing(async () => {
       const run = await ask<Run>("api/run", { name });
       this.playback?.stop();
-      this.playback = new Playback(run, this.picture, (at) => ask<Moment>("api/moment", at), (here) => this.ended(here));
+      this.playback = new Playback(run, this.picture, async (at) => {
+        const moment = await ask<Moment>("api/moment", at);
+        if (moment.top) this.top.show(moment.top);
+        return moment;
+      }, (here) => this.ended(here));
       this.frame.below.replaceChildren(this.playback.element);
       document.body.classList.add("playing");
       this.frame.status.className = "status";

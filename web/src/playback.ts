@@ -2,9 +2,8 @@
 
 import { announce, calm, counted, h } from "./dom";
 import type { Picture } from "./picture";
-import { Refused, type Moment, type Run } from "./server";
-
-type At = Pick<Moment, "marking" | "signals" | "free">;
+import { Refused, type At, type Moment, type Run } from "./server";
+import type { Scene } from "./top_view";
 
 const FRAME_MS = 900;
 
@@ -88,9 +87,15 @@ export class Playback {
     this.words.replaceChildren(h("b", {}, `${to} / ${frames.length - 1}`), ` ${frame.what}`, frame.says ? h("span", { class: "soft" }, ` ${frame.says}`) : "", time ? h("span", { class: "soft" }, time) : "", turn, note ? h("strong", {}, `${note}.`) : "");
     this.stuck.hidden = true;
     if (document.activeElement !== this.slider) announce(said);
-    const at: At = { marking: frame.marking, signals: frame.signals, free: this.run.free };
+    const at: At = { marking: frame.marking, signals: frame.signals, free: this.run.free, scene: this.scene(to) };
     this.picture.show({ ...at, transitions: {} });
     void this.tell(at);
+  }
+
+  /** How the cell looks in a frame: as the last frame before it that tells. */
+  private scene(index: number): Scene | undefined {
+    for (let i = index; i >= 0; i--) if (this.run.frames[i]!.scene !== undefined) return this.run.frames[i]!.scene;
+    return undefined;
   }
 
   /** What may fire in the frame that is shown: asked for the newest only. */

@@ -1,6 +1,8 @@
 // What the server is asked, and how it knows who asks: by the token in the fragment of the address that the command
 // printed. The fragment is sent to nobody; it is taken out of the address bar, and kept for a reload of this window.
 
+import type { Scene, Top, TopStart } from "./top_view";
+
 export interface Wait {
   may: "fire" | "wait" | "not";
   why?: string;
@@ -17,6 +19,16 @@ export interface Moment {
   free: boolean;
   transitions: Record<string, Wait>;
   deadlock: boolean;
+  /** How the cell looks, where a plant says what it is made of. */
+  top?: Top;
+}
+
+/** A moment as the server is told it. */
+export interface At {
+  marking: string[];
+  signals: string[];
+  free: boolean;
+  scene?: Scene | undefined;
 }
 
 export interface Fired extends Moment {
@@ -63,6 +75,8 @@ export interface Frame {
   says?: string;
   fired?: string[];
   turn?: boolean;
+  /** How the cell looks from here on, where that has changed. */
+  scene?: Scene;
 }
 
 export interface Run extends RunSummary {
@@ -89,6 +103,7 @@ export interface PlayPage {
   moment: Moment;
   runs: RunSummary[];
   verdicts: Verdict[] | null;
+  top: TopStart;
 }
 
 export interface Problem {

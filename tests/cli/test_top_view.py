@@ -1,0 +1,127 @@
+"""The cell from above: workpieces go where commands take them, and nothing of a cell is drawn upon another thing."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import pytest
+
+from firable.cli.view.runs import Run
+from firable.cli.view.scene import Piece, Stage
+from firable.cli.view.top_view import top_view
+from firable.nets.catalogue import catalogue_names, catalogue_net, catalogue_path
+from firable.nets.diagnostics import InputError
+from firable.nets.machines.plant_file import PlantModel, parse_plant, read_plant
+from firable.semantics.trace import Discipline, Trace
+
+PLANTS = {
+    name: path for name in catalogue_names() if (path := catalogue_path(name).with_name(f"{name}.plant.yaml")).exists()
+}
+
+
+def plant(name: str) -> PlantModel:
+    return read_plant(PLANTS[name])
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_everything_of_a_cell_stands_somewhere_and_apart(name: str) -> None:
+    model = plant(name)
+    view = top_view(model)
+    grippers = {station for arm in view["arms"].values() for station in arm["gripper"]}
+    assert {*view["stations"], *grippers} == set(model.stations)
+    assert {*view["belts"], *view["tables"], *view["arms"], *view["others"]} == set(model.machines)
+    bodies = [*view["stations"].values(), *view["others"].values(), *(arm["base"] for arm in view["arms"].values())]
+    for (a, b), (c, d) in combinations(bodies, 2):
+        assert max(abs(a - c), abs(b - d)) >= 60
+
+
+def test_a_workpiece_goes_through_the_cell_and_out_of_it() -> None:
+    stage = Stage(catalogue_net("one_robot"), plant("one_robot"))
+    scene, seen = stage.begin(), []
+    for name in [
+        "G1",
+        "G2",
+        "t1-a",
+        "G3",
+        "t1-b",
+        "G4",
+        "G5",
+        "t2-a",
+        "t2-b",
+        "G6",
+        "t1-c",
+        "G7",
+        "t1-d",
+        "G8",
+        "G9",
+        "G1",
+    ]:
+        scene = stage.fired(scene, (name,), sends=True)
+        seen.append([(piece.number, piece.on, piece.machined) for piece in scene.pieces])
+    one = [[(1, on, machined)] for on, machined in (
+        ("CV1", False), ("cv1_end", False), ("cv1_end", False), ("R", False), ("R", False), ("mc_table", False),
+        ("mc_table", False), ("mc_table", False), ("mc_table", True), ("mc_table", True), ("mc_table", True),
+        ("R", True), ("R", True), ("CV2", True), ("cv2_exit", True),
+    )]  # fmt: skip
+    assert seen == [*one, [(2, "CV1", False)]]
+    assert scene.hands == {"R": "CV2"}
+    assert stage.of_json(scene.to_json()) == scene
+
+
+def test_a_command_that_is_left_before_its_completion_has_no_effect() -> None:
+    stage = Stage(catalogue_net("one_robot_timed"), plant("one_robot_timed"))
+    fault = next(t for t in stage.net.transitions if t.name == "robot.to_cv1_timeout")
+    moving = stage.sent(stage.begin(), "robot.to_cv1")
+    assert stage.fired(moving, (fault.name,), sends=False).hands == {"R": "HOME"}
+    assert stage.signal(moving, "robot.at_cv1").hands == {"R": "CV1"}
+    assert stage.signal(moving, "robot.at_cv1").busy == {}
+
+
+def test_a_sensor_shows_that_a_workpiece_has_come_and_only_one() -> None:
+    stage = Stage(catalogue_net("one_robot"), plant("one_robot"))
+    scene = stage.signal(stage.signal(stage.begin(), "conveyor.part_at_entry"), "conveyor.part_at_entry")
+    assert scene.pieces == (Piece(1, "cv1_entry"),)
+
+
+def test_the_gripper_of_an_arm_that_carries_is_its_own_station_and_a_belt_has_none() -> None:
+    view = top_view(plant("two_cells"))
+    assert {name: arm["gripper"] for name, arm in view["arms"].items()} == {"RA": ["gripper_a"], "RB": ["gripper_b"]}
+    assert set(view["belts"]) == {"CV1", "CV2", "CV3"}
+    assert set(view["others"]) == {"MA", "MB"}
+
+
+def test_the_frames_of_a_run_tell_how_the_cell_looks() -> None:
+    net = catalogue_net("one_robot")
+    trace = Trace.of_firings(net, [("G1",), ("G2",)], Discipline.INTERLEAVING)
+    frames = Run("r", "", trace).to_json(net, Stage(net, plant("one_robot")))["frames"]
+    assert [frame["scene"]["pieces"] for frame in frames] == [[], [[1, "CV1", False]], [[1, "cv1_end", False]]]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"pieces": [[1, "nowhere", False]]},
+        {"pieces": [[1, "cv1_end"]]},
+        {"pieces": 3},
+        {"hands": {"X": "HOME"}},
+        {"busy": {"R": "no.place"}},
+        {"arrived": None},
+    ],
+)
+def test_a_scene_that_the_plant_cannot_have_is_refused(damage: dict[str, object]) -> None:
+    stage = Stage(catalogue_net("one_robot"), plant("one_robot"))
+    with pytest.raises(InputError, match="F5070"):
+        stage.of_json({**stage.begin().to_json(), **damage})
+
+
+def test_a_plant_with_one_machine_and_no_line_has_a_view() -> None:
+    text = """firable_plant: 1
+plant: p
+stations: [s]
+arrivals: {station: s, every_s: 1}
+departures: {station: s}
+machines: {M: {commands: {GO: {does: work, takes_s: 1}}}}
+"""
+    view = top_view(parse_plant(text))
+    assert view["stations"] == {"s": [0.0, -95.0]}
+    assert set(view["others"]) == {"M"}

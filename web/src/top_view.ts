@@ -1,0 +1,201 @@
+// The cell from above: belts, tables, arms and workpieces, where the server says that they stand and what they do. What
+// moves is moved by transitions of the style sheet, as long as its command takes; who wants no motion sees it arrive.
+
+import { calm, h, svg } from "./dom";
+
+type Spot = [number, number];
+
+export interface Scene {
+  pieces: [number, string, boolean][];
+  hands: Record<string, string>;
+  busy: Record<string, string>;
+  arrived: number;
+}
+
+export interface Top {
+  scene: Scene;
+  doing: Record<string, { does: string; command: string; from: string; to: string; takes_s: number }>;
+  words: string[];
+}
+
+interface Arm {
+  base: Spot;
+  home: Spot;
+  positions: Record<string, Spot>;
+  gripper: string[];
+}
+
+interface View {
+  name: string;
+  says: string;
+  stations: Record<string, Spot>;
+  belts: Record<string, [number, number, number, number]>;
+  tables: Record<string, Spot>;
+  arms: Record<string, Arm>;
+  others: Record<string, Spot>;
+  arrivals: string;
+  departures: string;
+}
+
+export type TopStart = { why_not: string } | (Top & { view: View });
+
+const PLAYED_S = 0.7;
+const MARGIN = 95;
+const WIDTH = 44;
+
+export class TopView {
+  readonly element = h("div", { class: "topview", id: "top", role: "tabpanel", "aria-labelledby": "tab-top", tabindex: "0", hidden: true });
+  private readonly drawing = svg("svg", { role: "img" });
+  private readonly words = h("ul", { class: "list scene-words" });
+  private readonly pieces = new Map<number, SVGGElement>();
+  private readonly hands = new Map<string, { arm: SVGGElement; reach: SVGRectElement; hand: SVGGElement }>();
+  private readonly machines = new Map<string, SVGGElement>();
+  private readonly layer = svg("g");
+  private readonly view: View | null;
+
+  constructor(start: TopStart) {
+    if ("why_not" in start) {
+      this.view = null;
+      this.element.append(h("p", { class: "none" }, `There is no top view: ${start.why_not}.`));
+      return;
+    }
+    this.view = start.view;
+    this.drawing.setAttribute("aria-label", `${start.view.name} from above`);
+    this.draw(start.view);
+    this.element.append(this.drawing, this.words);
+    this.show(start, 0);
+  }
+
+  get isThere(): boolean {
+    return this.view !== null;
+  }
+
+  private group(name: string, kind: string): SVGGElement {
+    const made = svg("g", { class: `machine ${kind}`, "data-machine": name });
+    this.machines.set(name, made);
+    this.drawing.append(made);
+    return made;
+  }
+
+  private label(x: number, y: number, words: string, kind = "name"): SVGTextElement {
+    const made = svg("text", { x, y, class: kind, "text-anchor": "middle" });
+    made.textContent = words;
+    return made;
+  }
+
+  private draw(view: View): void {
+    const spots = [...Object.values(view.stations), ...Object.values(view.others), ...Object.values(view.arms).flatMap((arm) => [arm.base, arm.home])];
+    const xs = spots.map(([x]) => x);
+    const ys = spots.map(([, y]) => y);
+    const [left, top] = [Math.min(...xs) - MARGIN, Math.min(...ys) - MARGIN];
+    this.drawing.setAttribute("viewBox", `${left} ${top} ${Math.max(...xs) + MARGIN - left} ${Math.max(...ys) + MARGIN - top}`);
+    for (const [name, [x1, y1, x2, y2]] of Object.entries(view.belts)) {
+      const belt = this.group(name, "belt");
+      const length = Math.hypot(x2 - x1, y2 - y1) + WIDTH + 12;
+      const turn = `translate(${(x1 + x2) / 2} ${(y1 + y2) / 2}) rotate(${(Math.atan2(y2 - y1, x2 - x1) * 180) / Math.PI})`;
+      const inner = svg("g", { transform: turn });
+      inner.append(svg("rect", { x: -length / 2, y: -WIDTH / 2 - 5, width: length, height: WIDTH + 10, rx: 8, class: "body" }), svg("path", { d: `M${-length / 2 + 6} 0H${length / 2 - 6}`, class: "running" }));
+      belt.append(inner, this.label((x1 + x2) / 2, (y1 + y2) / 2 + WIDTH / 2 + 22, name), this.label((x1 + x2) / 2, (y1 + y2) / 2 + WIDTH / 2 + 37, "", "doing"));
+    }
+    for (const [name, [x, y]] of Object.entries(view.tables)) {
+      const table = this.group(name, "table");
+      table.append(svg("rect", { x: x - 46, y: y - 46, width: 92, height: 92, rx: 10, class: "body" }), this.label(x, y - 70, name), this.label(x, y - 54, "", "doing"));
+    }
+    for (const [name, [x, y]] of Object.entries(view.others)) {
+      const other = this.group(name, "other");
+      other.append(svg("rect", { x: x - 40, y: y - 26, width: 80, height: 52, rx: 8, class: "body" }), this.label(x, y + 5, name), this.label(x, y + 44, "", "doing"));
+    }
+    for (const [name, [x, y]] of Object.entries(view.stations)) {
+      const station = svg("g", { class: "station" });
+      const title = svg("title");
+      title.textContent = `${name}${name === view.arrivals ? ", where workpieces come" : name === view.departures ? ", where they leave" : ""}`;
+      station.append(title, svg("rect", { x: x - WIDTH / 2, y: y - WIDTH / 2, width: WIDTH, height: WIDTH, rx: 5 }));
+      if (name === view.arrivals) station.append(svg("path", { d: `M${x - 58} ${y}h22m-8 -7l8 7l-8 7`, class: "way" }));
+      if (name === view.departures) station.append(svg("path", { d: `M${x + 36} ${y}h22m-8 -7l8 7l-8 7`, class: "way" }));
+      this.drawing.append(station);
+    }
+    this.drawing.append(this.layer);
+    for (const [name, { base }] of Object.entries(view.arms)) this.arm(name, base);
+  }
+
+  private arm(name: string, [x, y]: Spot): void {
+    const group = this.group(name, "arm");
+    const arm = svg("g", { class: "moving" });
+    const reach = svg("rect", { x: 0, y: -7, width: 1, height: 14, class: "link moving" });
+    const hand = svg("g", { class: "hand moving" });
+    hand.append(svg("path", { d: "M-15 -13h30M-15 13h30M-15 -13v26" }));
+    arm.append(reach, hand);
+    const side = y > 0 ? 1 : -1;
+    group.append(arm, svg("circle", { cx: x, cy: y, r: 24, class: "body" }), this.label(x, y + 5, name), this.label(x, y + side * 44 + (side > 0 ? 8 : 0), "", "doing"));
+    this.hands.set(name, { arm, reach, hand });
+  }
+
+  /** Show a scene; what is on its way takes so many seconds, as the commands say where none are given. */
+  show(top: Top, seconds = PLAYED_S, speed = 0): void {
+    const { view } = this;
+    if (view === null) return;
+    const lasting = (machine: string): number => (calm() ? 0 : speed > 0 ? (top.doing[machine]?.takes_s ?? 0.2) / speed : seconds);
+    for (const [name, group] of this.machines) {
+      const doing = top.doing[name];
+      group.classList.toggle("busy", doing !== undefined);
+      group.querySelector(".doing")!.textContent = doing === undefined ? "" : doing.command.slice(name.length + 1);
+    }
+    for (const name of this.hands.keys()) this.reach(view.arms[name]!, name, this.handAt(view, top, name), lasting(name));
+    const there = new Set<number>();
+    for (const [number, on, machined] of top.scene.pieces) {
+      there.add(number);
+      const [x, y] = this.spot(view, top, on);
+      const mover = this.hands.has(on) || on in view.belts ? on : Object.keys(top.doing).find((name) => top.doing[name]!.to === on || top.doing[name]!.from === on);
+      const piece = this.pieces.get(number) ?? this.piece(number, [x, y]);
+      piece.classList.toggle("machined", machined);
+      piece.style.transitionDuration = `${mover === undefined ? Math.min(seconds, 0.2) : lasting(mover)}s`;
+      piece.style.transform = `translate(${x}px, ${y}px)`;
+    }
+    for (const [number, piece] of this.pieces) {
+      if (there.has(number)) continue;
+      piece.remove();
+      this.pieces.delete(number);
+    }
+    const key = top.words.join("\n");
+    if (this.words.dataset["key"] !== key) {
+      this.words.dataset["key"] = key;
+      this.words.replaceChildren(...top.words.map((one) => h("li", {}, one)));
+    }
+  }
+
+  private piece(number: number, [x, y]: Spot): SVGGElement {
+    const made = svg("g", { class: "piece moving" });
+    made.append(svg("rect", { x: -13, y: -13, width: 26, height: 26, rx: 4 }), svg("circle", { r: 6 }));
+    made.style.transform = `translate(${x}px, ${y}px)`;
+    this.layer.append(made);
+    this.pieces.set(number, made);
+    return made;
+  }
+
+  private handAt(view: View, top: Top, name: string): Spot {
+    const arm = view.arms[name]!;
+    const doing = top.doing[name];
+    if (doing?.does === "carry") return view.stations[arm.gripper.includes(doing.to) ? doing.from : doing.to] ?? arm.home;
+    const position = doing?.does === "move" ? doing.to : (top.scene.hands[name] ?? "");
+    return arm.positions[position] ?? arm.home;
+  }
+
+  /** Where a workpiece is drawn: on its station, in a hand, or on a belt, at the end to which it is carried. */
+  private spot(view: View, top: Top, on: string): Spot {
+    const arm = Object.keys(view.arms).find((name) => name === on || view.arms[name]!.gripper.includes(on));
+    if (arm !== undefined) return this.handAt(view, top, arm);
+    const belt = view.belts[on];
+    if (belt === undefined) return view.stations[on] ?? [0, 0];
+    return view.stations[top.doing[on]?.to ?? ""] ?? [(belt[0] + belt[2]) / 2, (belt[1] + belt[3]) / 2];
+  }
+
+  private reach({ base }: Arm, name: string, [x, y]: Spot, seconds: number): void {
+    const { arm, reach, hand } = this.hands.get(name)!;
+    const length = Math.max(1, Math.hypot(x - base[0], y - base[1]));
+    const turn = (Math.atan2(y - base[1], x - base[0]) * 180) / Math.PI;
+    for (const one of [arm, reach, hand]) one.style.transitionDuration = `${seconds}s`;
+    arm.style.transform = `translate(${base[0]}px, ${base[1]}px) rotate(${turn}deg)`;
+    reach.style.transform = `scaleX(${Math.max(1, length - 16)})`;
+    hand.style.transform = `translate(${length}px, 0px)`;
+  }
+}
