@@ -22,19 +22,19 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Final
 
 from firable.executor.drivers.binding import ChannelDocument
 from firable.executor.drivers.device import Point, Value, Writes, as_number
 from firable.executor.drivers.driver import Answer
+from firable.executor.protocol.record import record
 
 NUMBER_MAX: Final = 65_535
 """Numbers fit a register of 16 bits; 0 is no command."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Order:
     """The command of a place, for one entry as the controller counts it."""
 
@@ -53,7 +53,7 @@ class Said(Enum):
     FAILED = auto()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Outcome:
     """What a machine says, and of which order."""
 

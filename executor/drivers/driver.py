@@ -25,12 +25,12 @@ that can only be polled do so inside, behind this protocol. Real machines are re
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, TypeVar
 
 from firable.executor.protocol.commands import Answer as Answer
 from firable.executor.protocol.messages import Effect, Sending
+from firable.executor.protocol.record import record
 from firable.nets.net import Place
 
 Leaving = TypeVar("Leaving", bound=Effect)
@@ -44,7 +44,7 @@ class Quality(StrEnum):
     BAD = "bad"
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Reading:
     """What the process image holds of one signal.
 

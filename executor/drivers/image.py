@@ -12,17 +12,18 @@ Pure: the time comes with each call.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from firable.executor.drivers.binding import SignalDocument
 from firable.executor.drivers.device import Point, Value, as_bit, as_number
 from firable.executor.drivers.driver import Quality, Reading
+from firable.executor.protocol.record import record
 
 COUNTER_MODULUS = 1 << 16
 """Counters of edges begin again at this number or at a multiple of it."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Change:
     """A signal shows something else."""
 
@@ -53,9 +54,11 @@ class Image:
         faults: list[str] = []
         for point, value in batch:
             for name in self.reads.get(point, ()):
-                reading = self.readings[name]
+                reading, bit = self.readings[name], as_bit(value)
+                if bit is not None and bit ^ self.signals[name].invert is reading.value and name not in before:
+                    self.readings[name] = Reading(reading.value, now_seconds, Quality.GOOD, "", reading.coalesced)
+                    continue  # as most do that are polled
                 before.setdefault(name, reading.value)
-                bit = as_bit(value)
                 if bit is None:
                     faults += self._lose(name, f"'{point}' shows {value!r}, which is neither 0 nor 1")
                     continue
@@ -66,6 +69,8 @@ class Image:
             for name in self.counters.get(point, ()):
                 if (number := as_number(value)) is not None:
                     counts[name] = number
+        if not before and not counts:
+            return [], faults
         changes = list(self._changes(before))
         told = {change.signal for change in changes}
         for name in {*edges, *counts}:

@@ -7,7 +7,9 @@ and lies together goes out in one request, so that a command and its number reac
 The line takes one request at a time, and a command goes before the next poll.
 
 A request that is not answered in time ends the connection (`retries=0`). Frames over TCP carry a transaction number and
-pymodbus looks at it, frames of RTU carry none: there a late answer *is* the answer to the next question.
+pymodbus looks at it, frames of RTU carry none: there a late answer *is* the answer to the next question. The time is
+watched here (`Watch`), by one timer for all requests of a connection: pymodbus would set one for each, and wait for its
+answer in two more turns of the event loop, which is a good part of what a reaction takes.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ from collections.abc import Awaitable, Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Final, Literal
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import Field
 
@@ -106,16 +109,68 @@ def blocks(addresses: Sequence[Address]) -> Iterator[_Block]:
             del numbers[:count]
 
 
+class Watch:
+    """The time limit of a connection, on whatever it asks: one question at a time."""
+
+    def __init__(self, timeout_s: float) -> None:
+        self.timeout_s = timeout_s
+        self.loop = asyncio.get_running_loop()
+        self.since_seconds = 0.0
+        self.asking: asyncio.Task[Any] | None = None
+        """Who asks, since then."""
+        self.is_over = False
+        self.timer = self.loop.call_later(timeout_s, self._look)
+
+    def __enter__(self) -> None:
+        self.since_seconds, self.asking = self.loop.time(), asyncio.current_task()
+
+    def __exit__(self, *failed: object) -> None:
+        asking, self.asking = self.asking, None
+        if self.is_over and asking is not None and asking.uncancel() == 0:
+            raise TimeoutError("no answer in time") from None
+
+    def close(self) -> None:
+        """Watch no more."""
+        self.timer.cancel()
+
+    def _look(self) -> None:
+        left_s = self.timeout_s
+        if self.asking is not None:
+            left_s -= self.loop.time() - self.since_seconds
+            if left_s <= 0:
+                self.is_over = True
+                self.asking.cancel()
+                return
+        self.timer = self.loop.call_later(left_s, self._look)
+
+
 class ModbusConnection:
     """A connection to one device, by a client that is connected."""
 
-    def __init__(self, client: AsyncModbusTcpClient | AsyncModbusSerialClient, unit: int, every_s: float) -> None:
+    def __init__(
+        self, client: AsyncModbusTcpClient | AsyncModbusSerialClient, unit: int, every_s: float, timeout_s: float
+    ) -> None:
+        from pymodbus.exceptions import ModbusException
+
         self.client = client
         self.unit = unit
         self.every_s = every_s
+        self.watch = Watch(timeout_s)
+        self.line = asyncio.Lock()
+        """Of who asks: the time of a question begins when the line is its own."""
         self.points: dict[Address, list[Point]] = {}
         self.blocks: tuple[_Block, ...] = ()
+        self.layout: list[tuple[Point, int, Address]] = []
+        """Where each point stands among the values of all blocks."""
         self.due_seconds = 0.0
+        self.failures: tuple[type[Exception], ...] = (ModbusException, TimeoutError)
+        self.asked: dict[str, Callable[..., Awaitable[ModbusPDU]]] = {
+            "coil": client.read_coils,
+            "discrete": client.read_discrete_inputs,
+            "input": client.read_input_registers,
+            "holding": client.read_holding_registers,
+        }
+        """What asks for a block of each table."""
         self.is_free = asyncio.Event()
         """Set while nothing is being written."""
         self.is_free.set()
@@ -125,22 +180,22 @@ class ModbusConnection:
         for point in points:
             self.points.setdefault(address(point), []).append(point)
         self.blocks = tuple(blocks(list(self.points)))
+        first = dict(zip(self.blocks, accumulate((b.count for b in self.blocks), initial=0), strict=False))
+        at = {(b.table, b.first + i): first[b] + i for b in self.blocks for i in range(b.count)}
+        self.layout = [(point, at[one.table, one.number], one) for one, each in self.points.items() for point in each]
 
     async def read(self) -> Sequence[tuple[Point, Value]]:
         """All points, when it is time to poll them again."""
         loop = asyncio.get_running_loop()
         # A turn of the loop at least, in which the writer begins with the command that follows from what was polled.
         await asyncio.sleep(max(0.0, self.due_seconds - loop.time()))
-        await self.is_free.wait()
+        if not self.is_free.is_set():
+            await self.is_free.wait()
         self.due_seconds = loop.time() + self.every_s
-        shown: dict[tuple[str, int], int] = {}
+        shown: list[int] = []
         for block in self.blocks:
-            shown |= await self._block(block)
-        return [
-            (point, _value(shown[one.table, one.number], one))
-            for one, points in self.points.items()
-            for point in points
-        ]
+            shown += await self._block(block)
+        return [(point, _value(shown[at], one)) for point, at, one in self.layout]
 
     async def write(self, writes: Writes) -> None:
         """Write values in their order, neighbours together."""
@@ -164,22 +219,16 @@ class ModbusConnection:
 
     async def close(self) -> None:
         """Close the client, which is not used again."""
+        self.watch.close()
         self.client.close()
 
-    async def _block(self, block: _Block) -> dict[tuple[str, int], int]:
-        client = self.client
-        request = {
-            "coil": client.read_coils,
-            "discrete": client.read_discrete_inputs,
-            "input": client.read_input_registers,
-            "holding": client.read_holding_registers,
-        }[block.table]
+    async def _block(self, block: _Block) -> Sequence[int]:
         what = f"{block.table} {block.first}"
-        answer = await self._answered(partial(request, block.first, count=block.count), what)
+        answer = await self._answered(partial(self.asked[block.table], block.first, count=block.count), what)
         shown: Sequence[int] = answer.bits if block.table in BITS else answer.registers
         if len(shown) < block.count:
             raise LinkError(f"an answer with {len(shown)} values to a question for {block.count} from {what}")
-        return {(block.table, block.first + i): int(shown[i]) for i in range(block.count)}
+        return shown[: block.count]
 
     async def _write(self, first: Address, values: Sequence[Value]) -> None:
         what = f"{first.table} {first.number}"
@@ -200,11 +249,11 @@ class ModbusConnection:
         await self._answered(request, what)
 
     async def _answered(self, request: Callable[..., Awaitable[ModbusPDU]], what: str) -> ModbusPDU:
-        from pymodbus.exceptions import ModbusException
-
         try:
-            answer = await request(device_id=self.unit)
-        except ModbusException as error:
+            async with self.line:
+                with self.watch:
+                    answer = await request(device_id=self.unit)
+        except self.failures as error:
             raise LinkError(f"{what}: {str(error).removeprefix('Modbus Error: ')}") from None
         if answer.isError():
             raise LinkError(f"the device refuses {what}: exception {answer.exception_code}")
@@ -294,7 +343,8 @@ async def _opened(
     except BaseException:
         client.close()
         raise
-    connection = ModbusConnection(client, unit, every_s)
+    setattr(client.ctx.comm_params, "timeout_connect", None)  # noqa: B010 - its type says that there is one always
+    connection = ModbusConnection(client, unit, every_s, wanted.timeout_s)
     connection.want(list(wanted.read))
     return connection
 
