@@ -32,6 +32,7 @@ import zenoh
 from measuring import Table, against
 
 from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Greeting
 from firable.executor.links.zenoh_link import ZenohLink
 from firable.executor.operating.host import Host
@@ -223,8 +224,8 @@ def tables(repeat: int) -> list[Table]:
             trips = bare(at, repeat)
         with processes("loop", bundle) as at:
             by_loops = asyncio.run(bare_by_loops(at, repeat))
-        with processes("controller", bundle) as at:
-            firings = asyncio.run(firing(of, at, repeat))
+        with processes("controller", bundle) as at, asyncio.Runner(loop_factory=LendingLoop) as runner:
+            firings = runner.run(firing(of, at, repeat))
         with processes("echo", bundle) as at:
             again = bare(at, repeat)
     phase = min(firings) / PHASES
@@ -271,4 +272,5 @@ if __name__ == "__main__":
         asyncio.run(echo_by_loop(own, address))
     else:
         cell = read_bundle(path).decomposition
-        asyncio.run(host(cell, (own,), Recorder(cell.net, "", None, None, (own,)), join=address).main())
+        with asyncio.Runner(loop_factory=LendingLoop) as runner:
+            runner.run(host(cell, (own,), Recorder(cell.net, "", None, None, (own,)), join=address).main())

@@ -17,12 +17,11 @@ Nothing listens unless an address is given, and multicast is off. Beyond one mac
 on both sides (`Certificates`) keep strangers out; plain `tcp/` beyond loopback lets anybody on the network speak.
 Whoever has a certificate of the site may be any of its machines.
 
-Zenoh calls back on threads of its own; all that happens there is a hand-over to the event loop, which is woken once for
-all that comes before it looks: to wake it costs more than to act upon a message. `put` does not wait: a message that
-finds the queue of a dead line full is dropped.
-
-Rejected: to act on Zenoh's thread, which would save the hand-over. Drivers and timers live on the loop, and a lock
-around them all would let a slow disk hold up the connection itself.
+Zenoh calls back on threads of its own. Where the event loop sleeps, and is one that lends itself (`lending.py`),
+messages are acted upon there and then; a loop that is at work is woken once for all that comes before it looks, for to
+wake it costs more than to act upon a message. What is no message, a host that comes or goes, is left to the loop, and
+so is what asks something of Zenoh and waits for it. `put` does not wait: a message that finds the queue of a dead line
+full is dropped. A sync of the journal is on a thread of its own in any case, so no disk holds up the connection by it.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ import asyncio
 import ipaddress
 import json
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
@@ -41,6 +40,7 @@ from urllib.parse import quote, unquote
 import zenoh
 
 from firable.executor.links.encoding import EncodingError, decode, encode
+from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Arrival, Greeting, LinkListener, cannot_open, objection
 from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic, Severity
@@ -52,8 +52,6 @@ LEASE_SECONDS: Final = 1.0
 _OPENING_SECONDS: Final = 2.0
 _NAMELESS: Final = "%"  # which no name is quoted to
 _REST: Final = "**"
-
-_Act = Callable[[str, bytes, bool], Sequence[Arrival]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +89,11 @@ class ZenohLink:
         self.publishers: dict[tuple[str, str, str], zenoh.Publisher] = {}
         """For each sender here, receiver and session of the receiver."""
         self.damaged = 0
-        self.samples: deque[tuple[_Act, str, bytes, bool]] = deque()
-        """What has come and was not looked at yet."""
+        self.samples: deque[tuple[bool, str, bytes, bool]] = deque()
+        """What has come and was not looked at yet: messages, and tokens of hosts."""
         self.is_woken = False
+        self.lending: LendingLoop | None = None
+        """The event loop, if it lends itself."""
 
     async def run(self, listener: LinkListener) -> None:
         """Serve until cancelled; raises `InputError` F5021 where an address cannot be listened at."""
@@ -103,17 +103,18 @@ class ZenohLink:
         except zenoh.ZError as error:
             raise cannot_open(", ".join((*self.listen, *self.join)), str(error).partition(" at /")[0]) from None
         self.session, self.listener, self.identity = session, listener, str(session.info.zid())
+        self.lending = loop if isinstance(loop, LendingLoop) else None
         try:
             ours = self._key(self.greeting.version, self.greeting.digest)
             kept: list[object] = []
             for name in self.greeting.names:
                 at = f"{ours}/to/{_spelled(name)}/{self.identity}/{_REST}"
-                kept.append(session.declare_subscriber(at, lambda s: self._on(loop, self._message, s)))
+                kept.append(session.declare_subscriber(at, lambda s: self._on(loop, s, is_message=True)))
             for name in self.greeting.names:
                 kept.append(session.liveliness().declare_token(f"{ours}/alive/{_spelled(name)}/{self.identity}"))
             alive = "firable/*/*/alive/*/*"
             tokens = session.liveliness()
-            kept.append(tokens.declare_subscriber(alive, lambda s: self._on(loop, self._token, s), history=True))
+            kept.append(tokens.declare_subscriber(alive, lambda s: self._on(loop, s, is_message=False), history=True))
             self.broken = loop.create_future()
             await self.broken
         finally:
@@ -134,6 +135,9 @@ class ZenohLink:
             ours = self._key(self.greeting.version, self.greeting.digest)
             key = f"{ours}/to/{_spelled(receiver)}/{sessions[0]}/from/{_spelled(sender)}/{self.identity}"
             drop = zenoh.CongestionControl.DROP
+            if self.lending is not None and self.lending.is_lent:  # on Zenoh's own thread nothing waits for Zenoh
+                self.lending.call_soon(self.send, sender, receiver, message)
+                return
             publisher = self.session.declare_publisher(key, congestion_control=drop, express=True)
             self.publishers[to] = publisher
         publisher.put(encode(message))
@@ -175,27 +179,54 @@ class ZenohLink:
     def _key(version: int, digest: str) -> str:
         return f"firable/{version}/{_spelled(digest)}"
 
-    def _on(self, loop: asyncio.AbstractEventLoop, act: _Act, sample: zenoh.Sample) -> None:
-        """Hand a sample over to the event loop, from a thread of Zenoh; after the loop's end nobody hears it."""
+    def _on(self, loop: asyncio.AbstractEventLoop, sample: zenoh.Sample, *, is_message: bool) -> None:
+        """A sample has come, on a thread of Zenoh; after the loop's end nobody hears it."""
         gone = sample.kind == zenoh.SampleKind.DELETE
         key, payload = str(sample.key_expr), sample.payload.to_bytes()
-        self.samples.append((act, key, payload, gone))
+        self.samples.append((is_message, key, payload, gone))
+        if is_message and self.lending is not None and self._is_taken_here(self.lending):
+            return
         if not self.is_woken:
             self.is_woken = True
             with suppress(RuntimeError):  # the loop has been closed
                 loop.call_soon_threadsafe(self._look)
 
+    def _is_taken_here(self, loop: LendingLoop) -> bool:
+        """Take messages on this thread while the loop sleeps; whether nothing is left that it must be woken for."""
+        while self._is_message_next():
+            if not loop.lend(self._look_at_messages):
+                return loop.is_lent  # to another thread of Zenoh, which looks again when it has given it back
+        return not self.samples
+
+    def _is_message_next(self) -> bool:
+        try:
+            return self.samples[0][0]
+        except IndexError:  # another thread has taken all
+            return False
+
     def _look(self) -> None:
-        """Take all that has come; a callback of the loop has no caller: what fails in it ends `run`."""
+        """Take all that has come."""
         self.is_woken = False  # first: what comes from now on wakes the loop again
+        self._take(or_until_a_token=False)
+
+    def _look_at_messages(self) -> None:
+        self._take(or_until_a_token=True)
+
+    def _take(self, *, or_until_a_token: bool) -> None:
+        """Take what has come; this has no caller, so what fails in it ends `run`."""
         try:
             came: list[Arrival] = []
             for _ in range(len(self.samples)):
-                act, key, payload, gone = self.samples.popleft()
-                if act == self._token:
+                if or_until_a_token and not self.samples[0][0]:
+                    break
+                is_message, key, payload, gone = self.samples.popleft()
+                if is_message:
+                    came += self._message(key, payload, gone)
+                else:
                     self._told(came)
                     came = []
-                came += act(key, payload, gone)
+                    if self.listener is not None:
+                        self._host(self.listener, key, gone)
             self._told(came)
         except Exception as error:
             if self.broken is not None and not self.broken.done():
@@ -204,12 +235,6 @@ class ZenohLink:
     def _told(self, came: Sequence[Arrival]) -> None:
         if came and self.listener is not None:
             self.listener.arrived_together(came)
-
-    def _token(self, key: str, _payload: bytes, gone: bool) -> Sequence[Arrival]:
-        """A host has come or gone."""
-        if self.listener is not None:
-            self._host(self.listener, key, gone)
-        return ()
 
     def _host(self, listener: LinkListener, key: str, gone: bool) -> None:
         _, version, digest, _, name, session = key.split("/")

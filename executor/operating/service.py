@@ -66,7 +66,7 @@ def run_to_the_end(
     work = terminable(host) if service is None or figures is None else _serving(host, service, figures)
     guard = Guard(host.patience.seconds)
     try:
-        with _short_collections(), asyncio.Runner() as runner:
+        with _short_collections(), asyncio.Runner(loop_factory=_loop_for(host)) as runner:
             try:
                 ended = runner.run(work)
             finally:
@@ -74,6 +74,15 @@ def run_to_the_end(
     finally:
         guard.end()
     return ended
+
+
+def _loop_for(host: Host) -> type[asyncio.AbstractEventLoop] | None:
+    """The kind of loop: one that a link's threads may work on while it sleeps, where there is a link."""
+    if host.is_whole:
+        return None
+    from firable.executor.links.lending import LendingLoop
+
+    return LendingLoop
 
 
 @contextmanager

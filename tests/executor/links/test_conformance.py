@@ -1,13 +1,15 @@
 """What every link does, whatever carries it."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from support.link_rigs import Heard, Rig, in_process, over_a_serial_line, over_zenoh, running
 
+from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Greeting, Link
 from firable.executor.protocol.messages import Acknowledgement, Decision, Message, Readiness, Report, Vote, VoteRequest
 
@@ -26,6 +28,12 @@ TO_COORDINATOR: list[Message] = [
     Vote("robot", 1, frozenset(), READY),
     Acknowledgement("robot", 2, READY),
 ]
+
+
+def run(make: Make, main: Coroutine[Any, Any, None]) -> None:
+    """Run a test on the kind of loop that hosts with such a link have; Zenoh's own tests run on an ordinary one."""
+    with asyncio.Runner(loop_factory=LendingLoop if make is over_zenoh else None) as runner:
+        runner.run(main)
 
 
 async def deliver(link: Link, heard: Heard, sender: str, receiver: str, messages: list[Message]) -> None:
@@ -47,7 +55,7 @@ class TestLink:
                     await centre.until_told(("connected", "robot"), ("connected", "mc"))
                 await centre.until_told(("lost", "robot"), ("lost", "mc"))
 
-        asyncio.run(main())
+        run(make, main())
 
     def test_messages_arrive_as_they_were_sent_or_not_at_all(self, make: Make) -> None:
         async def main() -> None:
@@ -62,7 +70,7 @@ class TestLink:
                 assert {m for _, _, m in robot.messages} == set(TO_CONTROLLER)
                 assert {m for _, _, m in centre.messages} == set(TO_COORDINATOR)
 
-        asyncio.run(main())
+        run(make, main())
 
     def test_a_host_with_two_machines_is_reached_by_both_names(self, make: Make) -> None:
         async def main() -> None:
@@ -74,7 +82,7 @@ class TestLink:
                     await deliver(here, both, COORDINATOR, "system", [VoteRequest("system", 9, ("G1",), 0, 0)])
                 assert {r for _, r, _ in both.messages} == {"robot", "system"}
 
-        asyncio.run(main())
+        run(make, main())
 
     @pytest.mark.parametrize("other", [replace(ROBOT, digest="d2"), replace(ROBOT, version=99)])
     def test_a_host_of_another_bundle_or_version_is_refused_and_not_heard(self, make: Make, other: Greeting) -> None:
@@ -93,7 +101,7 @@ class TestLink:
                     assert {problem.code for problem in centre.problems} == {"F5020"}
                     assert ("another bundle" in centre.problems[0].message) is (other.digest != "d1")
 
-        asyncio.run(main())
+        run(make, main())
 
     def test_a_cut_line_is_noticed_by_both_and_mends(self, make: Make) -> None:
         async def main() -> None:
@@ -112,7 +120,7 @@ class TestLink:
                     await deliver(here, robot, COORDINATOR, "robot", TO_CONTROLLER)
                     await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR)
 
-        asyncio.run(main())
+        run(make, main())
 
     def test_a_host_that_is_started_anew_is_lost_and_connected(self, make: Make) -> None:
         async def main() -> None:
@@ -127,7 +135,7 @@ class TestLink:
                             await deliver(here, robot, COORDINATOR, "robot", TO_CONTROLLER)
                     assert [told for told, _ in centre.told][:3] == ["connected", "lost", "connected"]
 
-        asyncio.run(main())
+        run(make, main())
 
     def test_a_coordinator_that_is_started_anew_is_met_again(self, make: Make) -> None:
         async def main() -> None:
@@ -142,7 +150,7 @@ class TestLink:
                             await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR)
                     assert [told for told, _ in robot.told][:3] == ["connected", "lost", "connected"]
 
-        asyncio.run(main())
+        run(make, main())
 
     def test_what_is_sent_to_nobody_is_lost_without_an_error(self, make: Make) -> None:
         async def main() -> None:
@@ -153,4 +161,4 @@ class TestLink:
                     await asyncio.sleep(0.05)
                     link.send(COORDINATOR, "robot", TO_CONTROLLER[0])
 
-        asyncio.run(main())
+        run(make, main())
