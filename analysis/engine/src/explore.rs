@@ -196,9 +196,10 @@ impl Space {
         arrivals.first(width, &mut batch, (&mut self.table, max, &self.memory, watch))?;
         let (mut next, mut end) = (0, 1);
         while self.level_end(next, &mut end)? {
-            let open = match pair.as_mut().filter(|pair| pair.takes(end - next)) {
+            let open;
+            (open, end) = match pair.as_mut().filter(|pair| pair.takes(end - next)) {
                 Some(pair) => pair.expand(width, self, arrivals, next, max, watch)?,
-                None => vec![(next, end)],
+                None => (vec![(next, end)], end),
             };
             for range in open {
                 self.expand(width, net, range, (&mut batch, arrivals), max, watch)?;

@@ -1,8 +1,8 @@
 //! The table of keys in two halves, by the highest bit of the mixed key, each in the hands of one thread.
 //!
-//! Buckets are in the order of the mixed keys, so a half is the buckets of one side. What would have to move past the
-//! end of the lower half belongs to neither thread: it is given back, and put into the whole table when nobody works on
-//! it.
+//! Buckets are in the order of the mixed keys, so a half is the buckets of one side. What has to move past the end of the
+//! lower half, a handful of keys, is the affair of its thread, which keeps it in a list; nobody else looks for it. When
+//! nobody works on the table they are put into it.
 
 use super::{Asked, Exact, Filling, Place, ROOM};
 use crate::seat::{FACTOR, LANES, REACH, Shape, Slot};
@@ -32,8 +32,10 @@ pub(crate) enum Sought {
     Known,
     /// The bucket, of the half, and the slot where it belongs.
     Free((usize, usize)),
-    /// Past the end of this half: only the whole table can tell.
+    /// Past the end of this half.
     Past,
+    /// All buckets that would be tried for it are full.
+    Full,
 }
 
 /// The buckets of the keys whose mixed highest bit is 0, or 1.
@@ -54,6 +56,16 @@ impl<S: Slot> Exact<S> {
     /// Both halves.
     pub(crate) fn halves(&mut self) -> [HalfExact<'_, S>; 2] {
         halves(self.shape, self.slots.all_mut())
+    }
+
+    /// The keys of the lower half that stand past its end.
+    pub(crate) fn past(&self) -> Vec<u64> {
+        let (shape, first) = (self.shape, self.shape.buckets as usize / 2);
+        let past = self.buckets()[first..first + REACH].iter().zip(first..);
+        past.flat_map(|(bucket, at)| bucket.iter().map(move |slot| (slot.get(), at)))
+            .filter(|&(slot, at)| slot != 0 && at + 1 - ((slot & REACH as u64) as usize) < first)
+            .map(|(slot, at)| shape.key(shape.mixed(at + 1 - (slot & REACH as u64) as usize, slot)))
+            .collect()
     }
 
     /// How many keys more the table takes before it grows.
@@ -119,7 +131,7 @@ impl<S: Slot> Exact<S> {
     }
 
     /// Puts a key, which is counted already, where it belongs; false where all buckets that would be tried are full.
-    fn place(&mut self, key: u64) -> bool {
+    pub(crate) fn place(&mut self, key: u64) -> bool {
         let (home, wanted) = self.shape.seat::<S>(self.shape.mix(key));
         let place = self.place_of(home, wanted);
         if let Place::Free(slot) = place {
@@ -242,7 +254,7 @@ impl<S: Slot> HalfExact<'_, S> {
                 return Sought::Free((home + moved, free.trailing_zeros() as usize % LANES));
             }
         }
-        Sought::Past
+        if home + REACH > self.buckets.len() { Sought::Past } else { Sought::Full }
     }
 
     /// The key of a record.

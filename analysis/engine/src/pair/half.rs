@@ -36,11 +36,15 @@ pub(crate) struct Finds {
     pub(crate) memory: Memory,
     /// The markings.
     pub(crate) fresh: Store,
+    /// How many of them it found in each level.
+    pub(crate) levels: Vec<usize>,
     /// How many there may be.
     pub(crate) most: usize,
     /// What found no place, as `Shared::insert_left` takes it, and how much of it for good.
     pub(crate) left: Vec<u64>,
     strays: usize,
+    /// Keys of the markings that stand past the end of its half of a set of keys.
+    pub(crate) past: Vec<u64>,
     /// Why it must end.
     pub(crate) end: Option<End>,
 }
@@ -48,7 +52,17 @@ pub(crate) struct Finds {
 impl Finds {
     /// Nothing yet.
     pub(crate) fn new(id: usize, words: usize) -> Self {
-        Finds { id, memory: Memory::new(0), fresh: Store::new(words), most: 0, left: Vec::new(), strays: 0, end: None }
+        Finds {
+            id,
+            memory: Memory::new(0),
+            fresh: Store::new(words),
+            levels: Vec::new(),
+            most: 0,
+            left: Vec::new(),
+            strays: 0,
+            past: Vec::new(),
+            end: None,
+        }
     }
 
     /// Begins to work, with so many bytes more than are held and so many markings.
@@ -56,6 +70,8 @@ impl Finds {
         let held = self.memory.used();
         self.memory.allow(held + bytes);
         (self.most, self.strays, self.end) = (markings, 0, None);
+        self.levels.clear();
+        self.past.clear();
     }
 
     /// Ends for a reason, if not for one more urgent.
@@ -101,12 +117,15 @@ pub(crate) trait Shared<W: Width>: Arrivals<W> {
     where
         Self: 'a;
 
+    /// Whether the threads may go on to the next level with what they found: where the set says no indexes.
+    const GOES_ON: bool;
+
     /// The array of markings, and the two halves.
     fn halves<'a>(&'a mut self, table: &'a mut Table) -> (&'a Store, [Self::Half<'a>; 2]);
 
-    /// Corrects the indexes that the set says of the markings found, before they are laid into the array: in turn `BLOCK`
-    /// of each thread, as many turns as there are `even` blocks of both, then what one and the other have more.
-    fn renumber(&mut self, width: W, space: &mut Space, finds: [&Finds; 2], even: usize) -> Result<(), Stop>;
+    /// Makes the set say all that was found, by the indexes that the markings are about to get in the array: in each level
+    /// in turn `BLOCK` of each thread, as long as both have them, then what one and the other have more.
+    fn complete(&mut self, width: W, space: &mut Space, finds: [&Finds; 2], watch: &mut Watch<'_>) -> Result<(), Stop>;
 
     /// Makes room for more; false where there is no memory for that. After an error a set of hashes cannot be used any
     /// more; one of keys has lost none.

@@ -230,14 +230,16 @@ fn halves<'a>(table: (&'a Store, &'a mut [u32], Shape)) -> [HashedHalf<'a>; 2] {
 
 impl<W: Width> Shared<W> for Hashed {
     type Half<'a> = HashedHalf<'a>;
+    const GOES_ON: bool = false;
 
     fn halves<'a>(&'a mut self, table: &'a mut Table) -> (&'a Store, [HashedHalf<'a>; 2]) {
         let (store, slots, shape) = table.parts();
         (store, halves((store, slots, shape)))
     }
 
-    fn renumber(&mut self, width: W, space: &mut Space, finds: [&Finds; 2], even: usize) -> Result<(), Stop> {
+    fn complete(&mut self, width: W, space: &mut Space, finds: [&Finds; 2], _: &mut Watch<'_>) -> Result<(), Stop> {
         let (store, slots, shape) = space.table.parts();
+        let even = finds[0].fresh.len().min(finds[1].fresh.len()) / BLOCK;
         let base = store.len();
         // All are found before the first is corrected: until then each number stands once.
         let mut moved = Vec::new();

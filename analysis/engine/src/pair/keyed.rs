@@ -1,7 +1,8 @@
 //! The halves of a set of exact keys: a record is where a key belongs and what would stand there, so that who receives it
 //! has nothing left to compute. A marking is made of it where it is new.
 //!
-//! The set says no indexes, so nothing is numbered before the markings stand in the array.
+//! The set says no indexes, so nothing is numbered before the markings stand in the array, and the threads may go on from
+//! level to level meanwhile.
 
 use super::half::{End, Finds, Half, Shared};
 use crate::batch::Batch;
@@ -28,6 +29,8 @@ pub(crate) struct KeyedHalf<'a, S> {
     spread: &'a Spread,
     /// New keys that there is room for.
     room: usize,
+    /// The keys of this half that stood past its end before.
+    past: Vec<u64>,
     marking: Vec<u64>,
 }
 
@@ -73,25 +76,30 @@ impl<S: Slot> KeyedHalf<'_, S> {
         for k in 0..self.half.look(records, &mut open) {
             let c = usize::from(open[k % ROOM]) * stride::<S>();
             let record = &records[c..c + stride::<S>()];
-            match self.half.seek(record) {
-                Sought::Known => {}
-                Sought::Past => finds.leave(&[self.half.key(record)]),
-                Sought::Free(slot) if finds.fresh.len() < self.room => {
-                    let key = self.half.key(record);
-                    let marking = &mut self.marking[..width.words()];
-                    self.spread.marking(key, marking);
-                    let (fresh, memory) = (&mut finds.fresh, &finds.memory);
-                    if fresh.len() < finds.most && fresh.push(width, marking, finds.most, memory).is_ok() {
-                        self.half.take(record, slot);
-                    } else {
-                        finds.end(End::Short);
-                        finds.left.push(key);
-                    }
-                }
-                Sought::Free(_) => {
-                    finds.end(End::Full);
-                    finds.left.push(self.half.key(record));
-                }
+            let sought = self.half.seek(record);
+            if sought == Sought::Known {
+                continue;
+            }
+            let key = self.half.key(record);
+            if sought == Sought::Past && (self.past.contains(&key) || finds.past.contains(&key)) {
+                continue;
+            }
+            if sought == Sought::Full || finds.fresh.len() >= self.room {
+                finds.end(End::Full);
+                finds.left.push(key);
+                continue;
+            }
+            let marking = &mut self.marking[..width.words()];
+            self.spread.marking(key, marking);
+            let (fresh, memory) = (&mut finds.fresh, &finds.memory);
+            if fresh.len() >= finds.most || fresh.push(width, marking, finds.most, memory).is_err() {
+                finds.end(End::Short);
+                finds.left.push(key);
+                continue;
+            }
+            match sought {
+                Sought::Free(slot) => self.half.take(record, slot),
+                _ => finds.past.push(key),
             }
         }
     }
@@ -102,21 +110,32 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
         = KeyedHalf<'a, S>
     where
         Self: 'a;
+    const GOES_ON: bool = true;
 
     fn halves<'a>(&'a mut self, table: &'a mut Table) -> (&'a Store, [KeyedHalf<'a, S>; 2]) {
         let store = &table.store;
         let (span, spread, exact) = self.keyed.parts();
         // As full as one thread would let it become, if both halves were equally full.
         let room = exact.free() / 2;
-        let half = |half| {
+        let past = exact.past();
+        let half = |half, past| {
             let (mine, marking) = (vec![0; ROOM * stride::<S>()], vec![0; spread.words()]);
-            KeyedHalf { half, mine, waiting: 0, span, spread, room, marking }
+            KeyedHalf { half, mine, waiting: 0, span, spread, room, past, marking }
         };
-        (store, exact.halves().map(half))
+        let [low, high] = exact.halves();
+        (store, [half(low, past), half(high, Vec::new())])
     }
 
-    fn renumber(&mut self, _: W, _: &mut Space, finds: [&Finds; 2], _: usize) -> Result<(), Stop> {
-        self.keyed.parts().2.count(finds[0].fresh.len() + finds[1].fresh.len());
+    fn complete(&mut self, _: W, space: &mut Space, finds: [&Finds; 2], watch: &mut Watch<'_>) -> Result<(), Stop> {
+        let exact = self.keyed.parts().2;
+        for of in finds {
+            exact.count(of.fresh.len());
+            for &key in &of.past {
+                while !exact.place(key) {
+                    exact.grow(&space.memory, watch)?;
+                }
+            }
+        }
         Ok(())
     }
 
@@ -148,4 +167,40 @@ impl<W: Width, S: Slot> Shared<W> for ByKey<'_, S> {
     }
 
     fn forget_others(&mut self, _: W, _: &mut Space) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::unwatched;
+    use crate::explore::Limits;
+    use crate::known::Set;
+    use crate::marking::Fixed;
+    use crate::samples::machines;
+
+    #[test]
+    fn keys_past_the_end_of_the_lower_half_are_found_once_and_known_from_then_on() {
+        let limits = Limits { step: false, markings: 1, memory_bytes: 1 << 28, time: None };
+        let mut space = Space::explore(machines(16, 0), limits, &mut unwatched).expect("begins");
+        let Set::Narrow(mut keyed) = std::mem::replace(&mut space.set, Set::Hashed) else { panic!("sixteen bits") };
+        let (mut set, width, mut poll) = (ByKey::new(&mut keyed), Fixed::<1>, unwatched);
+        let mut watch = Watch::new(None, &mut poll);
+        // The last before the middle; all belong to one bucket, which holds eight.
+        let shape = set.keyed.exact.shape();
+        let keys: Vec<u64> = (0..1 << 16).filter(|&key| shape.mix(key) >> 53 == (1 << 10) - 1).collect();
+        for expected in [32, 0, 0] {
+            let mut finds = [0, 1].map(|id| Finds::new(id, 1));
+            finds.iter_mut().for_each(|of| of.allow(1 << 20, 1000));
+            let (_, [mut low, _]) = Shared::<Fixed<1>>::halves(&mut set, &mut space.table);
+            let (mut records, mut len, mut other, mut none) = (vec![0; 100], 0, vec![0; 100], 0);
+            for &key in keys.iter().chain(&keys) {
+                low.half.ask(1, |_| key, (&mut records, &mut len), (&mut other, &mut none));
+            }
+            low.put(width, &records[..len], &mut finds[0]);
+            assert_eq!((finds[0].fresh.len(), finds[0].end, len, none), (expected, None, 64, 0));
+            let [low, high] = &finds;
+            set.complete(width, &mut space, [low, high], &mut watch).expect("fits");
+            assert!(keys.iter().all(|&key| set.keyed.exact.has(key)));
+        }
+    }
 }

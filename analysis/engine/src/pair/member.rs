@@ -1,10 +1,17 @@
 //! One thread of a pair: it expands its share of a level, files the successors whose hash is its own, and sends the others
 //! to their owner, a parcel in each round.
 //!
-//! A parcel of a round is read after the next one is sent, so that a thread seldom waits for the other. Both see the same
-//! flags of the same round, and so end in the same round without asking anybody.
+//! A parcel of a round is read after the next one is sent, so that a thread seldom waits for the other. Who has sent his last
+//! reads all that is left, and says how many markings he has found. Where the set allows it, both then take up the next
+//! level, each with what he found himself: nobody else joins in, and nothing is moved. What is read when depends on the
+//! rounds alone, never on the clock, and so does where both end.
+//!
+//! Both have about the same to do, so who waits looks again and again for a while before he sleeps: to be woken takes
+//! longer than most waits.
 
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::hint::spin_loop;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvError, Sender, TryRecvError, channel};
 
 use super::half::{BLOCK, End, Finds, Half};
 use crate::batch::Batch;
@@ -14,18 +21,59 @@ use crate::net::Net;
 use crate::table::NONE;
 
 /// Edges after which a round ends.
-const ROUND_EDGES: u64 = 1 << 14;
+const ROUND_EDGES: u64 = 1 << 13;
+/// Looks for a message before one sleeps: some hundred microseconds.
+const LOOKS: usize = 1 << 12;
 
-/// What both threads know of the level.
-pub(crate) struct Level<'a> {
+/// What both threads know of the work.
+pub(crate) struct Work<'a> {
     pub(crate) net: &'a Net,
     /// The markings found before, end to end.
     pub(crate) old: &'a [u64],
-    /// The level itself.
-    pub(crate) start: usize,
-    pub(crate) end: usize,
+    /// Ranges of at most `BLOCK` of them that are to be expanded, dealt out in turn.
+    pub(crate) open: &'a [(usize, usize)],
+    /// How many markings there are before the first that is found now.
+    pub(crate) base: usize,
+    /// The fewest markings for which they go on to the next level; none where they must not.
+    pub(crate) go_on: Option<usize>,
+    /// Whether a second processor is free.
+    pub(crate) free: &'a AtomicBool,
     /// What had been found when the threads began.
     pub(crate) before: Found,
+}
+
+/// The markings that a thread has to expand.
+#[derive(Clone, Copy)]
+enum Share {
+    /// Every other range of those that are open.
+    Dealt,
+    /// What it found in the level before: from which of its finds on, the index of the level, and how many both found.
+    Own { from: usize, base: usize, counts: [usize; 2] },
+}
+
+impl Share {
+    /// The k-th block of a thread: the index of its first marking, how many, and which of the finds is the first if they
+    /// are its own.
+    fn block(self, work: &Work<'_>, id: usize, k: usize) -> Option<(usize, usize, Option<usize>)> {
+        match self {
+            Share::Dealt => work.open.get(2 * k + id).map(|&(first, end)| (first, end - first, None)),
+            Share::Own { from, base, counts } => {
+                let i = k * BLOCK;
+                let count = counts[id].checked_sub(i).filter(|&left| left > 0)?.min(BLOCK);
+                Some((base + place(counts, id, i), count, Some(from + i)))
+            }
+        }
+    }
+}
+
+/// The number in a level of the i-th marking that a thread has found of it: in turn a block of each, then what one and the
+/// other have more.
+fn place(counts: [usize; 2], id: usize, i: usize) -> usize {
+    let even = counts[0].min(counts[1]) / BLOCK * BLOCK;
+    if i < even {
+        return (i / BLOCK * 2 + id) * BLOCK + i % BLOCK;
+    }
+    i + even + if id == 1 { counts[0] - even } else { 0 }
 }
 
 /// Records end to end.
@@ -36,19 +84,18 @@ struct Records {
     len: usize,
 }
 
-/// What one thread sends another once a round.
-struct Parcel {
-    records: Records,
-    /// Whether the sender has expanded all its share.
-    done: bool,
-    end: Option<End>,
-    found: Found,
+/// What one thread sends another.
+enum Message {
+    /// The records of a round; the last of a level or not, and why the sender must end.
+    Parcel { records: Records, last: bool, end: Option<End>, found: Found },
+    /// All parcels are filed: what was found of the next level, why the sender must end, and whether he would go on.
+    Filed { count: usize, end: Option<End>, go_on: bool },
 }
 
 /// The ends of the channels of one thread, to and from the other.
 pub(crate) struct Port {
-    to: Sender<Parcel>,
-    from: Receiver<Parcel>,
+    to: Sender<Message>,
+    from: Receiver<Message>,
 }
 
 impl Port {
@@ -57,13 +104,30 @@ impl Port {
         let ((a, to_a), (b, to_b)) = (channel(), channel());
         [Port { to: b, from: to_a }, Port { to: a, from: to_b }]
     }
+
+    /// Who has panicked receives nothing more; that comes out where he is joined.
+    fn send(&self, message: Message) {
+        let _ = self.to.send(message);
+    }
+
+    fn receive(&self) -> Result<Message, RecvError> {
+        for _ in 0..LOOKS {
+            match self.from.try_recv() {
+                Ok(message) => return Ok(message),
+                Err(TryRecvError::Disconnected) => return Err(RecvError),
+                Err(TryRecvError::Empty) => spin_loop(),
+            }
+        }
+        self.from.recv()
+    }
 }
 
 /// A thread: what it found in this level, and what it counted in all of them.
 pub(crate) struct Member {
     pub(crate) finds: Finds,
-    /// Blocks of the level that were expanded.
-    pub(crate) blocks: usize,
+    /// What of the last level is its, and how many blocks of that were expanded.
+    share: Share,
+    blocks: usize,
     pub(crate) edges: u64,
     pub(crate) fired: Vec<u64>,
     pub(crate) contacts: Vec<u64>,
@@ -86,6 +150,7 @@ impl Member {
         let count = net.transitions.len();
         Member {
             finds: Finds::new(id, net.words),
+            share: Share::Dealt,
             blocks: 0,
             edges: 0,
             fired: vec![0; count],
@@ -101,48 +166,83 @@ impl Member {
         }
     }
 
-    /// Works on the level until it is done or somebody cannot go on; why it ended.
+    /// Works until there is nothing to go on with or somebody cannot go on; why it ended.
     pub(crate) fn work<W: Width>(
         &mut self,
         width: W,
-        level: &Level<'_>,
+        work: &Work<'_>,
         half: &mut impl Half<W>,
         port: &Port,
         mut watch: Option<&mut Watch<'_>>,
     ) -> Option<End> {
-        let mut other = Found::default();
-        let mut before: Option<(bool, Option<End>)> = None;
+        self.share = Share::Dealt;
+        let (mut from, mut base) = (0, work.base);
         loop {
-            if self.finds.end.is_none() {
-                self.round(width, level, half, watch.as_deref_mut());
+            self.blocks = 0;
+            // Who is left alone by a panic ends as if all were done; that comes out where the other is joined.
+            let ended = self.level(width, work, half, port, watch.as_deref_mut()).ok()?;
+            let count = self.finds.fresh.len() - from;
+            let go_on = work.free.load(Ordering::Relaxed);
+            port.send(Message::Filed { count, end: self.finds.end, go_on });
+            let Message::Filed { count: others, end, go_on: also } = port.receive().ok()? else {
+                unreachable!("a thread says last that all is filed")
+            };
+            let ended = ended.max(end).max(self.finds.end);
+            self.finds.levels.push(count);
+            if ended.is_some() || !go_on || !also || work.go_on.is_none_or(|least| count + others < least) {
+                return ended;
             }
-            let found = Found { markings: self.finds.fresh.len() as u64, edges: self.edges };
-            let now = (self.is_done(level), self.finds.end);
-            let records = std::mem::replace(&mut self.theirs, self.spare.pop().unwrap_or_default());
-            // Who has panicked receives nothing more; that comes out where he is joined.
-            let _ = port.to.send(Parcel { records, done: now.0, end: now.1, found });
-            if let Some((done, end)) = before {
-                let parcel = port.from.recv().ok()?;
-                let (done, end) = (done && parcel.done, end.max(parcel.end));
-                other = parcel.found;
-                self.receive(width, half, parcel.records);
-                if done || end.is_some() {
-                    // What is on its way was counted already.
-                    let last = port.from.recv().ok()?;
-                    self.receive(width, half, last.records);
-                    return end.max(last.end).max(self.finds.end);
-                }
-            }
-            before = Some(now);
-            if let Some(watch) = &mut watch {
-                watch.found.markings = level.before.markings + found.markings + other.markings;
-                watch.found.edges = level.before.edges + found.edges + other.edges;
-            }
+            let counts = if self.finds.id == 0 { [count, others] } else { [others, count] };
+            self.share = Share::Own { from, base, counts };
+            from += count;
+            base += count + others;
         }
     }
 
-    fn is_done(&self, level: &Level<'_>) -> bool {
-        level.start + (2 * self.blocks + self.finds.id) * BLOCK >= level.end
+    /// Expands its share of a level, as long as nobody must end, and files all that is its; why the other must end.
+    fn level<W: Width>(
+        &mut self,
+        width: W,
+        work: &Work<'_>,
+        half: &mut impl Half<W>,
+        port: &Port,
+        mut watch: Option<&mut Watch<'_>>,
+    ) -> Result<Option<End>, RecvError> {
+        let (mut sent, mut read) = (0, 0);
+        let (mut is_last, mut was_last, mut its_end) = (false, false, None);
+        while !is_last || !was_last {
+            if !is_last {
+                if self.finds.end.is_none() && its_end.is_none() {
+                    self.round(width, work, half, watch.as_deref_mut());
+                }
+                let done = self.share.block(work, self.finds.id, self.blocks).is_none();
+                is_last = done || self.finds.end.is_some() || its_end.is_some();
+                let found = Found { markings: self.finds.fresh.len() as u64, edges: self.edges };
+                let records = std::mem::replace(&mut self.theirs, self.spare.pop().unwrap_or_default());
+                port.send(Message::Parcel { records, last: is_last, end: self.finds.end, found });
+                sent += 1;
+            }
+            while !was_last && (is_last || read + 1 < sent) {
+                let Message::Parcel { records, last, end, found: other } = port.receive()? else {
+                    unreachable!("a thread says that all is filed after its last parcel")
+                };
+                self.receive(width, half, records);
+                (was_last, its_end) = (last, its_end.max(end));
+                read += 1;
+                if let Some(watch) = &mut watch {
+                    watch.found.markings = work.before.markings + self.finds.fresh.len() as u64 + other.markings;
+                    watch.found.edges = work.before.edges + self.edges + other.edges;
+                }
+            }
+        }
+        Ok(its_end)
+    }
+
+    /// The ranges of indexes that it has to expand and has not.
+    pub(crate) fn left<'a>(&'a self, work: &'a Work<'_>) -> impl Iterator<Item = (usize, usize)> + 'a {
+        (self.blocks..)
+            .map_while(|k| self.share.block(work, self.finds.id, k))
+            .map(|(first, count, _)| (first, first + count))
     }
 
     /// Files what the other sent, and keeps its buffer.
@@ -156,20 +256,21 @@ impl Member {
     fn round<W: Width>(
         &mut self,
         width: W,
-        level: &Level<'_>,
+        work: &Work<'_>,
         half: &mut impl Half<W>,
         mut watch: Option<&mut Watch<'_>>,
     ) {
         let first = self.edges;
-        while self.finds.end.is_none() && !self.is_done(level) && self.edges - first < ROUND_EDGES {
+        while self.finds.end.is_none() && self.edges - first < ROUND_EDGES {
+            let Some(block) = self.share.block(work, self.finds.id, self.blocks) else { break };
             let before = self.edges;
-            if let Err(stop) = self.expand(width, level, half) {
+            if let Err(stop) = self.expand(width, work, half, block) {
                 debug_assert_eq!(stop, Stop::Memory);
                 self.finds.end(End::Short);
                 break;
             }
             if let Some(watch) = &mut watch
-                && let Err(stop) = watch.tick(BLOCK + (self.edges - before) as usize + level.net.transitions.len())
+                && let Err(stop) = watch.tick(BLOCK + (self.edges - before) as usize + work.net.transitions.len())
             {
                 self.finds.end(End::Stopped(stop));
             }
@@ -178,12 +279,17 @@ impl Member {
     }
 
     /// Expands one block, unless there is no memory for what it gives.
-    fn expand<W: Width>(&mut self, width: W, level: &Level<'_>, half: &mut impl Half<W>) -> Result<(), Stop> {
-        let (net, words) = (level.net, width.words());
-        let first = level.start + (2 * self.blocks + self.finds.id) * BLOCK;
-        let end = level.end.min(first + BLOCK);
+    fn expand<W: Width>(
+        &mut self,
+        width: W,
+        work: &Work<'_>,
+        half: &mut impl Half<W>,
+        (first, count, own): (usize, usize, Option<usize>),
+    ) -> Result<(), Stop> {
+        let (net, words) = (work.net, width.words());
+        let (all, at) = own.map_or((work.old, first), |own| (self.finds.fresh.all(), own));
         self.batch.markings.clear();
-        self.batch.markings.extend_from_slice(&level.old[first * words..end * words]);
+        self.batch.markings.extend_from_slice(&all[at * words..(at + count) * words]);
         half.cut(width, &mut self.batch);
         self.firing.clear();
         self.contact.clear();

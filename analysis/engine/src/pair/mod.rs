@@ -2,29 +2,30 @@
 //!
 //! The slots of the table are cut in two by the highest bit of the hash: only its owner reads and writes a half. The
 //! markings of a level are dealt out 64 by 64; each thread expands its share, looks up the successors whose hash is its
-//! own, and hands the others over in a large buffer, once a round (`member.rs`). Rounds are measured in edges, not in
-//! time, and each thread reads what it gets in the order of the rounds; so what a thread finds, and in which order, is a
-//! function of the net and the budget.
+//! own, and hands the others over in a buffer, once a round (`member.rs`). Rounds are measured in edges, not in time, and
+//! each thread reads what it gets in the order of the rounds; so what a thread finds, and in which order, is a function
+//! of the net and the budget.
 //!
-//! Indexes stay one numbering by levels. A thread that finds its i-th marking of a level numbers it as if both threads
-//! found equally many, 64 in turn. At the end of the level the markings are laid into the array in that order; only those
-//! by which one thread has found more than the other move, and their slots are corrected. What probes past the end of a
-//! half, a handful of markings, is kept until then too. So nothing is atomic, and whoever asks the space afterwards sees
-//! the array and the slots that one thread would leave, in another order within the levels.
+//! The share of the next level is then what a thread has found itself: the threads tell each other how much that is, and go
+//! on until the table is full or levels get small. So to start a thread, which takes a tenth of a millisecond, is not the
+//! price of a level but of a growth.
+//!
+//! Indexes stay one numbering by levels: in each level 64 of one thread, 64 of the other, in turn, then what one has found
+//! more. Both know the index of whatever they expand from how much both have found. When they end, the markings are laid
+//! into the array in that order. So nothing is atomic, and whoever asks the space afterwards sees the array and the slots
+//! that one thread would leave, in another order within the levels. The slots of a set of hashes say indexes, so there a
+//! thread numbers its i-th find as if both found equally many; that is put right after each level, and the threads are
+//! started anew.
 //!
 //! Small levels, and the last of a budget, are left to one thread: the two share out what memory and markings there are,
 //! and the first who has used up his share ends it. Rejected: slots claimed by compare-and-swap, both threads in one
 //! table. That saves the buffers but numbers the markings by who came first, so that the witnesses of one net differ from
 //! day to day; to sort each level afterwards costs more than the buffers.
 //!
-//! What that gains was looked into on two processors that were mostly quiet. Two programs of bare random inserts that
-//! share nothing take each a sixth longer than one alone, on the mean, so 1.7 times as quick is about all that is to be had
-//! (`benchmarks/explicit.py` measures it beside). Where the system puts both threads on one processor, they take together
-//! about a tenth more processor time than one thread; on two, 1.15 to 1.5 times as much, a seventh and more of it in the
-//! kernel. So it is less the records that cost than waiting, and what the caches share. To start and join a thread takes a
-//! tenth of a millisecond and to wake one that waits a hundredth or more, so a net with many levels of a millisecond
-//! gains least. Tried in vain: to spin before waiting, and rounds of a quarter or of four times the edges. Not tried:
-//! threads that go on from level to level, each with what it found itself, until the table grows.
+//! What is left between this and twice as quick, by profiles of a net with levels of ten thousand markings: two threads
+//! take a seventh more instructions than one, each waits a tenth of its time for the other, growth starts threads, and one
+//! of them alone lays markings down. Two explorations that share nothing, at once, are 1.7 to 1.95 times as quick as one
+//! after the other, so that is about all there is to be had.
 
 mod half;
 mod hashed;
@@ -42,11 +43,13 @@ use crate::marking::Width;
 use crate::net::Net;
 use crate::table::NONE;
 pub(crate) use half::Shared;
-use half::{BLOCK, End};
-use member::{Level, Member, Port};
+use half::{BLOCK, End, Finds};
+use member::{Member, Port, Work};
 
 /// Markings below which a level is not worth the starting of threads.
 pub(crate) const LEVEL_LEAST: usize = 1 << 12;
+/// Markings below which threads that are at it go on to a level no more.
+const GO_ON_LEAST: usize = 1 << 9;
 /// Bytes that the array of markings may claim beyond what it holds.
 const ROUNDING_BYTES: usize = 1 << 22;
 
@@ -73,22 +76,26 @@ impl Pair {
         !self.retired && markings >= self.level_least && self.free.load(Ordering::Relaxed)
     }
 
-    /// Expands a level; returns what the budgets leave of it, as ranges of indexes.
-    pub(crate) fn expand<W: Width>(
+    /// Expands a level, and those after it as long as that is worth it; returns what the budgets leave of the last one, as
+    /// ranges of indexes, and where it ends.
+    pub(crate) fn expand<W: Width, S: Shared<W>>(
         &mut self,
         width: W,
         space: &mut Space,
-        set: &mut impl Shared<W>,
+        set: &mut S,
         start: usize,
         max: usize,
         watch: &mut Watch<'_>,
-    ) -> Result<Vec<(usize, usize)>, Stop> {
-        let end = space.table.store.len();
-        self.members.iter_mut().for_each(|member| member.blocks = 0);
+    ) -> Result<(Vec<(usize, usize)>, usize), Stop> {
+        let mut end = space.table.store.len();
+        let mut open: Vec<_> = (start..end).step_by(BLOCK).map(|first| (first, end.min(first + BLOCK))).collect();
+        // Of a level that is taken up again, what was found before stands in the array, and nobody has it for himself.
+        let mut go_on = S::GOES_ON.then_some(self.level_least.min(GO_ON_LEAST));
         loop {
-            let worst = self.work(width, space, set, (start, end), max, watch);
+            let worst;
+            (open, worst) = self.work(width, space, set, (&open, go_on), max, watch);
             space.edges += self.members.iter_mut().map(|member| std::mem::take(&mut member.edges)).sum::<u64>();
-            self.lay_down(width, space, set, max)?;
+            end = self.lay_down(width, space, set, max, watch)?.unwrap_or(end);
             match worst {
                 Some(End::Stopped(stop)) => return Err(stop),
                 // Whether there is really no memory, one thread will find out.
@@ -100,21 +107,23 @@ impl Pair {
                 set.insert_left(width, space, &std::mem::take(&mut member.finds.left), max, watch)?;
             }
             if worst.is_none() || self.retired {
-                return Ok(self.rest(start, end));
+                return Ok((open, end));
             }
+            go_on = None;
         }
     }
 
-    /// Lets both members work until the level is done or one of them cannot go on.
+    /// Lets both members work until there is nothing to go on with or one of them cannot; what is left of the last level, and
+    /// why they ended.
     fn work<W: Width>(
         &mut self,
         width: W,
         space: &mut Space,
         set: &mut impl Shared<W>,
-        (start, end): (usize, usize),
+        (open, go_on): (&[(usize, usize)], Option<usize>),
         max: usize,
         watch: &mut Watch<'_>,
-    ) -> Option<End> {
+    ) -> (Vec<(usize, usize)>, Option<End>) {
         // What is found is held twice for a moment, by its member and in the array.
         let free = (space.memory.limit() - space.memory.used()).saturating_sub(ROUNDING_BYTES);
         let base = space.table.store.len();
@@ -123,50 +132,39 @@ impl Pair {
         }
         let (store, [mut low, mut high]) = set.halves(&mut space.table);
         let before = Found { markings: base as u64, edges: space.edges };
-        let level = Level { net: &space.net, old: store.all(), start, end, before };
+        let work = Work { net: &space.net, old: store.all(), open, base, go_on, free: &self.free, before };
         let [here, there] = &mut self.members;
         let [port, its_port] = Port::both();
-        thread::scope(|scope| {
-            let level = &level;
-            let work = move || there.work(width, level, &mut high, &its_port, None);
+        let worst = thread::scope(|scope| {
+            let work = &work;
+            let all = move || there.work(width, work, &mut high, &its_port, None);
             // Where the system has no thread to give, one does it all.
-            let Ok(its) = thread::Builder::new().spawn_scoped(scope, work) else { return Some(End::Short) };
-            let end = here.work(width, level, &mut low, &port, Some(watch));
+            let its = thread::Builder::new().spawn_scoped(scope, all).ok()?;
+            let end = here.work(width, work, &mut low, &port, Some(watch));
             drop(port);
-            end.max(its.join().unwrap_or_else(|panic| resume_unwind(panic)))
-        })
+            Some(end.max(its.join().unwrap_or_else(|panic| resume_unwind(panic))))
+        });
+        let Some(worst) = worst else { return (open.to_vec(), Some(End::Short)) };
+        let mut left: Vec<_> = self.members.iter().flat_map(|member| member.left(&work)).collect();
+        left.sort_unstable();
+        (left, worst)
     }
 
-    /// Appends to the array what the members found.
+    /// Appends to the array what the members found; where the last of the levels that they expanded ends, if these are many.
     fn lay_down<W: Width>(
         &mut self,
         width: W,
         space: &mut Space,
         set: &mut impl Shared<W>,
         max: usize,
-    ) -> Result<(), Stop> {
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<usize>, Stop> {
         let [a, b] = &mut self.members;
         let held = a.finds.memory.used() + b.finds.memory.used();
         space.memory.claim(held.saturating_sub(self.claimed))?;
         self.claimed = self.claimed.max(held);
-        let even = a.finds.fresh.len().min(b.finds.fresh.len()) / BLOCK;
-        let mut append = || {
-            set.renumber(width, space, [&a.finds, &b.finds], even)?;
-            let words = width.words();
-            let store = &mut space.table.store;
-            for block in 0..even {
-                for of in [&a.finds, &b.finds] {
-                    let markings = &of.fresh.all()[BLOCK * block * words..BLOCK * (block + 1) * words];
-                    store.append(markings, max, &space.memory)?;
-                }
-            }
-            for of in [&a.finds, &b.finds] {
-                let markings = &of.fresh.all()[BLOCK * even * words..of.fresh.len() * words];
-                store.append(markings, max, &space.memory)?;
-            }
-            Ok(())
-        };
-        let result = append();
+        let result = set.complete(width, space, [&a.finds, &b.finds], watch);
+        let result = result.and_then(|()| append(space, [&a.finds, &b.finds], max));
         if result.is_err() {
             // The set says more than the array holds, which is still a prefix.
             set.forget_others(width, space);
@@ -174,13 +172,6 @@ impl Pair {
         a.finds.fresh.clear();
         b.finds.fresh.clear();
         result
-    }
-
-    /// What the members have not expanded of a level.
-    fn rest(&self, start: usize, end: usize) -> Vec<(usize, usize)> {
-        let blocks = (start..end).step_by(BLOCK).enumerate();
-        let open = blocks.filter(|(block, _)| block / 2 >= self.members[block % 2].blocks);
-        open.map(|(_, first)| (first, end.min(first + BLOCK))).collect()
     }
 
     /// Adds what the members counted to the counts of the space.
@@ -202,6 +193,32 @@ impl Pair {
         space.deadlocks.sort_unstable();
         Ok(())
     }
+}
+
+/// Appends to the array the finds of each level: in turn a block of each thread, then what one and the other have more.
+fn append(space: &mut Space, finds: [&Finds; 2], max: usize) -> Result<Option<usize>, Stop> {
+    let words = space.net.words;
+    let mut all = finds.map(|of| of.fresh.all());
+    let mut end = None;
+    for (&a, &b) in finds[0].levels.iter().zip(&finds[1].levels) {
+        if let Some(begun) = end {
+            space.memory.push(&mut space.levels, begun as u32)?;
+        }
+        end = Some(space.table.store.len());
+        let even = a.min(b) / BLOCK;
+        let mut lay = |of: usize, count: usize| {
+            let (markings, rest) = all[of].split_at(count * words);
+            all[of] = rest;
+            space.table.store.append(markings, max, &space.memory)
+        };
+        for _ in 0..even {
+            lay(0, BLOCK)?;
+            lay(1, BLOCK)?;
+        }
+        lay(0, a - BLOCK * even)?;
+        lay(1, b - BLOCK * even)?;
+    }
+    Ok(end.filter(|_| finds[0].levels.len() > 1))
 }
 
 #[cfg(test)]
