@@ -20,7 +20,7 @@ from typing import Final
 
 from firable.cli.timeline.axis import Axis, axis
 from firable.cli.timeline.lanes import lanes, taking_part
-from firable.nets.drawing.layout import local_name
+from firable.nets.drawing.labels import local_name
 from firable.nets.drawing.text import COMMAND, NAME, NOTE, width_of
 from firable.nets.drawing.xml import esc, ident, px
 from firable.semantics.course import Course, Stay

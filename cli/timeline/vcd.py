@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from firable.cli.timeline.lanes import lane_of
-from firable.nets.drawing.layout import local_name
+from firable.nets.drawing.labels import local_name
 from firable.semantics.course import Course
 
 NOT_CARRIED: Final = (

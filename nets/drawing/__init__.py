@@ -2,10 +2,19 @@
 
 `draw_net` is the way in. `rows` orders the transitions, `layout` gives everything its place, `svg` writes it down.
 `draw_markings` draws a `MarkingGraph` of markings and `Step`s, placed by `layered` or another layouter.
+`draw_coordinator` draws a `Decomposition`: who decides what over whom; `draw_strip` a run by its `Frame`s.
 """
 
 from firable.nets.drawing.layered import layered
 from firable.nets.drawing.marking_graph import MarkingGraph, Step, draw_markings
+from firable.nets.drawing.sheet import NODES_MAX
 from firable.nets.drawing.svg import draw_net
 
-__all__ = ["MarkingGraph", "Step", "draw_markings", "draw_net", "layered"]
+__all__ = [
+    "NODES_MAX",
+    "MarkingGraph",
+    "Step",
+    "draw_markings",
+    "draw_net",
+    "layered",
+]

@@ -12,11 +12,17 @@ without controllers, and the worse one for a cell, where "who takes part in this
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import permutations
+from types import MappingProxyType
 from typing import Final
 
+from firable.nets.drawing.arrangement import Arrangement, Owner
+from firable.nets.drawing.folding import taking_part
+from firable.nets.drawing.labels import local_name, place_words, transition_words
 from firable.nets.drawing.rows import lane_order, rows_of
 from firable.nets.drawing.shapes import (
     BAR_HALF_WIDTH,
@@ -31,15 +37,15 @@ from firable.nets.drawing.shapes import (
     Spot,
     Stub,
 )
-from firable.nets.drawing.text import COMMAND, NAME, NOTE, Style, width_of, wrapped
-from firable.nets.net import ExternalGate, Net, Place
-from firable.nets.time_limits import format_time
+from firable.nets.drawing.text import COMMAND, NAME, NOTE, Words, width_of
+from firable.nets.net import ExternalGate, Net
 
+FREE: Final = Arrangement()
+"""An arrangement in which nothing is settled."""
 _BYPASS_HALF_WIDTH: Final = 5.0
 _ROW_HEIGHT: Final = 94.0
 _EMPTY_ROW_HEIGHT: Final = 56.0
 _EDGE_ROW_HEIGHT: Final = 34.0
-_NOTE_CHARACTERS: Final = 22
 _LANE_GAP: Final = 14.0
 _LANE_PADDING: Final = 14.0
 _HEADER_HEIGHT: Final = 52.0
@@ -48,23 +54,24 @@ _MARGIN: Final = 24.0
 _TRACKS_PERMUTED_MAX: Final = 5
 
 
-def local_name(name: str, owner: str | None) -> str:
-    """The name without its owner, as it stands in the box of the owner."""
-    return name.removeprefix(f"{owner}.") if owner else name
+def layout(net: Net, given: Arrangement = FREE, members: Mapping[str, Sequence[str]] = MappingProxyType({})) -> Layout:
+    """Lay out a net; the same net, arranged in the same way, always gets the same layout.
+
+    `members` are the places inside each macro place.
+    """
+    return _Layouter(net, given, members).layout()
 
 
-def label_lines(place: Place) -> list[tuple[str, Style]]:
-    """What stands beside a place: its name, and below it the command, or else the description."""
-    lines = [(local_name(place.name, place.owner), NAME)]
-    if place.command is not None:
-        limit = [] if place.within is None else [(f"within {format_time(place.within.milliseconds)}", NOTE)]
-        return [*lines, (str(place.command), COMMAND), *limit]
-    return [*lines, *((line, NOTE) for line in wrapped(place.description, _NOTE_CHARACTERS))]
-
-
-def layout(net: Net) -> Layout:
-    """Lay out a net; the same net always gets the same layout."""
-    return _Layouter(net).layout()
+def arranged(net: Net, given: Arrangement = FREE) -> Arrangement:
+    """How a net is laid out, as an arrangement: what a layout file keeps, and what other pictures of the net follow."""
+    laid = _Layouter(net, given, {})
+    tracks: dict[Owner, list[tuple[str, ...]]] = {owner: [] for owner in laid.owners}
+    for lane, places in zip(laid.lane_of_track, laid.tracks, strict=True):
+        if places:
+            tracks[laid.owners[lane]].append(tuple(net.places[p].name for p in places))
+    rows = {t.name: float(row) for t, row in zip(net.transitions, laid.rows, strict=True)}
+    participants = {t.name: laid.taking[i] for i, t in enumerate(net.transitions)}
+    return Arrangement(tuple(laid.owners), rows, {owner: tuple(some) for owner, some in tracks.items()}, participants)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,19 +87,26 @@ class _Gate:
 class _Layouter:
     """The steps of the layout, each using those before it."""
 
-    def __init__(self, net: Net) -> None:
-        self.net = net
+    def __init__(self, net: Net, given: Arrangement, members: Mapping[str, Sequence[str]]) -> None:
+        self.net, self.given, self.members = net, given, members
         owned = {place.owner for place in net.places} | {signal.owner for signal in net.signals}
-        self.owners: list[str | None] = [c.name for c in net.controllers if c.name in owned]
+        self.owners: list[Owner] = [c.name for c in net.controllers if c.name in owned]
         if None in owned or not self.owners:
             self.owners.append(None)
-        participants = [self._participants(t) for t in range(len(net.transitions))]
-        order = lane_order(participants, len(self.owners))
+        taking = self.taking = [self._taking(t) for t in range(len(net.transitions))]
+        self.is_global = [len(owners) > 1 for owners in taking]
+        self.elsewhere = [sorted(str(owner) for owner in owners.difference(self.owners)) for owners in taking]
+        participants = [
+            frozenset(self.owners.index(owner) for owner in owners if owner in self.owners) or frozenset({0})
+            for owners in taking
+        ]
+        order = self._order(participants)
         self.owners = [self.owners[lane] for lane in order]
         position = {lane: i for i, lane in enumerate(order)}
         self.participants = [frozenset(position[lane] for lane in lanes) for lanes in participants]
-        self.rows = rows_of(net, [(min(lanes), max(lanes)) for lanes in self.participants])
+        self.rows = rows_of(net, [(min(lanes), max(lanes)) for lanes in self.participants], given.rows)
         self.row_count = max(self.rows, default=0)
+        self.in_margin = self._in_margin()
         self.incident = self._incident()
         self.gaps = [self._gap(edges) for edges in self.incident]
         self.tracks = self._tracks()
@@ -102,15 +116,36 @@ class _Layouter:
         for p, edges in enumerate(self.incident):
             for t, _ in edges:
                 self.attached[t].add(self.track_of[p])
-        for tracks in self.attached:
+        for t, tracks in enumerate(self.attached):
             if not tracks:
-                tracks.add(self._spare(0))
+                tracks.add(self._spare(min(self.participants[t])))
 
-    def _participants(self, t: int) -> frozenset[int]:
+    def _taking(self, t: int) -> frozenset[Owner]:
+        """Who takes part in a transition: by its arcs and gates, unless it is given."""
         transition, net = self.net.transitions[t], self.net
-        places = (*transition.inputs, *transition.outputs, *transition.permissive, *transition.inhibitive)
-        owners = {net.place(name).owner for name in places} | {net.signal(g.signal).owner for g in transition.external}
-        return frozenset(self.owners.index(owner) for owner in owners) or frozenset({0})
+        if transition.name in self.given.participants:
+            return self.given.participants[transition.name]
+        return taking_part(net, transition)
+
+    def _order(self, participants: Sequence[frozenset[int]]) -> tuple[int, ...]:
+        """The lanes in the order that is given, and behind them those that are new."""
+        known = [owner for owner in self.given.lanes if owner in self.owners]
+        if not known:
+            return lane_order(participants, len(self.owners))
+        return tuple(map(self.owners.index, [*known, *(owner for owner in self.owners if owner not in known)]))
+
+    def _place_words(self, p: int) -> Words:
+        place = self.net.places[p]
+        return place_words(place, self.members.get(place.name, ()))
+
+    def _words(self, t: int) -> Words:
+        return transition_words(self.net.transitions[t], self.elsewhere[t], in_margin=t in self.in_margin)
+
+    def _in_margin(self) -> frozenset[int]:
+        """The global transitions whose words stand in the margin: those that have a row to themselves there."""
+        wide = [t for t, is_global in enumerate(self.is_global) if is_global]
+        there = Counter(self.rows[t] for t in wide)
+        return frozenset(t for t in wide if there[self.rows[t]] == 1)
 
     def _incident(self) -> list[list[tuple[int, Kind]]]:
         found: list[list[tuple[int, Kind]]] = [[] for _ in self.net.places]
@@ -146,9 +181,10 @@ class _Layouter:
         tracks: list[list[int]] = []
         self.lane_of_track: list[int] = []
         for lane, owner in enumerate(self.owners):
-            mine = [p for p, place in enumerate(self.net.places) if place.owner == owner]
+            here = self._kept_tracks(owner)
+            settled = {p for track in here for p in track}
+            mine = [p for p, place in enumerate(self.net.places) if place.owner == owner and p not in settled]
             mine.sort(key=lambda p: (self._extent(p)[1] - self._extent(p)[0], self._extent(p)[0], p))
-            here: list[list[int]] = []
             for p in mine:
                 free = (track for track in here if not any(self._overlap(p, other) for other in track))
                 track = next(free, None)
@@ -166,6 +202,18 @@ class _Layouter:
                 ordered.insert(last + 1, [])
                 self.lane_of_track.insert(last + 1, lane)
         return ordered
+
+    def _kept_tracks(self, owner: Owner) -> list[list[int]]:
+        """The tracks that are given, without the places that would meet others there by now."""
+        found: list[list[int]] = []
+        index = self.net.place_index
+        for names in self.given.tracks.get(owner, ()):
+            track: list[int] = []
+            for p in (index[name] for name in names if name in index and self.net.places[index[name]].owner == owner):
+                if not any(self._overlap(p, other) for other in track):
+                    track.append(p)
+            found += [track] if track else []
+        return found
 
     def _lanes_with_bare_parts(self) -> set[int]:
         """The lanes in which a transition has a part but no place: such a part gets a track without places."""
@@ -188,23 +236,25 @@ class _Layouter:
         order = list(range(len(tracks)))
         for lane in range(len(self.owners)):
             mine = [i for i, track in enumerate(order) if self.lane_of_track[track] == lane]
-            if not 1 < len(mine) <= _TRACKS_PERMUTED_MAX:
+            if not 1 < len(mine) <= _TRACKS_PERMUTED_MAX or self.owners[lane] in self.given.tracks:
                 continue
             first, last = mine[0], mine[-1] + 1
             candidates = ([*order[:first], *some, *order[last:]] for some in permutations(order[first:last]))
-            order = min(candidates, key=lambda some: self._crossings(some, tracks))
+            here = [p for track in order[first:last] for p in tracks[track]]
+            order = min(candidates, key=partial(self._crossings, tracks=tracks, here=here))
         return [tracks[track] for track in order]
 
-    def _crossings(self, order: Sequence[int], tracks: Sequence[Sequence[int]]) -> int:
+    def _crossings(self, order: Sequence[int], tracks: Sequence[Sequence[int]], here: Sequence[int]) -> int:
+        """How many bars the edges of the places of one lane cross; to the others its order makes no difference."""
         position = {p: i for i, track in enumerate(order) for p in tracks[track]}
         reach: dict[int, list[int]] = {}
         for p, edges in enumerate(self.incident):
             for t, _ in edges:
                 reach.setdefault(t, []).append(position[p])
         crossings = 0
-        for p, edges in enumerate(self.incident):
+        for p in here:
             first, last = self._extent(p)
-            touched = {t for t, _ in edges}
+            touched = {t for t, _ in self.incident[p]}
             crossings += sum(
                 first < self.rows[t] < last and min(at) < position[p] < max(at)
                 for t, at in reach.items()
@@ -223,8 +273,13 @@ class _Layouter:
         bypass = self._bypasses()
         lanes, centre, margin, width = self._columns(bypass)
         places = tuple(
-            Spot(centre[self.track_of[p]], (y_of_row[self.gaps[p]] + y_of_row[self.gaps[p] + 1]) / 2)
-            for p in range(len(net.places))
+            Spot(
+                centre[self.track_of[p]],
+                (y_of_row[self.gaps[p]] + y_of_row[self.gaps[p] + 1]) / 2,
+                self._place_words(p),
+                place.name in self.members,
+            )
+            for p, place in enumerate(net.places)
         )
         edges = tuple(
             Edge(p, t, kind, places[p].x - (BYPASS_FIRST + (n - 1) * BYPASS_STEP if n else 0.0), n)
@@ -261,18 +316,18 @@ class _Layouter:
             track = self.track_of[p]
             extra = 12 if place.command else 0
             widest = max(
-                width_of(text, style) + (extra if style is COMMAND else 0) for text, style in label_lines(place)
+                width_of(text, style) + (extra if style is COMMAND else 0) for text, style in self._place_words(p)
             )
             right[track] = max(right[track], LABEL_LEFT + widest)
         for gate in (gate for gates in self.gates for gate in gates):
             right[gate.track] = max(right[gate.track], BAR_HALF_WIDTH + 14 + width_of(gate.label, COMMAND))
+        wide = self.in_margin
         for t in range(len(net.transitions)):
-            if len(self.participants[t]) == 1:
+            if t not in wide:
                 track = max(self.attached[t])
-                lines = transition_lines(net, t, is_global=False)
+                lines = self._words(t)
                 right[track] = max(right[track], BAR_HALF_WIDTH + 8 + max(width_of(*line) for line in lines))
-        wide = [t for t, lanes in enumerate(self.participants) if len(lanes) > 1]
-        margin = max((width_of(*line) for t in wide for line in transition_lines(net, t, is_global=True)), default=0.0)
+        margin = max((width_of(*line) for t in wide for line in self._words(t)), default=0.0)
         x = _MARGIN + (margin + 24 if wide else 0.0)
         lanes, centre = [], []
         for lane, owner in enumerate(self.owners):
@@ -334,17 +389,9 @@ class _Layouter:
             else:
                 segments.append((start, end))
             last = track
-        return Bar(y, tuple(segments), len(self.participants[t]) > 1)
+        return Bar(y, tuple(segments), self.is_global[t], t in self.in_margin, self._words(t))
 
     def _passes(self, edge: Edge, row: int) -> bool:
         """Whether the line of an edge passes a row without ending there."""
         end, gap = self.rows[edge.transition], self.gaps[edge.place]
         return gap < row < end if end > gap else end < row <= gap
-
-
-def transition_lines(net: Net, t: int, *, is_global: bool) -> list[tuple[str, Style]]:
-    """What stands beside a transition: its name and its description, in one line where a place follows below."""
-    transition = net.transitions[t]
-    width, lines_max = (_NOTE_CHARACTERS, 2) if is_global else (46, 1)
-    notes = wrapped(transition.description, width, lines_max)
-    return [(transition.name, NAME), *((line, NOTE) for line in notes)]

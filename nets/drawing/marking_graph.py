@@ -6,8 +6,9 @@ have moved. A marking where nothing is different from M0 is M0, so what is not n
 firing; pointing at it tells which tokens it takes and puts. Deadlocks have a double rim and say so; doomed markings,
 from which a deadlock can no longer be avoided, are tinted and say so: no meaning hangs on a colour alone.
 
-Rows are distances from M0, so the row of a marking is the length of its shortest firing sequence. The drawing knows
-nothing of how markings are found; who calls it brings them (`firable.cli.draw` from `firable.analysis`).
+Rows are distances from M0, so the row of a marking is the length of its shortest firing sequence; where a row would be
+wider than a sheet, it goes on in the next, and the markings say how far they are. The drawing knows nothing of how
+markings are found; who calls it brings them (`firable.cli.pictures` from `firable.analysis`).
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from firable.nets.drawing.labels import local_name
 from firable.nets.drawing.layered import Box, Layouter, Link, Point, Route, layered
-from firable.nets.drawing.layout import local_name
+from firable.nets.drawing.sheet import opening
 from firable.nets.drawing.text import NAME, NOTE, Style, width_of, wrapped
 from firable.nets.drawing.xml import esc, head, ident, px
 from firable.nets.net import Marking, Net
@@ -28,12 +30,12 @@ _LINES_MAX: Final = 7
 _FIRINGS_MAX: Final = 4
 _TOP: Final = 72.0
 _MARGIN: Final = 24.0
+_GAP: Final = 18.0
+_WIDTH_MAX: Final = 2400.0
+"""How wide the markings of one distance may stand, in pixels, before they go on in the next row."""
 _FIRING: Final = Style("firing", 11.0, 7.0)
 
 _STYLE: Final = """
-text{font-family:'Helvetica Neue',Arial,'DejaVu Sans',sans-serif;fill:#1d2733}
-.title{font-size:21px;font-weight:700}
-.subtitle{font-size:12.5px;fill:#5b6775}
 .name{font-size:13px;font-weight:600}
 .note{font-size:10.5px;fill:#4c5966}
 .firing{font-size:11px;font-weight:600;paint-order:stroke;stroke:#fff;stroke-width:4px;stroke-linejoin:round}
@@ -94,8 +96,10 @@ class _Writer:
         for step in graph.steps:
             self.fired.setdefault((step.tail, step.head), []).append(step.fired)
         self.joined = [pair for pair in self.fired if pair[0] != pair[1]]
-        depth = self._depths()
-        boxes = [Box(*self._size(texts), depth[i]) for i, texts in enumerate(self.texts)]
+        self.depth = self._depths()
+        rows = self._rows()
+        self.is_wrapped = max(rows, default=0) > max(self.depth, default=0)
+        boxes = [Box(*self._size(texts), rows[i]) for i, texts in enumerate(self.texts)]
         links = [Link(tail, head, *self._size_of_words(tail, head)) for tail, head in self.joined]
         self.boxes, self.where = boxes, layout(boxes, links)
         self.legend = list(self._legend_items())
@@ -118,6 +122,23 @@ class _Writer:
                     queue.append(into)
         deepest = max(depth.values(), default=-1)
         return [depth.get(i, deepest + 1) for i in range(len(self.graph.markings))]
+
+    def _rows(self) -> list[int]:
+        """The row of each marking: its distance from M0, unless so many are so far that their row is too wide."""
+        room = [self._size(texts)[0] for texts in self.texts]
+        below = [0.0] * len(room)
+        for tail, into in self.joined:
+            upper = min(tail, into, key=lambda i: (self.depth[i], i))
+            below[upper] += self._size_of_words(tail, into)[0] + _GAP
+        rows = [0] * len(room)
+        row, last, width = -1, -1, 0.0
+        for i in sorted(range(len(room)), key=lambda i: (self.depth[i], i)):
+            needed = max(room[i] + _GAP, below[i])
+            if self.depth[i] != last or width + needed > _WIDTH_MAX:
+                row, width = row + 1, 0.0
+            last, width = self.depth[i], width + needed
+            rows[i] = row
+        return rows
 
     def _texts(self, i: int) -> Iterator[tuple[str, str]]:
         """The lines in the box of a marking, each as (text, class)."""
@@ -162,16 +183,8 @@ class _Writer:
 
     def lines(self) -> Iterator[str]:
         """The picture, line by line."""
-        width, height = px(self.width), px(self.bottom + 24)
-        yield (
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
-            f'viewBox="0 0 {width} {height}" role="img">'
-        )
-        yield f"<title>{esc(self.net.name)}: reachability graph</title>"
-        yield f"<style>{_STYLE}</style>"
-        yield f'<rect width="{width}" height="{height}" fill="#fff"/>'
-        yield f'<text class="title" x="24" y="34">{esc(self.net.name)}</text>'
-        yield f'<text class="subtitle" x="24" y="53">{esc(self.caption)}</text>'
+        title = f"{self.net.name}: reachability graph"
+        yield from opening(self.width, self.bottom + 24, _STYLE, title, self.net.name, self.caption)
         for pair, route in zip(self.joined, self.where.routes, strict=True):
             yield from self._edge(*pair, route)
         for i in range(len(self.graph.markings)):
@@ -221,7 +234,8 @@ class _Writer:
         left, top = x - box.width / 2, y - box.height / 2
         css = "deadlock" if i in self.graph.deadlocks else "doomed" if i in self.graph.doomed else "marking"
         held = ", ".join(self.net.names(self.graph.markings[i])) or "no token"
-        yield f"<g {ident('marking', str(i))}><title>M{i}: {esc(held)}</title>"
+        far = f", {self.depth[i]} firings from M0" if self.is_wrapped else ""
+        yield f"<g {ident('marking', str(i))}><title>M{i}{far}: {esc(held)}</title>"
         yield from _box("initial" if i == 0 and css == "marking" else css, left, top, box.width, box.height)
         for k, (text, style) in enumerate(self.texts[i]):
             yield (

@@ -11,13 +11,16 @@ wherever that is, so a small change of the net turns the picture around.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import permutations
+from types import MappingProxyType
 from typing import Final
 
 from firable.nets.net import Net
 
 _PERMUTED_MAX: Final = 7
+_GROWN_MAX: Final = 40
 
 Span = tuple[int, int]
 """The first and the last lane that a transition reaches."""
@@ -26,10 +29,13 @@ Span = tuple[int, int]
 def lane_order(participants: Sequence[frozenset[int]], lanes: int) -> tuple[int, ...]:
     """The order of the lanes in which transitions pass over the fewest lanes that take no part in them.
 
-    `participants[t]` are the lanes of transition t. With more than 7 lanes the order is that of the net.
+    `participants[t]` are the lanes of transition t. Of more than 7 lanes the orders tried are that of the net and those
+    that grow from one lane by the lane that leaves the fewest transitions open, which is close to the best.
     """
-    orders = permutations(range(lanes)) if lanes <= _PERMUTED_MAX else iter([tuple(range(lanes))])
     wide = [lanes_of for lanes_of in participants if len(lanes_of) > 1]
+    orders: Iterable[tuple[int, ...]] = permutations(range(lanes))
+    if lanes > _PERMUTED_MAX:
+        orders = (tuple(range(lanes)), *(_grown(wide, lanes, start) for start in range(min(lanes, _GROWN_MAX))))
 
     def passed_over(order: tuple[int, ...]) -> int:
         position = {lane: i for i, lane in enumerate(order)}
@@ -40,22 +46,72 @@ def lane_order(participants: Sequence[frozenset[int]], lanes: int) -> tuple[int,
     return min(orders, key=lambda order: (passed_over(order), order))
 
 
-def rows_of(net: Net, spans: Sequence[Span]) -> tuple[int, ...]:
-    """The row of each transition, from 1: behind what it follows, and beside others only where no lane is shared."""
+def _grown(wide: Sequence[frozenset[int]], lanes: int, start: int) -> tuple[int, ...]:
+    """An order from one lane on: each next one closes the most transitions that are open, and opens the fewest."""
+    of_lane: list[list[int]] = [[] for _ in range(lanes)]
+    missing = [len(lanes_of) for lanes_of in wide]
+    for t, lanes_of in enumerate(wide):
+        for lane in lanes_of:
+            of_lane[lane].append(t)
+    order, rest, since = [start], set(range(lanes)) - {start}, dict.fromkeys(of_lane[start], 0)
+    for t in of_lane[start]:
+        missing[t] -= 1
+
+    def cost(lane: int) -> tuple[int, int, int]:
+        opened = sum(t not in since for t in of_lane[lane])
+        closed = sum(missing[t] == 1 for t in of_lane[lane])
+        oldest = min((since[t] for t in of_lane[lane] if t in since), default=len(order))
+        return opened - closed, oldest, lane
+
+    while rest:
+        lane = min(rest, key=cost)
+        rest.remove(lane)
+        for t in of_lane[lane]:
+            since.setdefault(t, len(order))
+            missing[t] -= 1
+        order.append(lane)
+    return tuple(order)
+
+
+def rows_of(net: Net, spans: Sequence[Span], kept: Mapping[str, float] = MappingProxyType({})) -> tuple[int, ...]:
+    """The row of each transition, from 1: behind what it follows, and beside others only where no lane is shared.
+
+    `kept` are rows that transitions have already, by name, whose order stays; where two of one row share a lane, the
+    second gets a row of its own behind it. What is new gets a row of its own behind what it follows.
+    """
     before = _predecessors(net)
-    depth: list[int] = [0] * len(net.transitions)
-    for t in _topological(before):
-        depth[t] = 1 + max((depth[u] for u in before[t]), default=0)
-    rows = [0] * len(net.transitions)
-    taken: set[tuple[int, int]] = set()
-    for t in sorted(range(len(rows)), key=lambda t: (depth[t], t)):
-        row = 1 + max((rows[u] for u in before[t]), default=0)
+    depth = _depths(before)
+    found: dict[int, float] = {}
+    taken: set[tuple[float, int]] = set()
+
+    def stand(t: int, row: float, step: float) -> None:
         first, last = spans[t]
         while any((row, lane) in taken for lane in range(first, last + 1)):
-            row += 1
-        rows[t] = row
+            # Between two rows of those that are kept there is always room for one more.
+            row = row + 1 if step == 1 else row + (math.floor(row) + 1 - row) / 2
+        found[t] = row
         taken.update((row, lane) for lane in range(first, last + 1))
-    return tuple(rows)
+
+    names = [transition.name for transition in net.transitions]
+    for t in sorted((t for t, name in enumerate(names) if name in kept), key=lambda t: (kept[names[t]], t)):
+        stand(t, kept[names[t]], 0.5)
+    step = 0.5 if found else 1
+    for t in sorted((t for t in range(len(names)) if t not in found), key=lambda t: (depth[t], t)):
+        stand(t, step + max((found[u] for u in before[t] if u in found), default=0), step)
+    rank = {row: i for i, row in enumerate(sorted(set(found.values())), start=1)}
+    return tuple(rank[found[t]] for t in range(len(names)))
+
+
+def depths(net: Net) -> list[int]:
+    """How many transitions lead to each one at least, itself among them, without going around a cycle."""
+    return _depths(_predecessors(net))
+
+
+def _depths(before: Sequence[Sequence[int]]) -> list[int]:
+    depth = [0] * len(before)
+    for t in _topological(before):
+        depth[t] = 1 + max((depth[u] for u in before[t]), default=0)
+    return depth
 
 
 def _predecessors(net: Net) -> list[list[int]]:

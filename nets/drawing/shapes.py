@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from firable.nets.drawing.text import Words
 from firable.nets.net import ExternalGate
 
 RADIUS: Final = 15.0
@@ -66,19 +67,26 @@ class Lane:
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """The centre of a place."""
+    """The centre of a place, the lines that stand beside it, and whether it is a macro place: a task that is folded."""
 
     x: float
     y: float
+    words: Words
+    is_macro: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Bar:
-    """A transition at height `y`: thick between each pair of `segments`, tied together by a thin line."""
+    """A transition at height `y`: thick between each pair of `segments`, tied together by a thin line.
+
+    `in_margin` says that its words stand at the left of all lanes, and not beside its last segment.
+    """
 
     y: float
     segments: tuple[tuple[float, float], ...]
     is_global: bool
+    in_margin: bool
+    words: Words
 
 
 @dataclass(frozen=True, slots=True)

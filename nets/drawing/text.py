@@ -25,6 +25,10 @@ COMMAND: Final = Style("command", 10.5, 6.5)
 NOTE: Final = Style("note", 10.5, 6.1)
 
 
+Words = tuple[tuple[str, Style], ...]
+"""Lines of text, each with how it looks."""
+
+
 def width_of(text: str, style: Style) -> float:
     """The width of a line in pixels, rather too much than too little."""
     return sum(2.0 if east_asian_width(character) in "WF" else 1.0 for character in text) * style.character_px

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from firable.cli.view.site import _TYPES
-from firable.nets.drawing import svg
+from firable.nets.drawing.colours import TINTS, UNOWNED
 
 ROOT = Path(__file__).parents[2]
 BUILT = ROOT / "cli" / "view" / "built"
@@ -42,6 +42,6 @@ def test_every_file_of_the_page_is_served_and_no_other_is_there() -> None:
 
 def test_the_dark_has_a_colour_for_each_tint_of_the_drawing() -> None:
     style = (ROOT / "web" / "src" / "picture.css").read_text("utf-8")
-    for tint in (*svg._TINTS, svg._UNOWNED[0]):
+    for tint in (*TINTS, UNOWNED[0]):
         assert f'[fill="{tint}"]' in style
         assert f'[stroke="{tint}"]' in style

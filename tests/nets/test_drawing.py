@@ -99,6 +99,32 @@ def test_lanes_that_work_together_stand_together() -> None:
     assert lane_order([frozenset({0, 2}), frozenset({0, 2}), frozenset({1, 2})], 3) == (0, 2, 1)
 
 
+def test_of_many_lanes_those_that_work_together_stand_together_too() -> None:
+    net = catalogue_net("manufacturing_cells-8")
+    owners = [lane.owner for lane in layout(net).lanes]
+    assert owners == ["s1", "r1", "s2", "s3", "r2", "s4", "s5", "r3", "s6", "s7", "r4", "s8"]
+
+
+def test_a_transition_without_arcs_has_its_bar_in_the_lane_whose_row_it_takes() -> None:
+    """Found by a drawn net: its bar stood in the first lane of the drawing, on that of another transition."""
+    controllers = (Controller("a"), Controller("b"), Controller("c"))
+    places = (Place("a.p", "a"), Place("b.p", "b"), Place("c.p", "c"))
+    wide = (Transition("ac", ("a.p",), ("c.p",)), Transition("ab", ("a.p",), ("b.p",)))
+    net = Net("n", places, (Transition("bare"), Transition("own", ("b.p",)), *wide), controllers=controllers)
+    where = layout(net)
+    assert [lane.owner for lane in where.lanes] == ["b", "a", "c"]
+    bare, own = where.bars[:2]
+    lane = where.lanes[1]
+    assert lane.x < bare.segments[0][0] < bare.segments[0][1] < lane.x + lane.width
+    assert own.segments[0][1] < lane.x
+
+
+def test_global_transitions_at_one_height_each_have_their_name_beside_their_bar() -> None:
+    svg = draw_net(catalogue_net("philosophers-4"))
+    names = [text for text in elements(svg, "text", "name") if "_takes_right" in (text.text or "")]
+    assert len({(text.get("x"), text.get("y")) for text in names}) == len(names) == 4
+
+
 def test_gates_end_in_a_dot_or_a_hollow_circle() -> None:
     net = Net(
         "n",

@@ -1,0 +1,91 @@
+"""Folded and wrapped pictures: what a task takes in, what stays to be seen, and that nothing is lost on the way."""
+
+import xml.etree.ElementTree as ET
+from urllib.parse import quote
+
+import pytest
+from hypothesis import given
+from support.examples import examples
+from support.whole_nets import whole_nets
+
+from firable.nets.catalogue import catalogue_net
+from firable.nets.drawing import draw_net
+from firable.nets.drawing.folding import fold, tasks
+from firable.nets.net import Net
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def ids(svg: ET.Element, kind: str) -> list[str]:
+    return [found for one in svg.iter() if (found := one.get("id", "")).startswith(f"{kind}:")]
+
+
+def classes(svg: ET.Element, id_: str) -> list[str | None]:
+    group = next(one for one in svg.iter() if one.get("id") == id_)
+    return [one.get("class") for one in group.iter(f"{SVG}circle")]
+
+
+def test_a_task_is_what_a_controller_does_until_it_is_idle_again() -> None:
+    net = catalogue_net("one_robot")
+    found = tasks(net)
+    assert ("robot.to_cv1", "robot.grasp_cv1", "robot.to_mc", "robot.put_mc", "robot.back") in found
+    assert ("robot.to_mc_empty", "robot.grasp_mc", "robot.to_cv2", "robot.put_cv2") in found
+    assert not any("robot.free" in task for task in found)
+
+
+def test_a_controller_names_all_its_tasks_and_a_place_the_one_it_is_in() -> None:
+    net = catalogue_net("one_robot")
+    assert set(fold(net, ["robot"]).members) == {"robot.to_cv1", "robot.to_mc_empty"}
+    assert set(fold(net, ["robot.put_mc"]).members) == {"robot.to_cv1"}
+    assert set(fold(net, ["robot.free"]).members) == set()
+    assert len(fold(net, ["all"]).net.places) == 10
+    with pytest.raises(KeyError):
+        fold(net, ["robt"])
+
+
+def test_local_transitions_inside_a_task_go_and_global_ones_keep_their_part() -> None:
+    net = catalogue_net("one_robot")
+    svg = ET.fromstring(draw_net(net, folded=["robot"]))
+    shown = {one.split(":")[1] for one in ids(svg, "transition")}
+    assert {t.name for t in net.transitions} - shown == {"t1-a", "t1-b", "t1-c", "t1-d"}
+    # G3 moves the robot's token inside the task: it has a bar in the box of the robot, and no arc there.
+    assert not {"input:G3:robot.to_cv1", "output:G3:robot.to_cv1"} & {one.get("id") for one in svg.iter()}
+    robot = next(one for one in svg.iter() if one.get("id") == "lane:robot")
+    left, width = float(robot.get("x", "")), float(robot.get("width", ""))
+    g3 = next(one for one in svg.iter() if one.get("id") == "transition:G3")
+    assert any(left < float(bar.get("x", "")) < left + width for bar in g3.iter(f"{SVG}rect"))
+
+
+def test_a_folded_task_is_a_double_circle_and_holds_the_token_of_any_place_in_it() -> None:
+    net = catalogue_net("one_robot")
+    marking = net.initial_marking & ~net.marking(["robot.free"]) | net.marking(["robot.put_mc"])
+    svg = ET.fromstring(draw_net(net, folded=["robot"], marking=marking))
+    assert classes(svg, "place:robot.to_cv1") == ["macro", "macro", "token"]
+    assert classes(svg, "place:robot.to_mc_empty") == ["macro", "macro"]
+    assert classes(svg, "place:robot.free") == ["place"]
+
+
+@examples(60)
+@given(whole_nets())
+def test_every_net_can_be_folded_and_wrapped_and_shows_all_the_rest_once(net: Net) -> None:
+    folded = fold(net, ["all"])
+    svg = ET.fromstring(draw_net(net, folded=["all"], width_max=300))
+    everything = [found for one in svg.iter() if (found := one.get("id"))]
+    assert len(set(everything)) == len(everything)
+    assert set(ids(svg, "place")) == {f"place:{quote(place.name)}" for place in folded.net.places}
+    shown = {":".join(one.split(":")[:2]) for one in ids(svg, "transition")}
+    assert shown == {f"transition:{quote(t.name)}" for t in folded.net.transitions}
+    inside = {name for members in folded.members.values() for name in members}
+    assert {place.name for place in net.places} == {place.name for place in folded.net.places} | inside
+
+
+def test_lanes_that_are_too_wide_go_on_below_with_the_parts_of_their_transitions() -> None:
+    net = catalogue_net("two_cells")
+    plain, narrow = (ET.fromstring(draw_net(net, width_max=width)) for width in (None, 1700))
+    assert float(narrow.get("width", "")) <= 1700 < float(plain.get("width", ""))
+    for kind in ("place", "lane", "input", "output", "gate"):
+        assert sorted(ids(narrow, kind)) == sorted(ids(plain, kind))
+    again = {one for one in ids(narrow, "transition") if one.count(":") == 2}
+    assert again == {"transition:load_a:2", "transition:fetched_a:2", "transition:placed_a:2"}
+    below = next(one for one in narrow.iter() if one.get("id") == "transition:load_a:2")
+    assert "also cell_a,…" in [text.text for text in below.iter(f"{SVG}text")]
