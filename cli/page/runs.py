@@ -18,25 +18,17 @@ from typing import Final
 
 from firable.cli.page.markup import Markup, tag, together
 from firable.nets.decomposition import Decomposition
-from firable.nets.drawing.layout import local_name
+from firable.nets.drawing import Frame
+from firable.nets.drawing.labels import local_name
 from firable.nets.machines.laws import PLANT, UNSENT
 from firable.nets.net import Marking, Net, Place
 from firable.nets.verdict import Witness
-from firable.semantics.player import NotFirableError, Player
+from firable.semantics.frames import frames
+from firable.semantics.player import NotFirableError
 
 STEPS_SHOWN_MAX: Final = 240
 _LANES_MAX: Final = 8
 _UNOWNED: Final = "without a controller"
-
-
-@dataclass(frozen=True)
-class Step:
-    """What one step did: the transitions that fired, and the marking before and after it."""
-
-    number: int
-    fired: tuple[str, ...]
-    before: Marking
-    after: Marking
 
 
 @dataclass(frozen=True)
@@ -113,24 +105,19 @@ def _told(witness: Witness) -> Markup:
     return together(tag("ol", items, cls="told"), rest, cycle)
 
 
-def played(net: Net, witness: Witness) -> list[Step] | None:
+def played(net: Net, witness: Witness) -> list[Frame] | None:
     """The steps of a run as the reference player fires it; None where it cannot."""
-    player, marking, steps = Player(net), net.initial_marking, []
-    for number, fired in enumerate((*witness.firings, *witness.cycle), start=1):
-        try:
-            after = player.fire(marking, [net.transition_index[name] for name in fired])
-        except (KeyError, NotFirableError):
-            return None
-        steps.append(Step(number, tuple(fired), marking, after))
-        marking = after
-    return steps
+    try:
+        return frames(net, (*witness.firings, *witness.cycle))
+    except (KeyError, NotFirableError):
+        return None
 
 
 def _lane_of(place: Place) -> str:
     return place.owner or _UNOWNED
 
 
-def _lanes(net: Net, steps: Sequence[Step]) -> tuple[str, ...]:
+def _lanes(net: Net, steps: Sequence[Frame]) -> tuple[str, ...]:
     """All controllers, or of many those that the run touches."""
     names = [controller.name for controller in net.controllers]
     if any(place.owner is None for place in net.places):
@@ -144,7 +131,7 @@ def _lanes(net: Net, steps: Sequence[Step]) -> tuple[str, ...]:
     return tuple(name for name in names if name in touched)
 
 
-def _rows(drawn: _Drawn, steps: Sequence[Step]) -> Iterator[Markup]:
+def _rows(drawn: _Drawn, steps: Sequence[Frame]) -> Iterator[Markup]:
     left_out = len(steps) - STEPS_SHOWN_MAX
     if left_out <= 0:
         yield from (_row(drawn, step) for step in steps)
@@ -154,7 +141,7 @@ def _rows(drawn: _Drawn, steps: Sequence[Step]) -> Iterator[Markup]:
     yield from (_row(drawn, step) for step in steps[-(STEPS_SHOWN_MAX // 2) :])
 
 
-def _row(drawn: _Drawn, step: Step) -> Markup:
+def _row(drawn: _Drawn, step: Frame) -> Markup:
     names = tag("div", *map(drawn.title, step.fired))
     head = tag("th", tag("span", f"{step.number}", cls="number"), names, scope="row")
     parts = _parts(step.fired, drawn.decomposition)
@@ -173,7 +160,7 @@ def _parts(fired: Iterable[str], decomposition: Decomposition | None) -> dict[st
     return found
 
 
-def _changes(net: Net, step: Step, lane: str, parts: tuple[str, ...]) -> list[Markup]:
+def _changes(net: Net, step: Frame, lane: str, parts: tuple[str, ...]) -> list[Markup]:
     written = [tag("span", part, cls="part") for part in parts]
     for p, place in enumerate(net.places):
         before, after = step.before >> p & 1, step.after >> p & 1

@@ -18,7 +18,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from firable.cli.page.markup import Markup, tag, together
-from firable.cli.page.runs import Step, across, played, token
+from firable.cli.page.runs import across, played, token
+from firable.nets.drawing import Frame
 from firable.nets.verdict import Witness
 
 if TYPE_CHECKING:
@@ -61,13 +62,13 @@ def _table(rows: Sequence[Markup], lanes: Sequence[str], foot: Markup | None = N
     return tag("div", table, cls="wide", tabindex="0", role="region", aria_label="run, event by event")
 
 
-def _actor(protocol: ProtocolNet, step: Step) -> str:
+def _actor(protocol: ProtocolNet, step: Frame) -> str:
 
     of = protocol.steps[step.fired[0]]
     return of.controller or of.coordinator or _NOBODY
 
 
-def _lanes(protocol: ProtocolNet, steps: Sequence[Step]) -> tuple[str, ...]:
+def _lanes(protocol: ProtocolNet, steps: Sequence[Frame]) -> tuple[str, ...]:
     """Who acts in the run, in the order of the cell, coordinators first, and whose tokens change."""
     touched = {_actor(protocol, step) for step in steps}
     touched |= {lane for step in steps for lane, _ in _changes(protocol, step)}
@@ -80,7 +81,7 @@ def _lanes(protocol: ProtocolNet, steps: Sequence[Step]) -> tuple[str, ...]:
     return tuple(name for name in dict.fromkeys(names) if name in touched)
 
 
-def _changes(protocol: ProtocolNet, step: Step) -> list[tuple[str, Markup]]:
+def _changes(protocol: ProtocolNet, step: Frame) -> list[tuple[str, Markup]]:
     """The tokens of controllers that change, each with its lane."""
     found, net = [], protocol.net
     for place in protocol.parts.net.places:
@@ -92,7 +93,7 @@ def _changes(protocol: ProtocolNet, step: Step) -> list[tuple[str, Markup]]:
 
 
 def _rows(
-    protocol: ProtocolNet, steps: Sequence[Step], lines: Sequence[Line], lanes: Sequence[str]
+    protocol: ProtocolNet, steps: Sequence[Frame], lines: Sequence[Line], lanes: Sequence[str]
 ) -> Iterator[Markup]:
     """A row for each line, and for each event that no line tells."""
     i = 0
@@ -106,7 +107,7 @@ def _rows(
     yield from (_row(protocol, step, lanes) for step in steps[i:])
 
 
-def _row(protocol: ProtocolNet, step: Step, lanes: Sequence[str], since: str = "", text: str = "") -> Markup:
+def _row(protocol: ProtocolNet, step: Frame, lanes: Sequence[str], since: str = "", text: str = "") -> Markup:
     cells: dict[str, list[Markup]] = {lane: [] for lane in lanes}
     cells[_actor(protocol, step)].append(tag("span", text or str(protocol.steps[step.fired[0]])))
     for lane, written in _changes(protocol, step):
@@ -116,7 +117,7 @@ def _row(protocol: ProtocolNet, step: Step, lanes: Sequence[str], since: str = "
 
 
 def _end(protocol: ProtocolNet, marking: int, lanes: Sequence[str]) -> Markup:
-    from firable.nets.drawing.layout import local_name
+    from firable.nets.drawing.labels import local_name
 
     index = protocol.net.place_index
     cells = []

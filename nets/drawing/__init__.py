@@ -8,13 +8,16 @@
 from firable.nets.drawing.layered import layered
 from firable.nets.drawing.marking_graph import MarkingGraph, Step, draw_markings
 from firable.nets.drawing.sheet import NODES_MAX
+from firable.nets.drawing.strip import Frame, draw_strip
 from firable.nets.drawing.svg import draw_net
 
 __all__ = [
     "NODES_MAX",
+    "Frame",
     "MarkingGraph",
     "Step",
     "draw_markings",
     "draw_net",
+    "draw_strip",
     "layered",
 ]
