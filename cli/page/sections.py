@@ -236,6 +236,17 @@ def _picture(report: Report) -> Markup | None:
     return tag("div", raw(draw_net(net)), cls="picture", tabindex="0", role="region", aria_label=label)
 
 
+def _coordinator(report: Report) -> Markup | None:
+    """The coordinator diagram, of a split that somebody can take in."""
+    from firable.nets.drawing import draw_coordinator
+
+    if report.decomposition is None or not 0 < len(report.table) <= _DRAWN_TRANSITIONS_MAX:
+        return None
+    label = "who decides what over whom: a box for each controller, and the transitions that coordinators decide"
+    drawn = raw(draw_coordinator(report.decomposition))
+    return tag("div", drawn, cls="picture", tabindex="0", role="region", aria_label=label)
+
+
 def _coordinator_table(report: Report) -> Markup | None:
     from firable.nets.layers import Layers
 
@@ -341,13 +352,14 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section("lives-on", "What this cell lives on", lives_on),
     Section("verdicts", "Verdicts", _others),
     Section("course", "How it was found", _course),
+    Section("coordinator", "Who decides what over whom", _coordinator),
     Section("table", "Coordinator table", _coordinator_table),
     Section("groups", "Arbitration", _groups),
     Section("controllers", "What each controller must know", _knowledge),
     Section("cell", "The cell", _picture),
 )
 """Every section, in the order of the page."""
-_ABOVE_IN_A_SPLIT: Final = ("table", "groups", "verdicts", "controllers")
+_ABOVE_IN_A_SPLIT: Final = ("coordinator", "table", "groups", "verdicts", "controllers")
 
 
 def sections(command: str) -> tuple[Section, ...]:

@@ -5,6 +5,7 @@
 `draw_coordinator` draws a `Decomposition`: who decides what over whom; `draw_strip` a run by its `Frame`s.
 """
 
+from firable.nets.drawing.coordinator_diagram import draw_coordinator
 from firable.nets.drawing.layered import layered
 from firable.nets.drawing.marking_graph import MarkingGraph, Step, draw_markings
 from firable.nets.drawing.sheet import NODES_MAX
@@ -16,6 +17,7 @@ __all__ = [
     "Frame",
     "MarkingGraph",
     "Step",
+    "draw_coordinator",
     "draw_markings",
     "draw_net",
     "draw_strip",
