@@ -6,6 +6,7 @@
 """
 
 from firable.nets.drawing.coordinator_diagram import draw_coordinator
+from firable.nets.drawing.free import draw_free
 from firable.nets.drawing.layered import layered
 from firable.nets.drawing.marking_graph import MarkingGraph, Step, draw_markings
 from firable.nets.drawing.sheet import NODES_MAX
@@ -18,6 +19,7 @@ __all__ = [
     "MarkingGraph",
     "Step",
     "draw_coordinator",
+    "draw_free",
     "draw_markings",
     "draw_net",
     "draw_strip",
