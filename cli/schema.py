@@ -9,10 +9,10 @@ from typing import Any
 import click
 
 
-@click.command(short_help="Print the JSON Schema of net files, task files, plant files or what is printed.")
-@click.argument("kind", type=click.Choice(["net", "tasks", "plant", "report", "io"]))
+@click.command(short_help="Print the JSON Schema of net, task, plant and layout files, or of what is printed.")
+@click.argument("kind", type=click.Choice(["net", "tasks", "plant", "layout", "report", "io"]))
 def schema(kind: str) -> int:
-    """Print the JSON Schema of a net file, a file of tasks, a plant file, or of what --format json prints.
+    """Print the JSON Schema of a net, task, plant or layout file, or of what --format json prints.
 
     `report` is what most commands print, `io` a line of `firable io`.
 
@@ -37,5 +37,9 @@ def schema_of(kind: str) -> Any:
             from firable.nets.machines.plant_file import PlantModel
 
             return PlantModel.model_json_schema()
+        case "layout":
+            from firable.nets.drawing.layout_file import LayoutModel
+
+            return LayoutModel.model_json_schema()
         case _:
             return json.loads(files("firable.cli").joinpath(f"{kind}.schema.json").read_text(encoding="utf-8"))

@@ -13,6 +13,7 @@ import firable.nets
 from firable.nets.catalogue import catalogue_names, catalogue_path
 from firable.nets.diagnostics import InputError
 from firable.nets.document import json_schema
+from firable.nets.drawing.layout_file import LayoutModel
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.printing import format_net
 from firable.nets.tasks.document import json_schema as tasks_schema
@@ -22,7 +23,12 @@ SCHEMA = Path(str(firable.nets.__file__)).parent / "net.schema.json"
 
 
 CATALOGUE = SCHEMA.parent / "catalogue"
-SCHEMAS = {"net": json_schema, "tasks": tasks_schema, "plant": PlantModel.model_json_schema}
+SCHEMAS = {
+    "net": json_schema,
+    "tasks": tasks_schema,
+    "plant": PlantModel.model_json_schema,
+    "layout": LayoutModel.model_json_schema,
+}
 FILES = sorted(file for kind in ("firable", "tasks", "plant") for file in CATALOGUE.glob(f"*.{kind}.yaml"))
 FIRST_LINE = re.compile(r"# yaml-language-server: \$schema=(.+)\n")
 

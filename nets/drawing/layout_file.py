@@ -1,0 +1,166 @@
+"""The layout file: how the picture of a net is arranged, kept beside the net so that it stays as one knows it.
+
+`cell.firable.yaml` has its layout in `cell.layout.yaml`: the lanes from left to right, the places in each of their
+tracks, and the transitions row by row. The net file says what the net is and holds no positions; a change of the
+picture changes no proof. What the net has lost since is said, and what is new in it finds its place by itself. The file
+is written by `firable draw --keep-layout`, and may be edited: a line moved up is a row moved up.
+
+    firable_layout: 1
+    lanes:
+    - owner: robot
+      tracks:
+      - [robot.to_cv1, robot.grasp_cv1]
+      - [robot.free]
+    rows:
+    - [G1]
+    - [G2, t1-a]
+
+Rejected: coordinates in pixels, for which there would have to be an editor; and positions inside the net file, where
+each of them would be a changed line in the review of a net that has not changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from firable.nets.diagnostics import Diagnostic, InputError, Severity
+from firable.nets.drawing.arrangement import Arrangement
+from firable.nets.net import Net
+from firable.nets.source import Source, quoted, read_source
+from firable.nets.yaml_tree import Node, data, node_span, nodes_along, parse_tree
+from firable.nets.yaml_writing import scalar
+
+SIZE_BYTES_MAX: Final = 1024 * 1024
+_ERRORS_MAX: Final = 20
+_NAMES_SAID: Final = 8
+_HINT: Final = "`firable draw NET --keep-layout` writes such a file anew; docs/pictures.md shows one"
+
+Name = Annotated[str, Field(min_length=1)]
+
+
+def _version(value: object) -> object:
+    return 1 if value == "1" else value
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class LaneModel(_Model):
+    """A lane: whose it is (nobody's where that is left out), and its places, track by track from the left."""
+
+    owner: Name | None = None
+    tracks: list[list[Name]] = []
+
+
+class LayoutModel(_Model):
+    """A whole layout file: the lanes from the left, and the transitions row by row from above."""
+
+    firable_layout: Annotated[Literal[1], BeforeValidator(_version)]
+    lanes: list[LaneModel] = []
+    rows: list[list[Name]] = []
+
+
+def layout_path(net_file: Path | str) -> Path:
+    """Where the layout of a net file is kept.
+
+    >>> layout_path("cells/cell.firable.yaml").as_posix(), layout_path("net.pnml").as_posix()
+    ('cells/cell.layout.yaml', 'net.layout.yaml')
+    """
+    path = Path(net_file)
+    stem = path.name.removesuffix(path.suffix).removesuffix(".firable")
+    return path.with_name(f"{stem}.layout.yaml")
+
+
+def read_layout(path: Path | str) -> Arrangement:
+    """Read a layout file; raises `InputError` F1021, or F1001-F1007 where the file is no YAML."""
+    return _parse(read_source(path, SIZE_BYTES_MAX))
+
+
+def parse_layout(text: str, file: str = "<layout>") -> Arrangement:
+    """Read a layout from text, as `read_layout` does."""
+    return _parse(Source(file, text))
+
+
+def _parse(source: Source) -> Arrangement:
+    tree = parse_tree(source)
+    try:
+        model = LayoutModel.model_validate(data(tree))
+    except ValidationError as error:
+        found = error.errors(include_url=False, include_input=False)[:_ERRORS_MAX]
+        raise InputError([_problem(source, tree, tuple(one["loc"]), one["msg"]) for one in found]) from None
+    if twice := list(_twice(model)):
+        raise InputError([_problem(source, tree, path, f"'{name}' stands here a second time") for path, name in twice])
+    rows = {name: float(row) for row, names in enumerate(model.rows, start=1) for name in names}
+    tracks = {lane.owner: tuple(map(tuple, lane.tracks)) for lane in model.lanes if lane.tracks}
+    return Arrangement(tuple(lane.owner for lane in model.lanes), rows, tracks)
+
+
+def _twice(model: LayoutModel) -> Iterator[tuple[tuple[Any, ...], str]]:
+    """What stands in a file more than once, with its path."""
+    groups: list[Iterator[tuple[tuple[Any, ...], str]]] = [
+        ((("lanes", i), lane.owner or "nobody's lane") for i, lane in enumerate(model.lanes)),
+        ((("rows", i, k), name) for i, row in enumerate(model.rows) for k, name in enumerate(row)),
+        (
+            (("lanes", i, "tracks", j, k), name)
+            for i, lane in enumerate(model.lanes)
+            for j, track in enumerate(lane.tracks)
+            for k, name in enumerate(track)
+        ),
+    ]
+    for group in groups:
+        seen = set[str]()
+        for path, name in group:
+            if name in seen:
+                yield path, name
+            seen.add(name)
+
+
+def _problem(source: Source, tree: Node, path: tuple[Any, ...], message: str) -> Diagnostic:
+    key, node = list(nodes_along(tree, path))[-1]
+    where = quoted(".".join(map(str, path))) if path else "the file"
+    return Diagnostic("F1021", f"{where}: {message}", _HINT, tuple(map(str, path)), node_span(source, key or node))
+
+
+def vanished(given: Arrangement, net: Net, file: str) -> tuple[Diagnostic, ...]:
+    """A note on what a layout names and the net does not have, if there is any such thing."""
+    owners = {controller.name for controller in net.controllers}
+    lanes = [owner for owner in given.lanes if owner is not None and owner not in owners]
+    places = [name for tracks in given.tracks.values() for track in tracks for name in track]
+    gone = [
+        *(("controller", name) for name in lanes),
+        *(("place", name) for name in places if name not in net.place_index),
+        *(("transition", name) for name in given.rows if name not in net.transition_index),
+    ]
+    if not gone:
+        return ()
+    said = ", ".join(f"the {kind} '{name}'" for kind, name in gone[:_NAMES_SAID])
+    more = f" and {len(gone) - _NAMES_SAID:,} more" if len(gone) > _NAMES_SAID else ""
+    message = f"{file} arranges what the net does not have: {said}{more}"
+    hint = "`firable draw NET --keep-layout` keeps the layout without it"
+    return (Diagnostic("F1021", message, hint, severity=Severity.WARNING),)
+
+
+def format_layout(given: Arrangement) -> str:
+    """A layout as the text of its file."""
+    lines = ["firable_layout: 1", "lanes:" if given.lanes else "lanes: []"]
+    for owner in given.lanes:
+        tracks = given.tracks.get(owner, ())
+        first = f"owner: {scalar(owner)}" if owner is not None else ""
+        lines.append(f"- {first or ('tracks:' if tracks else '{}')}")
+        lines += ["  tracks:"] if tracks and first else []
+        lines += [f"  - {_listed(track)}" for track in tracks]
+    rows: dict[float, list[str]] = {}
+    for name, row in given.rows.items():
+        rows.setdefault(row, []).append(name)
+    lines.append("rows:" if rows else "rows: []")
+    lines += [f"- {_listed(rows[row])}" for row in sorted(rows)]
+    return "\n".join(lines) + "\n"
+
+
+def _listed(names: tuple[str, ...] | list[str]) -> str:
+    return f"[{', '.join(map(scalar, names))}]"
