@@ -117,6 +117,19 @@ class CheckReport:
                 return verdict
         raise KeyError(name)
 
+    def _repr_html_(self) -> str:
+        """In a notebook: every verdict, and the runs of those that must hold and do not, step by step."""
+        from firable.nets.drawing import draw_strip
+        from firable.nets.notebook import told_apart, verdicts_html
+        from firable.semantics.frames import frames
+
+        pictures = {
+            verdict.name: draw_strip(self.net, frames(self.net, verdict.witness.firings), caption=verdict.statement)
+            for verdict in told_apart(self.verdicts, _PICTURES_MAX)
+            if verdict.witness is not None
+        }
+        return verdicts_html(f"{self.net.name}, {self.discipline}", self.verdicts, pictures)
+
 
 def report_on(
     space: StateSpace[Any], queries: Iterable[Query] = (), known: Mapping[str, Verdict] = MappingProxyType({})
@@ -140,6 +153,7 @@ def report_on(
     return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), tuple(verdicts), space)
 
 
+_PICTURES_MAX: Final = 3
 _ON_BEHAVIOUR: Final[tuple[Callable[[Behaviour[Any]], Verdict], ...]] = (
     behaviour_of.contact_free,
     behaviour_of.deadlock_free,

@@ -81,6 +81,13 @@ class Decomposition:
         """The coordinator table: the global transitions, in the order of the net."""
         return tuple(row for row in self.coordinated if row.is_global)
 
+    def _repr_svg_(self) -> str | None:
+        """The coordinator diagram in a notebook; nothing of a net that is too large for a picture."""
+        from firable.nets.drawing import NODES_MAX, draw_coordinator
+
+        net = self.net
+        return draw_coordinator(self) if len(net.places) + len(net.transitions) <= NODES_MAX else None
+
     def subnet(self, controller: str) -> Net:
         """The subnet of a controller; `KeyError` where there is none."""
         return self._subnet_of[controller]

@@ -391,3 +391,9 @@ class Net:
     def coordinator(self) -> Controller | None:
         """The controller marked as coordinator, if the net has one."""
         return next((controller for controller in self.controllers if controller.coordinator), None)
+
+    def _repr_svg_(self) -> str | None:
+        """The picture of the net in a notebook; nothing of a net too large for one, which shows its text instead."""
+        from firable.nets.drawing import NODES_MAX, draw_net
+
+        return draw_net(self) if len(self.places) + len(self.transitions) <= NODES_MAX else None

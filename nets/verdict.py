@@ -150,6 +150,11 @@ class Verdict:
             return self.status
         return Status.PROVED if self.status is self.expected else Status.VIOLATED
 
+    def _repr_html_(self) -> str:
+        from firable.nets.notebook import verdict_html
+
+        return verdict_html(self)
+
     def to_json(self) -> dict[str, Any]:
         """The verdict as JSON data, without measured times; what is empty is left out."""
         data: dict[str, Any] = {
