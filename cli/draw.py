@@ -2,47 +2,62 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping
+from typing import Final
 
 import click
 
 from firable.cli.options import load_net, net_argument, write_text
-from firable.cli.text import counted
 
-if TYPE_CHECKING:
-    from firable.nets.net import Net
-
-NODES_MAX: Final = 600
-"""How many places and transitions are drawn: lines are laid out to cross little, at a cost that grows with the cube."""
-EXPLORED_MAX: Final = 200_000
-"""How many markings are looked for in order to say how many there are, and which are doomed."""
-
-
-def drawable(net: Net) -> None:
-    """Refuse a net that is too large for a picture."""
-    if (n_nodes := len(net.places) + len(net.transitions)) > NODES_MAX:
-        raise click.UsageError(
-            f"{n_nodes:,} places and transitions make no picture that anybody can read; at most {NODES_MAX:,} are drawn"
-        )
+_OF: Final[Mapping[str, tuple[str, ...]]] = {
+    "marking": ("net",),
+    "trace": ("net", "strip"),
+    "collapse": ("net",),
+    "keep_layout": ("net",),
+    "width": ("net", "coordinator", "strip"),
+    "discipline": ("graph",),
+    "max_markings": ("graph",),
+    "layout": ("net", "graph"),
+}
+"""Of which pictures each option is."""
 
 
-@click.command(short_help="Draw a net, or its reachability graph, as SVG.")
+@click.command(short_help="Draw a net, its coordinator, its reachability graph or a run of it, as SVG.")
 @net_argument
 @click.option(
     "-o", "--output", metavar="FILE.svg", default="-", help="The file to write; - is standard output.  [default: -]"
 )
 @click.option(
     "--what",
-    type=click.Choice(["net", "graph"]),
+    type=click.Choice(["net", "coordinator", "graph", "strip"]),
     default="net",
     show_default=True,
-    help="The net, or its reachability graph.",
+    help="The net; who decides what over whom; its reachability graph; a run of it, a small picture for each step.",
 )
 @click.option(
     "--marking", metavar="PLACES", help="Show the tokens on these places, separated by commas, instead of M0."
 )
-@click.option("--trace", metavar="FILE", help="Show the marking where this trace ends, and which step fired what.")
+@click.option(
+    "--trace",
+    metavar="FILE",
+    help="Show the marking where this trace ends, and which step fired what; the run of a strip.",
+)
+@click.option(
+    "--collapse",
+    metavar="NAME",
+    multiple=True,
+    help="Draw a task as one place: the task that a place is in, those of a controller, or `all`; repeatable.",
+)
+@click.option(
+    "--keep-layout", is_flag=True, help="Keep how the picture is arranged in a file beside NET, for the next time."
+)
+@click.option(
+    "--width",
+    type=click.IntRange(400, 100_000),
+    default=None,
+    metavar="PIXELS",
+    help="Wrap what is wider than so many pixels.  [default: 2600 of a net, 1900 of a coordinator, 1500 of a strip]",
+)
 @click.option(
     "--discipline",
     type=click.Choice(["interleaving", "step"]),
@@ -57,9 +72,10 @@ def drawable(net: Net) -> None:
 )
 @click.option(
     "--layout",
-    type=click.Choice(["layered", "dot"]),
+    type=click.Choice(["lanes", "layered", "dot", "elk"]),
     default=None,
-    help="Of the graph: place it by firable itself, or by Graphviz where it is installed.  [default: layered]",
+    help="Place what is drawn in lanes (a net), by distance from the start, or by Graphviz or ELK where these are "
+    "installed.  [default: lanes of a net, layered of a graph]",
 )
 def draw(
     net: str,
@@ -67,6 +83,9 @@ def draw(
     what: str,
     marking: str | None,
     trace: str | None,
+    collapse: tuple[str, ...],
+    keep_layout: bool,
+    width: int | None,
     discipline: str | None,
     max_markings: int | None,
     layout: str | None,
@@ -74,76 +93,57 @@ def draw(
     """Draw NET in the conventions of the field: a lane for each controller, transitions as bars across them.
 
     Circles are places and bars transitions; permissive gates are dashed with a black dot at the transition, inhibitive
-    ones with a hollow circle; external gates are stubs; a small arrow leads from a place to its command.
+    ones with a hollow circle; external gates are stubs; a small arrow leads from a place to its command. Lanes that are
+    wider than the sheet are wrapped, and --collapse draws what a controller does for one task as one place, a double
+    circle. A layout file beside NET (cell.layout.yaml of cell.firable.yaml) says how the picture is arranged.
 
-    --what graph draws the reachability graph instead: its markings by what is different from M0, the firings between
-    them, deadlocks and doomed markings marked. Of a large net the markings nearest to M0 are drawn, and the picture
-    says how many there are.
+    --what coordinator draws the split over the controllers: for each global transition who decides it, the part of each
+    controller, what it waits for, and what competes. --what strip draws the run of a --trace, as `firable check
+    --trace-dir` and `firable run` write them: a small picture for each step, of the places that matter.
+
+    --what graph draws the reachability graph: its markings by what is different from M0, the firings between them,
+    deadlocks and doomed markings marked. Of a large net the markings nearest to M0 are drawn, and the picture says how
+    many there are.
     """
-    if what == "net" and not (discipline is None and max_markings is None and layout is None):
-        raise click.UsageError("--discipline, --max-markings and --layout are of the graph: add --what graph")
-    if what == "graph" and not (marking is None and trace is None):
-        raise click.UsageError("--marking and --trace show tokens in the net: leave out --what graph")
+    from firable.cli import pictures
+
+    given = {
+        "marking": marking,
+        "trace": trace,
+        "collapse": collapse or None,
+        "keep_layout": keep_layout or None,
+        "width": width,
+        "discipline": discipline,
+        "max_markings": max_markings,
+        "layout": layout,
+    }
+    for name, value in given.items():
+        if value is not None and what not in _OF[name]:
+            wanted = " or ".join(f"--what {one}" for one in _OF[name])
+            raise click.UsageError(f"--{name.replace('_', '-')} is of {wanted}, not of --what {what}")
     if marking is not None and trace is not None:
         raise click.UsageError("--marking and --trace both say which tokens to show: leave one out")
     loaded = load_net(net).net
-    if what == "graph":
-        write_text(output, _graph(loaded, discipline or "interleaving", max_markings or 100, layout or "layered"))
-    else:
-        write_text(output, _net(loaded, marking, trace))
+    match what:
+        case "graph":
+            limit = max_markings or 100
+            if layout == "lanes":
+                raise click.UsageError("--layout lanes is of --what net: markings have no lanes")
+            picture = pictures.graph_picture(loaded, discipline or "interleaving", limit, layout or "layered")
+        case "coordinator":
+            picture = pictures.coordinator_picture(loaded, width)
+        case "strip":
+            if trace is None:
+                raise click.UsageError("--what strip draws the run of a trace: add --trace FILE")
+            picture = pictures.strip_picture(loaded, trace, width)
+        case _:
+            if layout not in {None, "lanes"} and (collapse or keep_layout or width):
+                raise click.UsageError(
+                    f"--collapse, --keep-layout and --width are of lanes: leave out --layout {layout}"
+                )
+            kept = pictures.kept_layout(loaded, net)
+            picture = pictures.net_picture(loaded, marking, trace, collapse, kept, width, layout)
+            if keep_layout:
+                pictures.keep(loaded, net, kept)
+    write_text(output, picture)
     return 0
-
-
-def _net(net: Net, marking: str | None, trace: str | None) -> str:
-    from firable.nets.drawing import draw_net
-
-    drawable(net)
-    if trace is not None:
-        from firable.semantics.replaying import replay as play
-        from firable.semantics.trace import Fired, read_trace
-
-        read = read_trace(trace)
-        done = play(net, read)
-        firings = [event.transitions for event in read.events if isinstance(event, Fired)]
-        caption = f"after {counted(done.firings, 'firing')} of {Path(trace).name}"
-        return draw_net(net, marking=done.marking, firings=firings, caption=caption)
-    shown = None
-    if marking is not None:
-        names = [name.strip() for name in marking.split(",") if name.strip()]
-        if unknown := [name for name in names if name not in net.place_index]:
-            from firable.nets.diagnostics import did_you_mean
-
-            hint = did_you_mean(unknown[0], list(net.place_index))
-            raise click.UsageError(f"the net has no place '{unknown[0]}'. {hint}".strip())
-        shown = net.marking(names)
-    return draw_net(net, marking=shown)
-
-
-def _graph(net: Net, discipline: str, max_markings: int, layout: str) -> str:
-    from firable.analysis.spaces.reachability import Budget, explore
-    from firable.analysis.verdicts.behaviour import Behaviour
-    from firable.cli.graphviz import dot
-    from firable.nets.drawing import MarkingGraph, Step, draw_markings, layered
-
-    space = explore(net, discipline, Budget(markings=max(EXPLORED_MAX, max_markings)))
-    drawn = min(space.n_markings, max_markings)
-    steps, beyond = [], [0] * drawn
-    for i in range(drawn):
-        for fired, target in space.successors(i):
-            if target < drawn:
-                steps.append(Step(i, target, tuple(net.transitions[t].name for t in fired)))
-            else:
-                beyond[i] += 1
-    numbers = range(drawn)
-    deadlocks = frozenset(i for i in numbers if space.deadlocks[i])
-    known = space.complete
-    doomed = frozenset(i for i in numbers if Behaviour(space).doomed[i]) if known else frozenset[int]()
-    markings = tuple(space.marking(i) for i in numbers)
-    how = "one transition at a time" if discipline == "interleaving" else "in synchronous steps"
-    told = [f"{counted(space.n_markings, 'marking')} and {counted(space.n_edges, 'edge')}, {how}"]
-    if not known:
-        told = [f"more than {EXPLORED_MAX:,} markings, {how}; which of them are doomed is not known"]
-    if drawn < space.n_markings:
-        told.append(f"drawn: the {drawn:,} nearest to M0")
-    graph = MarkingGraph(markings, tuple(steps), deadlocks, doomed, tuple(beyond))
-    return draw_markings(net, graph, caption="; ".join(told), layout=dot if layout == "dot" else layered)

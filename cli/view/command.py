@@ -44,7 +44,7 @@ def view(net: str, trace: str | None, plant: str | None, port: int, read_only: b
     """
     import asyncio
 
-    from firable.cli.draw import drawable
+    from firable.cli.pictures import drawable
     from firable.cli.text import show_diagnostic
     from firable.cli.view.editing import editing_of
     from firable.cli.view.playing import Playing

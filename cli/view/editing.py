@@ -22,10 +22,10 @@ from typing import Any, Final
 
 from aiohttp import web
 
-from firable.cli.draw import NODES_MAX
 from firable.cli.view.playing import Playing
 from firable.cli.view.site import answering, diagnostic_json, refusal
 from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.drawing import NODES_MAX
 from firable.nets.editing import edits
 from firable.nets.editing.net_file import NetFile
 from firable.nets.editing.yaml_text import YamlText

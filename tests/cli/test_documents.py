@@ -44,6 +44,9 @@ def test_every_command_of_a_page_prints_what_it_shows(name: str, tmp_path: Path)
             done = run(command, tmp_path, status)
             status = done.returncode
             assert fits(shown, done.stdout), f"$ {command}\n{done.stdout}"
+    for picture in re.findall(r"\]\(pictures/([\w.]+)\)", text):
+        drawn = (tmp_path / picture).read_text("utf-8")
+        assert drawn == (DOCS / "pictures" / picture).read_text("utf-8"), f"draw {picture} anew, as the page does"
 
 
 @pytest.mark.parametrize("name", _with("sh"))

@@ -1,7 +1,9 @@
 """`firable draw`: the reachability graph as the engine knows it, placed by firable or by Graphviz."""
 
 import shutil
+import sys
 import xml.etree.ElementTree as ET
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -65,6 +67,39 @@ def test_the_graph_of_steps_names_what_fires_at_once(capsys: pytest.CaptureFixtu
     assert caption(svg) == "6 markings and 6 edges, in synchronous steps"
 
 
+LAYOUTERS = [
+    "layered",
+    pytest.param("dot", marks=pytest.mark.skipif(not shutil.which("dot"), reason="needs Graphviz")),
+    pytest.param("elk", marks=pytest.mark.skipif(find_spec("py_mini_racer") is None, reason="needs firable[layout]")),
+]
+
+
+@pytest.mark.parametrize("layout", LAYOUTERS)
+def test_a_net_is_placed_without_lanes_with_all_that_is_of_it(layout: str, capsys: pytest.CaptureFixture[str]) -> None:
+    lanes = picture(capsys, "catalogue:conceptual_two_robots")
+    svg = picture(capsys, "catalogue:conceptual_two_robots", "--layout", layout)
+    for kind in ("place", "transition", "input", "output"):
+        assert ids(svg, kind) == ids(lanes, kind)
+    circles = [one for one in svg.iter(f"{SVG}circle") if one.get("class") == "place"]
+    spots = {(one.get("cx"), one.get("cy")) for one in circles}
+    assert len(spots) == len(ids(svg, "place")) + 1  # and in the legend
+
+
+@pytest.mark.skipif(find_spec("py_mini_racer") is None, reason="needs firable[layout]")
+def test_a_graph_is_placed_by_elk(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = picture(capsys, "catalogue:philosophers-2", "--what", "graph", "--layout", "elk")
+    assert len(ids(svg, "marking")) == 6
+    assert flags(svg).count("deadlock") == 1
+
+
+def test_elk_that_is_missing_is_one_clear_error(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "py_mini_racer", None)
+    assert main(["draw", "catalogue:conceptual_one_robot", "--layout", "elk"]) == 2
+    assert "pip install 'firable[layout]'" in capsys.readouterr().err.replace("\n", " ")
+
+
 def fake_dot(folder: Path, script: str) -> str:
     (folder / "dot").write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
     (folder / "dot").chmod(0o755)
@@ -89,3 +124,22 @@ def test_a_graphviz_that_is_missing_or_fails_is_one_clear_error(
     monkeypatch.setenv("PATH", path)
     assert main(["draw", "catalogue:conceptual_one_robot", "--what", "graph", "--layout", "dot"]) == 2
     assert words in capsys.readouterr().err.replace("\n", " ")
+
+
+def test_the_coordinator_of_a_cell_is_drawn_from_its_split(capsys: pytest.CaptureFixture[str]) -> None:
+    svg = picture(capsys, "catalogue:two_cells", "--what", "coordinator")
+    assert ids(svg, "coordinator") >= {"coordinator:line", "coordinator:cell_a", "coordinator:cell_b"}
+    assert caption(svg) == "Coordinator diagram: 12 global transitions of 7 controllers"
+
+
+def test_a_counterexample_is_drawn_step_by_step_with_what_its_end_waits_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    net = "catalogue:philosophers-2"
+    assert main(["check", net, "--trace-dir", str(tmp_path), "--no-cache"]) == 1
+    capsys.readouterr()
+    svg = picture(capsys, net, "--what", "strip", "--trace", str(tmp_path / "deadlock-free.trace.jsonl"))
+    assert ids(svg, "fired") == {"fired:1:p1_takes_left", "fired:2:p2_takes_left"}
+    said = " ".join(text.text or "" for text in svg.iter(f"{SVG}text") if text.get("class") == "end")
+    assert said.startswith("Deadlock: no transition is firable.")
+    assert "p2.left waits in p2_takes_right for p1.fork" in said
