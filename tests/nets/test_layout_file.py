@@ -15,6 +15,7 @@ from firable.nets.drawing import draw_net
 from firable.nets.drawing.arrangement import Arrangement
 from firable.nets.drawing.layout import arranged, layout
 from firable.nets.drawing.layout_file import format_layout, layout_path, parse_layout, vanished
+from firable.nets.drawing.shapes import RADIUS
 from firable.nets.net import Net, Place, Transition
 
 NET = """\
@@ -86,6 +87,19 @@ def test_the_layout_of_another_net_spoils_no_picture(net: Net, other: Net) -> No
         assert all(y != v or end < left or right < start for v, (left, right) in pieces[:i])
     spots = [(spot.x, spot.y) for spot in where.places]
     assert len(set(spots)) == len(spots)
+
+
+@examples(60)
+@given(whole_nets())
+def test_a_file_that_puts_all_places_of_a_lane_into_one_track_is_followed_as_far_as_lines_allow(net: Net) -> None:
+    owners = {place.owner for place in net.places}
+    crowded = {owner: (tuple(place.name for place in net.places if place.owner == owner),) for owner in owners}
+    where = layout(net, Arrangement(tracks=crowded))
+    for edge in where.edges:
+        low, high = sorted((where.places[edge.place].y, where.bars[edge.transition].y))
+        for p, other in enumerate(where.places):
+            assert p == edge.place or not (abs(other.x - edge.x) < RADIUS + 3 and low < other.y < high)
+    assert len({(spot.x, spot.y) for spot in where.places}) == len(where.places)
 
 
 def test_names_that_have_vanished_are_said() -> None:
