@@ -259,7 +259,8 @@ def _votes(report: Report) -> Iterator[str]:
     if report.verdicts:
         yield f"{persistent} of {len(report.verdicts)} are persistent: no other transition takes the yes back"
         free = len(report.verdicts) - promising
-        yield f"{free} of these need no promise, which locks places from the yes to the order: their firing takes"
+        need = "needs" if free == 1 else "need"
+        yield f"{free} of these {need} no promise, which locks places from the yes to the order: their firing takes"
         yield "back no other yes at their controller, and no command sent meanwhile clears a gate that they read"
     others = [verdict for verdict in report.verdicts if not verdict.holds]
     for verdict in others[:_CONTROLLERS_MAX]:

@@ -196,6 +196,14 @@ class Parts:
         arcs = (t.inputs, t.outputs, t.permissive, t.inhibitive)
         return Part(whole, controller, name, *arcs, bool(t.external), free=self._is_free(whole, controller))
 
+    def votes_numbered(self, part: Part) -> bool:
+        """Whether votes on a part carry the number of their round; one that stands, that of what it comes after."""
+        return self.variant.vote_rounds or (self.variant.of_free and not part.free)
+
+    def orders_numbered(self, part: Part) -> bool:
+        """Whether orders to a part carry the number of their round."""
+        return self.variant.order_rounds or (self.variant.of_free and not part.free)
+
     def _is_free(self, whole: str, controller: str) -> bool:
         """Whether a part is said to be free of promise; in the bare skeleton none is."""
         if not self.variant.acknowledged:

@@ -31,6 +31,7 @@ from firable.decompose.protocol.parts import Parts
 from firable.decompose.protocol.variant import PROTOCOL, Variant
 from firable.decompose.protocol.wrong import WrongProtocol, example
 from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.persistence import freed
 from firable.nets.decomposition import Decomposition
 from firable.nets.formula import And, Formula, Holds, Or
 from firable.nets.net import Net, Property, PropertyKind
@@ -129,6 +130,8 @@ def refute(wrong: WrongProtocol, net: Net | Decomposition | None = None, limits:
     """
     of = example(wrong.example) if net is None else net
     decomposition = split(of) if isinstance(of, Net) else of
+    if wrong.variant.of_free and not decomposition.free:
+        decomposition = freed(decomposition)
     limits = limits or Limits()
     protocol = protocol_net(decomposition, wrong.variant, wrong.faults)
     graph = explore(protocol.net, budget=Budget(FIRST_MARKINGS, limits.memory_bytes), deadline=limits.deadline)
@@ -165,6 +168,8 @@ def is_true_here(decomposition: Decomposition, variant: Variant) -> bool:
     groups, or of what a promise excludes.
     """
     by_parts = replace(PROTOCOL, gate_copies=variant.gate_copies, lock=variant.lock, arbitrated=variant.arbitrated)
+    if variant.of_free and not decomposition.free:
+        variant = replace(variant, vote_rounds=True, order_rounds=True, of_free=False)
     if variant != replace(by_parts, common=variant.common, all_free=variant.all_free):
         return False
     its, true = Parts(decomposition, variant), Parts(decomposition, PROTOCOL)

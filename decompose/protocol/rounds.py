@@ -113,8 +113,8 @@ def _coordinator(draft: Draft, parts: Parts, t: str, group: Sequence[str], over:
 
 def _cleared(parts: Parts, part: Part) -> list[str]:
     """The channels of a part that are empty when a round closes: what comes later is known to be of an older round."""
-    kept = set() if parts.variant.vote_rounds else {"request", "vote"}
-    kept |= set() if parts.variant.order_rounds else {"commit-order"}
+    kept = set() if parts.votes_numbered(part) else {"request", "vote"}
+    kept |= set() if parts.orders_numbered(part) else {"commit-order"}
     return [channel for channel in channels_of(part) if channel not in kept]
 
 
@@ -149,7 +149,7 @@ def _promising(draft: Draft, parts: Parts, part: Part, over: str) -> None:
     draft.step(f"hear/{t}/{c}", heard_of, [vote], [heard], (), [heard, over])
     known = Step("hear", f"the yes of {c} on {t} arrives again", coordinator=who)
     draft.step(f"hear/{t}/{c}/again", known, [vote], (), [heard])
-    if parts.variant.vote_rounds:
+    if parts.votes_numbered(part):
         late = Step("ignore", f"the yes of {c} on {t} arrives too late", coordinator=who)
         draft.step(f"ignore-vote/{t}/{c}", late, [vote], (), [over])
 
@@ -173,7 +173,7 @@ def _standing(draft: Draft, parts: Parts, part: Part) -> None:
     draft.step(f"hear/{t}/{c}", heard_of, [vote], [heard], (), [heard, committed(t)])
     known = Step("hear", f"the yes of {c} on {t} arrives again", coordinator=who)
     draft.step(f"hear/{t}/{c}/again", known, [vote], (), [heard])
-    if parts.variant.vote_rounds:
+    if parts.votes_numbered(part):
         old = Step("ignore", f"the yes of {c} on {t} from before the order arrives", coordinator=who)
         draft.step(f"ignore-vote/{t}/{c}", old, [vote], (), [committed(t)])
 
@@ -206,18 +206,18 @@ def _obeying(draft: Draft, parts: Parts, part: Part) -> None:
         inputs, outputs = [commit, *effect.inputs], [acknowledgement, *effect.outputs]
         empty = [*effect.empty, *([obeyed] if part.free else [])]  # it may stand anew before the round is closed
         draft.step(f"apply/{t}/{c}{effect.suffix}", apply, [*inputs, promised], [*outputs, obeyed], effect.full, empty)
-        if not parts.variant.order_rounds:
+        if not parts.orders_numbered(part):
             twice = Step("apply", f"the order for {t} arrives at {c} once more, which fires its part again", c)
             draft.step(
                 f"apply-again/{t}/{c}{effect.suffix}", twice, inputs, outputs, effect.full, [*effect.empty, promised]
             )
     why = "has obeyed it before" if part.free else "has nothing promised"
     known = Step("apply", f"the order for {t} arrives at {c}, which {why} and acknowledges it", c)
-    if parts.variant.order_rounds:
+    if parts.orders_numbered(part):
         draft.step(f"acknowledge-commit/{t}/{c}", known, [commit], [acknowledgement], [obeyed], [acknowledgement])
     if part.free:
         return
-    if parts.variant.order_rounds:
+    if parts.orders_numbered(part):
         draft.step(
             f"acknowledge-commit/{t}/{c}/unpromised", known, [commit], [acknowledgement, obeyed], (), [promised, obeyed]
         )

@@ -89,7 +89,8 @@ class Variant:
     `common`: a conflict across coordinators is decided by their common ancestor (O8); else each decides what only those
     below it take part in, as if nobody else decided any of the conflict.
     `all_free`: every part is taken for one that is free of promise, whether its yes stands or not; else those that the
-    decomposition names, in the skeleton with rounds.
+    decomposition names, in the skeleton with rounds. `of_free`: the numbers that are left out are those of parts that
+    are free of promise, and the messages of the others have theirs.
 
     Raises `ValueError` for votes other than promised in the skeleton with rounds.
 
@@ -111,6 +112,7 @@ class Variant:
     one_round: bool = False
     common: bool = True
     all_free: bool = False
+    of_free: bool = False
 
     def __post_init__(self) -> None:
         if self.acknowledged and (self.votes is not Votes.PROMISED or self.recheck or self.serial):

@@ -96,14 +96,14 @@ WRONG: Final = (
         "used-votes",
         "O5",
         "a yes of a part free of promise counts again after the firing",
-        Variant(all_free=True, vote_rounds=False),
+        Variant(of_free=True, vote_rounds=False),
         "shuttle",
     ),
     WrongProtocol(
         "free-twice",
         "O5",
         "an order to a part free of promise that comes again is applied again",
-        Variant(all_free=True, order_rounds=False),
+        Variant(of_free=True, order_rounds=False),
         "shuttle",
     ),
     WrongProtocol(

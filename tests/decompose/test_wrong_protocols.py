@@ -12,8 +12,10 @@ from firable.decompose.protocol.refuting import LINES_READ, Refutation, is_true_
 from firable.decompose.protocol.variant import Variant
 from firable.decompose.protocol.wrong import WRONG, WrongProtocol, example
 from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.persistence import freed
 from firable.nets.catalogue import catalogue_net
 from firable.nets.formula import Holds
+from firable.nets.net import Controller, Net, Place, Transition
 from firable.nets.verdict import Status, Weight
 from firable.semantics.player import Player
 
@@ -138,8 +140,12 @@ def test_what_the_cell_has_nothing_of_cannot_be_left_out_of_its_protocol(name: s
 @pytest.mark.parametrize("wrong", WRONG, ids=named)
 def test_only_what_leaves_something_out_of_the_parts_may_be_the_true_protocol(wrong: WrongProtocol) -> None:
     by_parts = wrong.name in {"cached-gates", "unlocked-reads", "unlocked-conflicts", "conflicts-decided-below"}
-    assert is_true_here(split(example("shuttle")), wrong.variant) is by_parts
-    assert not is_true_here(split(example(wrong.example)), wrong.variant)
+    shuttle, own = split(example("shuttle")), split(example(wrong.example))
+    if wrong.variant.of_free:
+        assert is_true_here(shuttle, wrong.variant), "no part is said to be free"
+        shuttle, own = freed(shuttle), freed(own)
+    assert is_true_here(shuttle, wrong.variant) is by_parts
+    assert not is_true_here(own, wrong.variant)
 
 
 def test_steps_that_cannot_follow_each_other_are_no_leap() -> None:
@@ -174,3 +180,34 @@ def test_where_the_cell_has_no_run_that_can_be_read_the_small_example_has_one() 
     assert (len(found.small.events), found.small.protocol.parts.net.name) == (2, "doors")
     assert readable(found.small) is found.small
     assert all(len(refute(wrong).lines) <= LINES_READ for wrong in WRONG)
+
+
+def doors() -> Net:
+    """`finish` has free parts alone, and `begin` and `shut` none: what the one closes is a gate of the other."""
+    places = ("boss.idle", "arm.home", "press.open", "boss.busy", "arm.out", "press.shut")
+    transitions = (
+        Transition("begin", ("boss.idle", "arm.home"), ("boss.busy", "arm.out"), permissive=("press.open",)),
+        Transition("shut", ("press.open",), ("press.shut",), inhibitive=("arm.out",)),
+        Transition("reopen", ("press.shut",), ("press.open",)),
+        Transition("finish", ("boss.busy", "arm.out"), ("boss.idle", "arm.home")),
+    )
+    made = tuple(Place(name, name.partition(".")[0], i < 3) for i, name in enumerate(places))
+    return Net("doors", made, transitions, (), tuple(map(Controller, ("boss", "arm", "press"))))
+
+
+@pytest.mark.parametrize("name", ["used-votes", "free-twice"])
+def test_what_is_left_out_of_free_parts_goes_wrong_where_only_parts_are_free_that_may_be(name: str) -> None:
+    found = refute(BY_NAME[name], split(doors()))
+    assert found.status is Status.VIOLATED
+    assert found.protocol.parts.decomposition.free == freed(split(doors())).free
+    votes = {event for event in found.events if event.endswith("promises nothing")}
+    assert votes
+    assert not any("begin" in vote or "shut" in vote for vote in votes if vote.startswith("press"))
+    assert any("once more" in event for event in found.events) == (name == "free-twice")
+
+
+@pytest.mark.parametrize("name", ["used-votes", "free-twice"])
+def test_a_net_without_free_parts_cannot_go_wrong_by_them(name: str) -> None:
+    net = example("doors")
+    assert freed(split(net)).free == ()
+    assert refute(BY_NAME[name], split(net)).status is Status.PROVED
