@@ -6,7 +6,8 @@ import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 import click
 
@@ -16,7 +17,7 @@ from firable.cli.watched import machines_verdict
 from firable.nets.source import printable
 
 if TYPE_CHECKING:
-    from firable.executor.drivers.driver import Driver
+    from firable.executor.drivers.driver import Latched
     from firable.executor.links.link import Link
     from firable.executor.operating.log import Log
     from firable.executor.operating.running import Watch
@@ -160,14 +161,14 @@ def run_host_of(
     from firable.executor.operating.hosting import machines_of, run_host
 
     machines = machines_of(bundle.net, options.controller, coordinator=options.coordinator)
-    driver = _driver(bundle, machines, options)
+    driver = _drivers(bundle, machines, options)
     link, warnings = _link(bundle, machines, options)
     for warning in warnings:
         text.show_diagnostic(warning)
     report = run_host(
         bundle,
         machines,
-        driver,
+        driver(latched=False),
         link,
         trace_path=trace,
         journal_path=options.journal,
@@ -178,6 +179,7 @@ def run_host_of(
         log=log,
         plant=plant,
         watch=watch,
+        latched=partial(driver, latched=True),
     )
     return Report(
         "run",
@@ -206,7 +208,13 @@ def _told(kind: str, sentence: str) -> None:
     click.echo(f"{time.strftime('%H:%M:%S')} {kind}: {sentence}", err=True)
 
 
-def _driver(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> Driver:
+class _Drivers(Protocol):
+    """What makes drivers of the machines of a host."""
+
+    def __call__(self, *, latched: bool) -> Latched: ...
+
+
+def _drivers(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> _Drivers:
     from firable.executor.operating.hosting import own_net
 
     if options.bind is not None and options.dry_run is not None:
@@ -216,13 +224,17 @@ def _driver(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> 
         from firable.executor.drivers.bound import bound_driver
 
         own = own_net(bundle.decomposition, machines)
-        return bound_driver(read_binding(options.bind), bundle.net, own)
+        return partial(bound_driver, read_binding(options.bind), bundle.net, own)
     net = own_net(bundle.decomposition, machines)
     if options.dry_run is None and (net.signals or any(place.command for place in net.places)):
         raise click.UsageError("say with --bind where the machines of this host are, or --dry-run without any")
     from firable.executor.drivers.dry_run import DryRunDriver
 
-    return DryRunDriver([net], options.dry_run or 0.0)
+    def dry(*, latched: bool) -> Latched:
+        del latched  # there is nothing to be held safe
+        return DryRunDriver([net], options.dry_run or 0.0)
+
+    return dry
 
 
 def _link(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> tuple[Link, tuple[Diagnostic, ...]]:

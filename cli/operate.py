@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 _READING: Final = ("situation", "metrics")
-_COMMANDS: Final = (*_READING, "pause", "resume", "step", "stop", "stop-at-end", "emergency-stop")
+_COMMANDS: Final = (*_READING, "pause", "resume", "step", "stop", "stop-at-end", "emergency-stop", "reset", "say")
 _SECONDS: Final = 10.0
 NO_BROWSER: Final = "FIRABLE_NO_BROWSER"
 """The variable of the environment by which an address is told and no browser opened."""
@@ -93,14 +93,20 @@ def serve_options(command: F) -> F:
     return command
 
 
-@click.command(short_help="Act on a run from elsewhere: situation, pause, resume, step, stop.")
+@click.command(short_help="Act on a run from elsewhere: situation, pause, resume, step, stop, reset.")
 @click.argument("address", metavar="ADDRESS")
 @click.argument("command", type=click.Choice(_COMMANDS))
+@click.argument("what", metavar="[PLACE=ANSWER]", required=False)
 @click.option("--token-file", metavar="FILE", help="The file with the token that the run was given or has made.")
 @click.option("--ca", metavar="FILE", help="The authority of the run's certificate, for https addresses.")
 @click.option("--cert", metavar="CERT KEY", nargs=2, help="Your certificate and its key, instead of a token.")
-def operate(address: str, command: str, token_file: str | None, ca: str | None, cert: tuple[str, str] | None) -> int:
+def operate(
+    address: str, command: str, what: str | None, token_file: str | None, ca: str | None, cert: tuple[str, str] | None
+) -> int:
     """Do COMMAND on the run that serves at ADDRESS, as `firable run --serve` has printed it.
+
+    After an emergency stop, reset has the machines asked what they did, and resume lets them go on. Of a command of
+    which no machine can tell, say PLACE=done, =working or =not-received.
 
     An emergency stop over a network is a convenience beside the one that is wired, and no safety function.
     """
@@ -114,11 +120,19 @@ def operate(address: str, command: str, token_file: str | None, ca: str | None, 
         )
     token = "" if token_file is None else _token_read(Path(token_file))
     context = _client_tls(ca, cert) if address.startswith("https://") else None
-    click.echo(asyncio.run(_asked(address.rstrip("/"), command, token, context)), nl=command != "metrics")
-    return 0
+    place, is_said, word = (what or "").partition("=")
+    if (command == "say") != bool(is_said and place and word) or (what is not None and command != "say"):
+        raise click.UsageError("say what became of a command: say PLACE=done, =working or =not-received")
+    said = {"place": place, "answer": word.replace("-", " ")} if command == "say" else {}
+    answer, is_refused = asyncio.run(_asked(address.rstrip("/"), command, said, token, context))
+    click.echo(answer, nl=command != "metrics")
+    return 1 if is_refused else 0
 
 
-async def _asked(address: str, command: str, token: str, context: ssl.SSLContext | None) -> str:
+async def _asked(
+    address: str, command: str, said: dict[str, str], token: str, context: ssl.SSLContext | None
+) -> tuple[str, bool]:
+    """What the run answers, and whether it has refused to do it."""
     import aiohttp
 
     method = "GET" if command in _READING else "POST"
@@ -127,13 +141,18 @@ async def _asked(address: str, command: str, token: str, context: ssl.SSLContext
     try:
         async with (
             aiohttp.ClientSession(timeout=timeout) as session,
-            session.request(method, f"{address}/{command}", headers=headers, ssl=context or True) as answer,
+            session.request(
+                method, f"{address}/{command}", params=said, headers=headers, ssl=context or True
+            ) as answer,
         ):
             if answer.status == 401:
                 raise _refusal(f"{address} does not let you in", "show the token, or the certificate, of this run")
             if answer.status != 200:
                 raise _refusal(f"{address} answers {answer.status}", "is that the address that the run has printed?")
-            return await answer.text() if command == "metrics" else _told(await answer.json())
+            if command == "metrics":
+                return await answer.text(), False
+            told = await answer.json()
+            return _told(told), bool(told.get("refused"))
     except (aiohttp.ClientError, ssl.SSLError, OSError, TimeoutError) as error:
         reason = str(error) or "it does not answer"
         hint = "has the run ended? is the address, or the certificate, another one?"
@@ -144,6 +163,7 @@ def _told(answer: dict[str, Any]) -> str:
     lines = [f"{answer['state']}: {answer['message']}" if answer["message"] else str(answer["state"])]
     if "fired" in answer:
         lines.insert(0, f"fired {answer['fired']}" if answer["fired"] else "nothing is enabled")
+    lines[:0] = [f"refused: {why}" for why in answer.get("refused", ())]
     lines.append(f"  tokens on {', '.join(answer['marking'])}")
     return "\n".join([*lines, *(f"  {blocked}" for blocked in answer["blocked"])])
 

@@ -195,10 +195,11 @@ def run(
 
 
 def _told(kind: str, sentence: str) -> None:
-    """What the report does not tell: a word of the operator that was of no use."""
+    """What the report does not tell: a word of the operator that was of no use, an emergency stop that can be reset."""
+    from firable.executor.operating.latch import LATCHED
     from firable.executor.operating.restart import UNASKED
 
-    if kind == UNASKED:
+    if kind in {UNASKED, LATCHED}:
         click.echo(f"  {sentence}", err=True)
 
 

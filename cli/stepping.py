@@ -14,15 +14,19 @@ import signal
 import sys
 import threading
 from collections import deque
+from collections.abc import Collection
+from contextlib import suppress
 from typing import Protocol
 
 import click
 
-from firable.executor import Host, Operator
+from firable.executor import Answer, Host, Operator
 from firable.executor.operating.restart import uncertain
 
 _PROMPT = "  [Enter] next, [r] run on, [e] stop at the end of the cycle, [s] stop now: "
 _TAKE_UP = "  [r] take the run up, [s] stop now: "
+_RESET = "  type reset when nobody is in the way any more, [s] end the run: "
+_SAY = "  what did the machine do? PLACE=done, =working or =not-received, [s] stop now: "
 _POLL_SECONDS = 0.05
 
 
@@ -96,18 +100,20 @@ class _TypedMeanwhile:
 def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
     """The operator of a run at a speed (None: virtual time), who talks on standard output or on standard error."""
 
-    async def key(typed: _Typed, prompt: str = _PROMPT) -> str:
+    async def key(typed: _Typed, prompt: str = _PROMPT, keys: Collection[str] = ("", "r", "e", "s")) -> str:
         while True:
             line = await typed.asked(prompt)
             if line is None:
                 click.echo(err=to_stderr)
                 return "s"
-            if line.strip().lower() in {"", "r", "e", "s"}:
+            if line.strip().lower() in keys:
                 return line.strip().lower()
 
     async def stepped(host: Host) -> bool:
-        """Fire one transition, waiting until one is enabled; False where none ever will be."""
+        """Fire one transition, waiting until one is enabled or the cell is stopped; False where none ever will be."""
         while (fired := await host.step()) is None:
+            if host.emergency is not None:
+                return True
             if host.at_rest:
                 return False
             await asyncio.sleep(_POLL_SECONDS)
@@ -122,6 +128,8 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
             return False
         click.echo("  running on; Enter pauses", err=to_stderr)
         while not host.at_rest:
+            if host.emergency is not None:
+                return True
             if typed.unasked():
                 host.pause()
                 return True
@@ -129,16 +137,38 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
         return False
 
     async def taken_up(host: Host, typed: _Typed) -> bool:
-        """After a restart: say what became of the commands, and go on only if the operator wants it and it can be."""
-        while (found := host.taking_up) is not None:
-            if not found.is_final:
+        """After a restart, or an emergency stop and its reset: say what became of the commands, and go on if wanted."""
+        while (found := host.taking_up) is not None or host.emergency is not None:
+            if host.latch is not None:
+                while typed.unasked():  # what was typed before it was asked for resets nothing
+                    pass
+                if await key(typed, _RESET, {"reset", "s"}) == "s":
+                    return False
+                for why in host.reset():
+                    click.echo(f"  not reset: {why}", err=to_stderr)
+                continue
+            if found is None or not found.is_final:
                 await asyncio.sleep(_POLL_SECONDS)
                 continue
             for line in host.situation().message.split("; "):
                 click.echo(f"  {line}", err=to_stderr)
-            if uncertain(host) or await key(typed, _TAKE_UP) == "s":
+            if uncertain(host):
+                if not await said(host, typed):
+                    return False
+            elif await key(typed, _TAKE_UP) == "s":
                 return False
-            host.resume()
+            else:
+                host.resume()
+        return True
+
+    async def said(host: Host, typed: _Typed) -> bool:
+        """Say what became of a command that no machine can tell of; False where the operator wants an end instead."""
+        line = await typed.asked(_SAY)
+        if line is None or line.strip().lower() == "s":
+            return False
+        place, _, word = line.strip().partition("=")
+        with suppress(ValueError):  # no answer: then it is asked again
+            host.say(place, Answer(word.replace("-", " ")))
         return True
 
     async def operate(host: Host) -> None:
@@ -148,7 +178,14 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
             return
         host.pause()
         while await stepped(host):
-            match await key(typed):
+            typed_now = await key(typed) if host.emergency is None else ""
+            if host.emergency is not None and typed_now != "s":
+                if not await taken_up(host, typed):
+                    host.stop()
+                    return
+                host.pause()
+                continue
+            match typed_now:
                 case "s":
                     host.stop()
                     return

@@ -32,6 +32,7 @@ from firable.cli.view.site import PUBLIC, answering, file_routes
 from firable.cli.view.top_view import top_of
 from firable.cli.view.votes import votes
 from firable.executor import Host
+from firable.executor.operating.latch import may_stay
 from firable.executor.protocol.token_player import TokenPlayer, Word
 from firable.nets.drawing import draw_net
 from firable.nets.machines.plant_file import PlantModel, misfits
@@ -121,7 +122,7 @@ class LivePage:
         try:
             ended = False
             while not ended:
-                ended = self.host.is_over
+                ended = self.host.is_over and not may_stay(self.host)
                 frame = self.frame(follower, ended=ended)
                 await response.write(json.dumps(frame, separators=(",", ":")).encode() + b"\n")
                 if not ended:

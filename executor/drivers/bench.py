@@ -149,6 +149,8 @@ class Bench:
     timeout_s: float = 0.5
     button: bool = False
     """Whether the binding has the button of the machine as its emergency stop."""
+    latched: bool = False
+    """Whether the driver follows an emergency stop."""
     driver: BoundDriver = field(init=False)
     heard: Heard = field(init=False)
 
@@ -173,7 +175,7 @@ class Bench:
             emergency=f"emergency_stop: {{button: {{device: D, read: {points['button']}}}}}" if self.button else "",
             **(points | codes),
         )
-        self.driver = bound_driver(parse_binding(text), self.net)
+        self.driver = bound_driver(parse_binding(text), self.net, latched=self.latched)
 
     async def ordered(self, count: int) -> None:
         """Wait until so many commands have arrived."""

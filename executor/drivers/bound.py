@@ -20,9 +20,10 @@ from firable.nets.diagnostics import InputError
 from firable.nets.net import Net, Place, SignalKind
 
 
-def bound_driver(binding: Binding, net: Net, part: Net | None = None) -> BoundDriver:
+def bound_driver(binding: Binding, net: Net, part: Net | None = None, *, latched: bool = False) -> BoundDriver:
     """The driver of a net's binding, or of a part of the net, whose machines are all that this host has.
 
+    A `latched` one follows an emergency stop (`driver.Latched`).
     Raises `InputError` F5101 where binding and net do not fit, and F1001 or F1003 where a file that a device needs, a
     certificate or a key, cannot be read. One binding serves all hosts of a cell: each takes from
     it the devices of its own machines.
@@ -37,13 +38,15 @@ def bound_driver(binding: Binding, net: Net, part: Net | None = None) -> BoundDr
         binding = binding.serving(names, [controller.name for controller in part.controllers])
     if unreadable := tuple(binding.unreadable()):
         raise InputError(unreadable)
-    return BoundDriver(binding, completions, answered)
+    return BoundDriver(binding, completions, answered, latched=latched)
 
 
 class BoundDriver:
     """The driver of a binding. `completions` are the signals that it forms, `answered` the places that wait for one."""
 
-    def __init__(self, binding: Binding, completions: Collection[str], answered: frozenset[str]) -> None:
+    def __init__(
+        self, binding: Binding, completions: Collection[str], answered: frozenset[str], *, latched: bool = False
+    ) -> None:
         self.binding = binding
         document = binding.document
         sensed = [name for name, signal in document.signals.items() if name in completions and signal is not None]
@@ -56,11 +59,23 @@ class BoundDriver:
         self.clock: Clock | None = None
         self.listener: Listener | None = None
         self.is_stopped = False
+        self.is_latched = latched
+        """Whether there was an emergency stop, and nobody has reset it."""
 
     @property
     def may_move(self) -> bool:
-        """Whether every contact of the emergency stop is closed; before that no machine is commanded."""
-        return all(contacts.are_closed for contacts in self.contacts)
+        """Whether every contact of the emergency stop is closed, and none latched; before no machine is commanded."""
+        return not self.is_latched and all(contacts.are_closed for contacts in self.contacts)
+
+    def against(self) -> tuple[str, ...]:
+        """What keeps it latched: contacts that are open, devices that do not answer, signals whose loss is a fault."""
+        return tuple(why for device in self.devices.values() for why in device.against())
+
+    def release(self) -> None:
+        """Take an open contact for an emergency stop again, and a lost device for what it is."""
+        self.is_latched = False
+        for device in self.devices.values():
+            device.kept.awake.set()
 
     @property
     def at_rest(self) -> bool:

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.drivers.binding import CommandDocument, SignalDocument, writes
 from firable.executor.drivers.channels import Channel, Outcome, Said
 from firable.executor.drivers.device import Point, Value, Writes, as_bit
-from firable.executor.drivers.driver import Quality
+from firable.executor.drivers.driver import Quality, Reading
 from firable.executor.drivers.emergency import Contacts
 from firable.executor.drivers.handshake import Handshake
 from firable.executor.drivers.image import Change, Image
@@ -111,6 +111,23 @@ class BoundDevice:
         """Whether something that was to be written has not been confirmed."""
         return bool(self.forced) or any(channel.is_writing for channel in self.channels.values())
 
+    @property
+    def is_latched(self) -> bool:
+        """Whether every connection begins with the safe outputs."""
+        return self.driver.is_latched
+
+    def against(self) -> Iterator[str]:
+        """What keeps its driver latched, in a phrase each."""
+        if not self.is_ready.is_set():
+            yield f"{self.name} is not connected"
+            return
+        for name in sorted(self.contacts.open_ones):
+            yield f"{self.name}: '{name}' is not closed"
+        for name, signal in self.image.signals.items():
+            reading = self.image.readings[name]
+            if signal.on_loss == "fault" and reading.quality is not Quality.GOOD and reading.why != Reading().why:
+                yield f"{self.name}: '{name}' cannot be read: {reading.why}"
+
     # What the connection tells
 
     def read(self, batch: Sequence[tuple[Point, Value]]) -> None:
@@ -193,10 +210,14 @@ class BoundDevice:
             self.driver.listener.driver_note(self.name, message)
 
     def _fault(self, message: str) -> None:
-        if self.driver.listener is not None and not self.driver.is_stopped:
+        if self.driver.is_latched:
+            self.note(message)  # its machines are stopped, and stay so: whoever resets looks at them first
+        elif self.driver.listener is not None and not self.driver.is_stopped:
             self.driver.listener.driver_fault(self.name, message)
 
     def _emergency(self, reason: str) -> None:
+        if self.driver.is_latched:
+            return  # there was one
         self.driver.emergency_stop(f"{self.name}: {reason}")
 
     def _must_move(self) -> None:

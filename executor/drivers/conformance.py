@@ -17,54 +17,13 @@ imported, so that who runs a cell need not have it.
 
 from __future__ import annotations
 
-import asyncio
-import threading
-from abc import abstractmethod
-from collections.abc import Callable, Coroutine
-from contextlib import AbstractAsyncContextManager
-from typing import Any
-
-from firable.executor.drivers.bench import Bench, Far, bench_net, until
-from firable.executor.drivers.driver import Answer, Quality
-from firable.executor.drivers.far_side.machine import Machine
+from firable.executor.drivers.bench import Bench, until
+from firable.executor.drivers.conformance_stopping import StoppingConformance
+from firable.executor.drivers.driver import Quality
 
 
-class DriverConformance:
+class DriverConformance(StoppingConformance):
     """The tests; a subclass says how its kind is reached."""
-
-    @abstractmethod
-    def far_end(self) -> AbstractAsyncContextManager[Far]:
-        """A far end that is not started yet."""
-
-    def bench(self, test: Callable[[Bench], Coroutine[Any, Any, None]], **options: Any) -> None:
-        """Run a test on a bench."""
-
-        async def run() -> None:
-            async with self.far_end() as far:
-                machine = Machine(far.end, far.points)
-                await machine.start()
-                try:
-                    await test(Bench(machine, far, bench_net(), **options))
-                finally:
-                    await machine.stop()
-
-        self.run(run())
-
-    def run(self, work: Coroutine[Any, Any, None]) -> None:
-        """Do the work of a test in an event loop; all tests may have the same one."""
-        asyncio.run(work)
-
-    def test_safe_outputs_come_before_anything_else_at_the_start(self) -> None:
-        """A machine that was left on is stopped before it is told anything."""
-
-        async def test(b: Bench) -> None:
-            b.driver.send(b.place("move"), 1)
-            async with b.connected():
-                await until(lambda: b.machine.orders, "the command arrives")
-            assert b.machine.events[0] == "output"
-            assert b.machine.outputs[0] is False
-
-        self.bench(test)
 
     def test_a_command_is_taken_once_and_completed_with_its_entry(self) -> None:
         """The number says to which entry the machine's answer belongs."""
@@ -179,22 +138,6 @@ class DriverConformance:
                 await until(lambda: b.heard_of("moved"), "the completion")
             assert b.heard.takings == [("M.halt", 1), ("M.move", 1)]
             assert len(b.machine.orders) == 2
-
-        self.bench(test)
-
-    def test_a_command_that_a_stop_overtakes_is_never_told_as_taken(self) -> None:
-        """After the restart it is asked after: the machine has not moved by it."""
-
-        async def test(b: Bench) -> None:
-            async with b.connected():
-                await b.far.end.cut()
-                b.driver.send(b.place("halt"), 1)
-                await until(lambda: not b.driver.devices["D"].is_ready.is_set(), "the loss")
-                b.driver.stop()
-                b.driver.send(b.place("halt"), 2)
-                await b.far.end.mend()
-            assert b.machine.orders == []
-            assert b.heard.takings == []
 
         self.bench(test)
 
@@ -383,182 +326,6 @@ class DriverConformance:
             assert b.heard.faults == []
 
         self.bench(test)
-
-    def test_safe_outputs_are_the_last_thing_at_the_end_and_nothing_is_sent_after_a_stop(self) -> None:
-        """A stop is the end of what is sent."""
-
-        async def test(b: Bench) -> None:
-            async with b.connected():
-                b.driver.send(b.place("move"), 1)
-                await until(lambda: b.machine.orders, "the command arrives")
-                b.driver.stop()
-                b.driver.send(b.place("move"), 2)
-                await until(lambda: len(b.machine.outputs) == 2, "the safe outputs")
-            assert b.machine.events[-1] == "output"
-            assert b.machine.outputs == [False, False]
-            assert len(b.machine.orders) == 1
-
-        self.bench(test)
-
-    def test_a_driver_that_is_cancelled_drives_the_safe_outputs_on_its_way_out(self) -> None:
-        """However a run ends, its machines are stopped."""
-
-        async def test(b: Bench) -> None:
-            async with b.connected():
-                pass
-            assert b.machine.outputs == [False, False]
-
-        self.bench(test)
-
-    def test_nothing_is_commanded_before_the_contact_of_the_emergency_stop_was_read_as_closed(self) -> None:
-        """Who presses it before the start stops the start."""
-
-        async def test(b: Bench) -> None:
-            b.machine.show("button", value=False)
-            b.driver.send(b.place("move"), 1)
-            async with b.running():
-                await until(lambda: b.heard.emergencies, "the emergency stop")
-                await until(lambda: b.machine.outputs, "the safe outputs")
-                b.machine.show("button", value=True)
-                await until(b.driver.devices["D"].kept.stopped.is_set, "the stop is over")
-            assert b.heard.emergencies == ["D: 'button' is open"]
-            assert b.machine.orders == []
-            while not b.machine.orders:  # a start may come before everybody knows that it is closed again
-                b.begin()
-                b.driver.send(b.place("move"), 1)
-                async with b.running():
-                    await until(lambda: b.machine.orders or b.heard.emergencies, "a start")
-            assert b.heard.emergencies == []
-
-        self.bench(test, button=True)
-
-    def test_an_open_contact_of_the_emergency_stop_stops_the_machines_and_closing_it_starts_none(self) -> None:
-        """It drives the safe outputs by itself, tells of it, and commands nothing any more."""
-
-        async def test(b: Bench) -> None:
-            async with b.connected():
-                b.driver.send(b.place("move"), 1)
-                await until(lambda: b.machine.orders, "the command arrives")
-                b.machine.show("button", value=False)
-                await until(lambda: b.heard.emergencies, "the emergency stop")
-                assert b.driver.is_stopped
-                b.machine.show("button", value=True)
-                b.driver.send(b.place("halt"), 1)
-                await until(lambda: len(b.machine.outputs) == 2, "the safe outputs")
-            assert b.heard.emergencies == ["D: 'button' is open"]
-            assert b.machine.events[-1] == "output"
-            assert len(b.machine.orders) == 1
-
-        self.bench(test, button=True)
-
-    def test_a_contact_of_the_emergency_stop_that_cannot_be_read_is_open(self) -> None:
-        """Nobody could press it: there is no time of grace."""
-
-        async def lost(b: Bench) -> None:
-            async with b.connected():
-                await b.far.end.cut()
-                await until(lambda: b.heard.emergencies, "the emergency stop")
-            assert "D: 'button' cannot be read: " in b.heard.emergencies[0]
-
-        async def garbled(b: Bench) -> None:
-            async with b.connected():
-                b.far.end.faults.garbage = True
-                b.machine.show("button", value=True)
-                await until(lambda: b.heard.emergencies, "the emergency stop")
-                b.far.end.faults.garbage = False
-
-        async def never_reached(b: Bench) -> None:
-            await b.far.end.cut()
-            async with b.running():
-                await until(lambda: b.heard.emergencies, "the emergency stop")
-            assert "was not read within 0.05 s" in b.heard.emergencies[0]
-
-        self.bench(lost, button=True)
-        self.bench(garbled, button=True)
-        self.bench(never_reached, button=True, start_s=0.05)
-
-    def test_the_watchdog_of_the_device_acts_when_the_driver_freezes(self) -> None:
-        """A process that hangs cannot stop its machines; the device misses its heartbeat and does."""
-
-        async def test(b: Bench) -> None:
-            b.machine.watchdog_s = 1.0
-            thawed = threading.Event()
-            loop = asyncio.new_event_loop()
-            thread = threading.Thread(target=loop.run_forever)
-            thread.start()
-            running = asyncio.run_coroutine_threadsafe(b.driver.run(b.heard, b.heard), loop)
-            try:
-                await until(lambda: b.machine.beats > 3, "heartbeats")
-                assert b.machine.outputs == [False]
-                loop.call_soon_threadsafe(thawed.wait)  # sockets stay open, nothing moves: a frozen process
-                await until(lambda: len(b.machine.outputs) == 2, "the watchdog")
-                assert b.machine.outputs[-1] is False
-                thawed.set()
-                await until(lambda: b.heard.faults, "the driver is told")
-                assert "watchdog" in b.heard.faults[0]
-            finally:
-                thawed.set()
-                running.cancel()
-                await until(lambda: running.done() and not asyncio.all_tasks(loop), "the end")
-                loop.call_soon_threadsafe(loop.stop)
-                await asyncio.to_thread(thread.join)
-                loop.close()
-
-        self.bench(test)
-
-    def test_after_a_restart_the_machine_says_what_became_of_a_command(self) -> None:
-        """The numbers that the machine shows say it."""
-
-        async def test(b: Bench) -> None:
-            async with b.connected():
-                b.driver.send(b.place("move"), 7)
-                await until(lambda: b.machine.orders, "the command arrives")
-            b.begin()
-            async with b.connected():
-                # The safe outputs of the start have come between; the machine would show if they had ended it.
-                assert await b.driver.ask(b.place("move"), 7) is Answer.WORKING
-                assert await b.driver.ask(b.place("grip"), 1) is Answer.NOT_RECEIVED
-                assert b.heard_of("moved") == []
-                b.machine.finish()
-                await until(lambda: b.heard_of("moved") == [(True, 7)], "the completion")
-            b.begin()
-            async with b.connected():
-                assert await b.driver.ask(b.place("move"), 7) is Answer.DONE
-                assert await b.driver.ask(b.place("move"), 8) is Answer.NOT_RECEIVED
-                assert await b.driver.ask(b.place("grip"), 1) is Answer.NOT_RECEIVED
-                b.driver.send(b.place("move"), 8)
-                await until(lambda: len(b.machine.orders) == 2, "the command arrives")
-                b.machine.finish()
-                await until(lambda: b.heard_of("moved"), "the completion")
-            assert b.heard_of("moved") == [(True, 8)]
-
-        self.bench(test)
-
-    def test_a_machine_that_the_safe_outputs_of_the_start_have_stopped_leaves_it_to_a_person(self) -> None:
-        """How far it has come is to be seen only there."""
-
-        async def test(b: Bench) -> None:
-            async with b.connected():
-                b.driver.send(b.place("move"), 7)
-                await until(lambda: b.machine.orders, "the command arrives")
-            b.machine.stands_at_output = True
-            b.begin()
-            async with b.connected():
-                assert await b.driver.ask(b.place("move"), 7) is Answer.UNKNOWN
-                assert await b.driver.ask(b.place("move"), 8) is Answer.NOT_RECEIVED
-            assert len(b.machine.orders) == 1
-
-        self.bench(test)
-
-    def test_a_machine_that_cannot_be_reached_leaves_it_unknown(self) -> None:
-        """An answer is not made up."""
-
-        async def test(b: Bench) -> None:
-            await b.far.end.cut()
-            async with b.running():
-                assert await b.driver.ask(b.place("move"), 1) is Answer.UNKNOWN
-
-        self.bench(test, start_s=0.05)
 
     def test_edges_that_are_not_told_are_counted(self) -> None:
         """What was told and what was counted are together what happened."""

@@ -155,6 +155,22 @@ class Driver(Protocol):
         ...
 
 
+class Latched(Driver, Protocol):
+    """A driver that begins after an emergency stop, and is latched until it is released.
+
+    As long as it is, it drives the safe outputs on every connection, commands nothing, and takes neither an open
+    contact nor a lost device for news. It reads, and answers what it is asked.
+    """
+
+    def against(self) -> Collection[str]:
+        """What keeps it from being released, in a phrase each: contacts that are open, devices that do not answer."""
+        ...
+
+    def release(self) -> None:
+        """Be a driver as any other from now on; called only where nothing is against it."""
+        ...
+
+
 class Held(Protocol[Leaving]):
     """What is held back behind the journal (`Outbox`)."""
 

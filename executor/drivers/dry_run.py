@@ -73,6 +73,13 @@ class DryRunDriver:
         """Complete nothing any more."""
         self.is_stopped = True
 
+    def against(self) -> tuple[str, ...]:
+        """Nothing: there is no device that could be out of reach."""
+        return ()
+
+    def release(self) -> None:
+        """Nothing: no machine is stopped."""
+
     def close(self) -> bool:
         """Nothing: workpieces come and go with the tokens."""
         return False

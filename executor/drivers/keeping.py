@@ -15,7 +15,8 @@ can deal with.
 
 While the cell runs, the safe outputs are not driven on a *later* connection. What the machines do while the line is
 down is for the device's own watchdog, which knows of it in time; a driver that is back after a second would stop a
-machine that did its work.
+machine that did its work. After an emergency stop no machine does any work, and a device may have been switched off
+and on: until the stop is reset each connection begins with the safe outputs.
 """
 
 from __future__ import annotations
@@ -106,11 +107,16 @@ class Served(Protocol):
         """Whether something that is to be written has not been confirmed."""
         ...
 
+    @property
+    def is_latched(self) -> bool:
+        """Whether each connection begins with the safe outputs, and not the first one alone."""
+        ...
+
 
 class Nobody:
     """What a connection is for that is made for the safe outputs alone: for nothing else."""
 
-    is_writing = False
+    is_writing = is_latched = False
 
     def read(self, batch: Sequence[tuple[Point, Value]]) -> None:
         """Take nothing."""
@@ -272,7 +278,7 @@ class Kept:
                 self.awake.set()
 
     async def _write(self, connection: Connection) -> None:
-        if not self.started and not self.stopping:
+        if (not self.started or self.served.is_latched) and not self.stopping:
             if self.safe:
                 await connection.write(self.safe)
             self.started = True

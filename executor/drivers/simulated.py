@@ -69,6 +69,8 @@ class SimulatedDriver:
         self.clock: Clock | None = None
         self.listener: Listener = _Nobody()
         self.awake: asyncio.Event = asyncio.Event()
+        self.is_known = log is None
+        """Whether whoever listens has been told from the beginning what sensors show."""
         self.log: CellLog | None = None
         for at_seconds, what, arguments in log.past if log is not None else ():
             self._input(at_seconds, what, *arguments)
@@ -94,7 +96,7 @@ class SimulatedDriver:
         """Let the plant's events happen when they are due."""
         self.clock, self.listener = clock, listener
         loop = asyncio.get_running_loop()
-        if self.log is not None:  # perhaps of a controller that has restarted, and knows nothing of its sensors
+        if not self.is_known:  # perhaps it is a controller that has restarted, and knows nothing of its sensors
             for signal in self.sensors & self.image.keys():
                 listener.signal(signal, bool(self.image[signal].value), None)
         while True:
@@ -135,6 +137,19 @@ class SimulatedDriver:
     def stop(self) -> None:
         """Stop every machine of the plant where it is."""
         self._input(self.clock.now_seconds() if self.clock is not None else 0.0, "stop")
+
+    def latched(self) -> SimulatedDriver:
+        """The same cell for a run that goes on after an emergency stop: its machines stand until it is released."""
+        self.is_known = False
+        return self
+
+    def against(self) -> tuple[str, ...]:
+        """Nothing: there is no device that could be out of reach."""
+        return ()
+
+    def release(self) -> None:
+        """Let machines be commanded again; what the stop has broken off stays so."""
+        self._input(self.clock.now_seconds() if self.clock is not None else 0.0, "start")
 
     def close(self) -> bool:
         """Let no more workpieces come."""

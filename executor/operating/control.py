@@ -6,6 +6,8 @@
     POST /stop                       stop every machine where it is, and end the run
     POST /stop-at-end                let no new work in, and end when the cell, or what of it is here, is empty
     POST /emergency-stop             drive the safe outputs at once
+    POST /reset                      after an emergency stop: have the machines asked what they did; nothing moves
+    POST /say?place=P&answer=A       of a command of which no machine can tell: done, working, not received
 
 With a `Page` the endpoint serves that to a browser as well: its files, in which nothing of the run stands, to anybody,
 for a browser shows no token when it opens an address; and what it asks then, to those who may.
@@ -35,9 +37,11 @@ from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
 from firable.executor.operating.situation import Situation
+from firable.executor.protocol.commands import Answer
 from firable.nets.diagnostics import Diagnostic, InputError
 
 METRICS_CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
+_SAID: Final = tuple(answer.value for answer in Answer if answer is not Answer.UNKNOWN)
 SHUTDOWN_SECONDS: Final = 1.0
 """So long what is being answered may take once the run is over; then the process ends, whatever a client does."""
 
@@ -67,6 +71,14 @@ class Operated(Protocol):
 
     def emergency_stop(self, reason: str) -> None:
         """Drive the safe outputs at once."""
+        ...
+
+    def reset(self) -> Collection[str]:
+        """End the latch after an emergency stop; what is against it."""
+        ...
+
+    def say(self, place: str, answer: Answer) -> bool:
+        """Say what became of a command; whether anybody asks after it."""
         ...
 
     def commanded(self, command: str, by: str) -> None:
@@ -192,6 +204,17 @@ def application(
         run.commanded("emergency-stop", by)
         return web.json_response(_situation(run))
 
+    async def reset(request: web.Request) -> web.Response:
+        run.commanded("reset", who(request))
+        return web.json_response({"refused": list(run.reset()), **_situation(run)})
+
+    async def say(request: web.Request) -> web.Response:
+        place, word = request.query.get("place", ""), request.query.get("answer", "")
+        run.commanded(f"say {place}={word}", who(request))
+        is_asked = word in _SAID and run.say(place, Answer(word))
+        refused = [] if is_asked else [f"nobody asks after {place}" if word in _SAID else f"say {', '.join(_SAID)}"]
+        return web.json_response({"refused": refused, **_situation(run)})
+
     app = web.Application(middlewares=[admission(endpoint, () if page is None else page.public)], client_max_size=1024)
     app.router.add_get("/situation", situation)
     app.router.add_get("/metrics", metrics)
@@ -201,6 +224,8 @@ def application(
     app.router.add_post("/stop", commanding("stop", run.stop))
     app.router.add_post("/stop-at-end", commanding("stop-at-end", lambda: run.stop(at_end_of_cycle=True)))
     app.router.add_post("/emergency-stop", emergency_stop)
+    app.router.add_post("/reset", reset)
+    app.router.add_post("/say", say)
     if page is not None:
         app.router.add_routes(page.routes())
     return app

@@ -12,9 +12,9 @@ from collections.abc import Collection
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from firable.executor.operating import restart
+from firable.executor.operating import latch, restart
 from firable.executor.operating.situation import Situation, State, blocked, blocked_parts
-from firable.executor.operating.uncut import uncut
+from firable.executor.operating.uncut import Patience, uncut
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.net import Net, SignalKind
 
@@ -36,7 +36,11 @@ def situation(run: Host) -> Situation:
     if run.fault:
         return Situation(State.FAULT, run.marking, waiting, run.fault)
     if run.stopping:
-        return Situation(State.STOPPED, run.marking, waiting, run.ended_by or others, run.is_emergency)
+        if run.emergency is not None:
+            return Situation(State.STOPPED, run.marking, waiting, f"emergency stop: {run.emergency}", is_emergency=True)
+        return Situation(State.STOPPED, run.marking, waiting, run.ended_by or others)
+    if run.latch is not None:
+        return latch.situation(run)
     if run.ends_at_home and not run.is_whole:
         others = "; ".join(filter(None, (alone(run), others)))
     if run.taking_up is not None:
@@ -62,7 +66,7 @@ def ended(run: Host) -> Situation | None:
         if run.was_done and run.is_complete():
             message = "this run was done before, and nothing moved; to run the bundle again, name a new journal"
             return replace(situation(run), state=State.DONE, message=message)
-        return situation(run)
+        return None if run.served else situation(run)
     # What a pause holds back still has to fire before the cycle, or the work, is at its end.
     if run.draining and run.at_rest and not run.paused:
         return replace(situation(run), state=State.STOPPED, message=AT_THE_END)
@@ -77,14 +81,21 @@ async def close(run: Host, tasks: Collection[asyncio.Task[None]]) -> list[str]:
     """Drive the safe outputs, and end what runs beside the host; returns what had to be given up."""
     if run.taking_up is None or run.stopping:  # to look at a run that is held changes nothing
         run.make_safe()
-    for task in tasks:
-        task.cancel()
-    hanging = await uncut(tasks, run.patience)
+    hanging = await cancelled(tasks, run.patience)
     run.acts.end()
     run.dispatch.end()
+    for timer in run.waiting:
+        timer.cancel()
     if run.watching is not None:
         run.watching.end()
     return hanging
+
+
+async def cancelled(tasks: Collection[asyncio.Task[None]], patience: Patience) -> list[str]:
+    """End tasks; returns what had to be given up."""
+    for task in tasks:
+        task.cancel()
+    return await uncut(tasks, patience)
 
 
 def with_hanging(ended: Situation, hanging: Collection[str]) -> Situation:

@@ -86,7 +86,9 @@ class Groups:
         self.run.leave(self.run.acts.let_go())
 
     async def end(self, patience: Patience) -> list[str]:
-        """Wait for the sync that is under way; returns what had to be given up."""
+        """Do nothing more, and wait for the sync that is under way; returns what had to be given up."""
+        if self.turn is not None:
+            self.turn.cancel()
         if self.storing is None:
             return []
         hangs = self.is_given_up or await uncut([self.storing], patience)

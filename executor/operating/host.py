@@ -25,16 +25,17 @@ import asyncio
 from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from typing import Final
 
-from firable.executor.drivers.driver import Driver
+from firable.executor.drivers.driver import Driver, Latched
 from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.link import Link
-from firable.executor.operating import ending, restart, stopping
+from firable.executor.operating import ending, latch, lives, restart, stopping
 from firable.executor.operating.acts import Acts
 from firable.executor.operating.clock import RunClock
 from firable.executor.operating.dispatch import Dispatch
 from firable.executor.operating.figures import Figures
 from firable.executor.operating.groups import Groups
 from firable.executor.operating.items import SignalRead
+from firable.executor.operating.latch import Latch
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.log import Log
 from firable.executor.operating.monitor import Divergence, Monitor
@@ -42,7 +43,7 @@ from firable.executor.operating.peers import Peers
 from firable.executor.operating.recorder import TRACE, Recorder
 from firable.executor.operating.single_step import step
 from firable.executor.operating.situation import Situation, State
-from firable.executor.operating.uncut import Patience, uncut
+from firable.executor.operating.uncut import Patience
 from firable.executor.operating.watching import Watching
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.deciders import coordinators
@@ -81,6 +82,7 @@ class Host:
         figures: Figures | None = None,
         patience: Patience | None = None,
         log: Log | None = None,
+        latched: Callable[[], Latched] | None = None,
     ) -> None:
         self.decomposition = decomposition
         self.net = decomposition.net
@@ -88,15 +90,12 @@ class Host:
         self.recorder = recorder
         self.journal = journal or MemoryJournal()
         everything = (*coordinators(decomposition), *(subnet.name for subnet in decomposition.subnets))
-        self.dispatch = Dispatch(self, overdue_seconds)
-        here = everything if machines is None else machines
-        self.groups = Groups(self)
-        self.acts = Acts(decomposition, here, self.journal, recorder, figures, self.groups.wake, self.dispatch.left)
-        self.coordinators, self.controllers = self.acts.coordinators, self.acts.controllers
+        self.machines = everything if machines is None else machines
+        self.link = link
         self.is_whole = link is None
-        self.peers = Peers(decomposition, self.acts, link, self.told, self.groups.at_once)
         self.speed = speed
         self.begin_seconds = begin_seconds
+        self.overdue_seconds = overdue_seconds
         self.is_complete = is_complete
         self.operator = operator
         self.operated = operator is not None
@@ -106,15 +105,39 @@ class Host:
         self.divergence: Divergence | None = None
         self.stop_at_divergence = stop_at_divergence
         self.watching = None if monitor is None else Watching(monitor, self._diverged)
+        self.figures = figures
         self.log = log
         recorder.observers += [one.seen for one in (self.watching, figures, log) if one is not None]
-        self.owner_of = {
-            signal.name: name for name in self.controllers for signal in decomposition.subnet(name).signals
-        }
-        if isinstance(monitor, LocalMonitor):
-            monitor.excuse(lambda signal: self.controllers[self.owner_of[signal]].holds(signal))
         self.said = said or {}
         """What the operator has said beforehand of commands, by place."""
+        self.patience = patience or Patience()
+        self.latched = latched
+        self.latch: Latch | None = None
+        """The emergency stop that nobody has reset."""
+        self.is_to_end = False
+        """Whether somebody has asked for the end of the run."""
+        self.turn = 0
+        self.clock: RunClock | None = None
+        self.begin(resume=resume)
+        if isinstance(monitor, LocalMonitor):
+            monitor.excuse(lambda signal: self.controllers[self.owner_of[signal]].holds(signal))
+
+    def begin(self, *, resume: bool) -> None:
+        """Begin a life, with the machines of the protocol as the journal holds them."""
+        self.dispatch = Dispatch(self, self.overdue_seconds)
+        self.groups = Groups(self)
+        self.acts = Acts(
+            self.decomposition,
+            self.machines,
+            self.journal,
+            self.recorder,
+            self.figures,
+            self.groups.wake,
+            self.dispatch.left,
+        )
+        self.coordinators, self.controllers = self.acts.coordinators, self.acts.controllers
+        self.peers = Peers(self.decomposition, self.acts, self.link, self.told, self.groups.at_once)
+        self.owner_of = {signal.name: name for name, c in self.controllers.items() for signal in c.subnet.signals}
         self.taking_up: restart.TakingUp | None = None
         """What a restart has found out, as long as the controllers are held."""
         if any(controller.held for controller in self.controllers.values()):
@@ -129,17 +152,16 @@ class Host:
         """Whether the safe outputs are driven; commands that were issued and did not leave are asked after, later."""
         self.has_waited = False
         """Whether a stop has waited long enough for what is open."""
+        self.waiting: list[asyncio.TimerHandle] = []
+        """What a stop does when it has waited long enough."""
         self.left_nothing_open = False
+        self.emergency = None if self.latch is None else self.latch.reason
+        """Why there was an emergency stop, if there was one."""
         self.ended_by = ""
-        self.is_emergency = False
-        """Whether there was an emergency stop."""
         self.fault = ""
-        self.patience = patience or Patience()
-        self.turn = 0
         self.ended: Situation | None = None
-        """How the run has ended, as soon as that is decided."""
+        """How this life has ended, as soon as that is decided."""
         self.quiet_waiters: list[asyncio.Future[None]] = []
-        self.clock: RunClock | None = None
         self.outcome: asyncio.Future[Situation] | None = None
 
     # The run
@@ -149,45 +171,7 @@ class Host:
 
         Raises `InputError` where the link, the journal or the trace fails; the safe outputs are driven before.
         """
-        clock = self.clock = self.acts.clock = RunClock.going_on(self.begin_seconds, self.speed)
-        self.outcome = clock.loop.create_future()
-        if self.watching is not None:
-            self.watching.begin(clock)
-        works = {"driver": self.driver.run(clock, self), "link": self.peers.run()}
-        if self.taking_up is not None:
-            works["restart"] = restart.take_up(self, self.taking_up)
-        if self.operator is not None:
-            works["operator"] = self._operate(self.operator)
-        tasks = [asyncio.create_task(work, name=name) for name, work in works.items()]
-        for task in tasks:
-            task.add_done_callback(self._task_ended)
-        if self.log is not None:
-            self.log.began(self.net.name, [*self.coordinators, *self.controllers])
-        try:
-            self.acts.start()
-            if self.taking_up is None:
-                restart.tell_unasked(self, ())
-            ended = await self._outcome(self.outcome)
-        finally:
-            hanging = await ending.close(self, tasks)
-            hanging += await self.groups.end(self.patience)
-        ended = ending.with_unconfirmed(ending.with_hanging(ended, hanging), self.driver.unconfirmed)
-        ended = ending.with_failed(ended, tasks[0])
-        if self.left_nothing_open:
-            self.recorder.end(self.now_seconds(), self.marking, ended.state.value)
-        else:
-            self.recorder.flush()
-        if self.log is not None:
-            self.log.ended(ended)
-        return ended
-
-    async def _outcome(self, outcome: asyncio.Future[Situation]) -> Situation:
-        try:
-            return await asyncio.shield(outcome)
-        except asyncio.CancelledError:
-            self.stop()  # Ctrl-C, or a request to terminate, is the operator's stop: the run ends in order
-            await uncut([outcome])
-            return outcome.result()
+        return await lives.to_the_end(self)
 
     def now_seconds(self) -> float:
         """The time since the run began."""
@@ -224,9 +208,9 @@ class Host:
     def resume(self) -> bool:
         """Let transitions fire again after a pause, or after a restart once nothing about it is uncertain.
 
-        False where it is not, or the host is stopping: what is owed would be commanded after the stop.
+        False where it is not, or the host is latched or stopping: what is owed would be commanded after the stop.
         """
-        if self.stopping or restart.uncertain(self):
+        if self.stopping or self.latch is not None or restart.uncertain(self):
             return False
         if self.taking_up is not None:
             restart.release(self)
@@ -245,8 +229,16 @@ class Host:
         stopping.stop(self, at_end_of_cycle=at_end_of_cycle)
 
     def emergency_stop(self, reason: str) -> None:
-        """Drive the safe outputs at once, before anything is written or said; the run ends, and can be taken up."""
+        """Drive the safe outputs at once, before anything is written or said; it can be reset, or the run ends."""
         stopping.emergency_stop(self, reason)
+
+    def reset(self) -> tuple[str, ...]:
+        """End the latch after an emergency stop: the machines are asked, nothing moves. Returns what is against it."""
+        return latch.reset(self)
+
+    def say(self, place: str, answer: Answer) -> bool:
+        """Say what became of a command that no machine can tell of; False where nobody asks after it."""
+        return restart.say(self, place, answer)
 
     def commanded(self, command: str, by: str) -> None:
         """Who commanded what stands in the trace."""
@@ -265,7 +257,8 @@ class Host:
             self.quiet_waiters.append(waiter)
             await waiter
 
-    async def _operate(self, operator: Callable[[Host], Awaitable[None]]) -> None:
+    async def operate(self, operator: Callable[[Host], Awaitable[None]]) -> None:
+        """Let an operator act until that ends; then a run that only an operator could have changed may end."""
         await operator(self)
         self.operated = False
         self.groups.wake()
@@ -373,7 +366,8 @@ class Host:
         except Exception as error:  # a timer has no caller
             self.broken(error)
 
-    def _task_ended(self, task: asyncio.Task[None]) -> None:
+    def task_ended(self, task: asyncio.Task[None]) -> None:
+        """What runs beside the host has ended: with an error the run does."""
         if not task.cancelled() and (error := task.exception()) is not None:
             self.broken(error)
 

@@ -8,12 +8,12 @@ signed it; at connection the hosts compare what they hold.
 from __future__ import annotations
 
 import ssl
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from firable.executor.drivers.driver import Driver
+from firable.executor.drivers.driver import Driver, Latched
 from firable.executor.links.link import Greeting, Link
 from firable.executor.operating.host import Host, Told
 from firable.executor.operating.local_monitor import LocalMonitor
@@ -176,13 +176,15 @@ def run_host(
     log: Log | None = None,
     plant: PlantModel | None = None,
     watch: Watch = Watch.TELL,
+    latched: Callable[[], Latched] | None = None,
 ) -> HostReport:
     """Run a host until it is stopped (Ctrl-C, SIGTERM, an operator) or fails.
 
     `resume` ends the hold after a restart by itself; `said` is what an operator says of commands, by place, where no
     machine can tell what became of them. Where a `plant` says what the machines should do, those here are held against
-    it as the run goes (`watch`), unless it is taken up. Raises `InputError` as link, journal and trace do, and F5003
-    where the plant does not fit.
+    it as the run goes (`watch`), unless it is taken up. With a `service`, and `latched` to make the driver of the same
+    machines anew, it stays after an emergency stop until that is reset. Raises `InputError` as link, journal and trace
+    do, and F5003 where the plant does not fit.
     """
     controllers = [subnet.name for subnet in bundle.decomposition.subnets if subnet.name in machines]
     monitor = None
@@ -209,6 +211,7 @@ def run_host(
             log=log,
             monitor=monitor,
             stop_at_divergence=watch is Watch.STOP,
+            latched=latched,
         )
         situation = run_to_the_end(host, service, figures)
     acts = host.acts

@@ -25,7 +25,7 @@ from firable.semantics.trace import Event, Noted
 
 LEVELS: Final[Mapping[str, int]] = MappingProxyType(
     {
-        **dict.fromkeys(("fault", "divergence", "emergency stop"), logging.ERROR),
+        **dict.fromkeys(("fault", "divergence", "emergency stop", "latched"), logging.ERROR),
         **dict.fromkeys(
             ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold"), logging.WARNING
         ),

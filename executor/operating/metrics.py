@@ -92,6 +92,7 @@ class Metrics:
         self.faults = Counter(
             "firable_faults", "Faults, divergences and emergency stops told", ["kind"], registry=registry
         )
+        self.latched = Gauge("firable_latched", "1 after an emergency stop, until it is reset", registry=registry)
         self.since: dict[str, float] = {}
         self.fired_at: dict[str, float] = {}
         self.sent_at: dict[str, tuple[float, str]] = {}
@@ -127,6 +128,8 @@ class Metrics:
             case Noted(_, note):
                 if note in ("fault", "divergence", "emergency stop"):
                     self.faults.labels(note).inc()
+                if note in ("emergency stop", "reset"):
+                    self.latched.set(note == "emergency stop")
 
     def message(self, message: Message, *, again: bool = False) -> None:
         """Count a message between a controller and the coordinator; `again` where it repeats an unanswered one."""

@@ -77,6 +77,20 @@ def tell_unasked(run: Host, asked: Collection[str]) -> None:
             run.told(UNASKED, f"nobody asked after {place}: what is said of it changes nothing")
 
 
+def say(run: Host, place: str, answer: Answer) -> bool:
+    """Take the operator's word on a command of which no machine can tell; False where nobody asks after it (yet)."""
+    found = run.taking_up
+    if found is None or not found.is_final or run.stopping or place not in uncertain(run):
+        return False
+    found.answers[place] = answer
+    for name, controller in run.controllers.items():
+        for asked, entry in controller.commands.questions:
+            if asked == place:
+                run.note("said", place=place, answer=answer.value)
+                run.answer(name, place, entry, answer)
+    return True
+
+
 def release(run: Host) -> None:
     """End the hold: what is owed is sent, and what is enabled fires."""
     run.taking_up = None
@@ -101,5 +115,6 @@ def told(run: Host, found: TakingUp) -> str:
         if place not in found.answers:
             lines.append(f"'{run.net.place(place).command}' of '{place}' was decided and not sent; it will be")
     if open_ := uncertain(run):
-        lines.append(f"look at the machine and say what it did: --say {open_[0]}=done, =working or =not-received")
+        how = "say" if run.served else "--say"
+        lines.append(f"look at the machine and say what it did: {how} {open_[0]}=done, =working or =not-received")
     return "; ".join(lines)

@@ -191,13 +191,15 @@ def execute(
     """
     _check(plant, decomposition.net, workpieces, speed, overdue_seconds)
     cell = Plant(plant, workpieces=workpieces, seed=seed, disturbances=disturbances)
+    net = decomposition.net
     with opened(decomposition, digest, journal_path, trace, simulated=(plant, workpieces, seed)) as files:
         # A run that is taken up may begin in any marking of the machines, which no model of them tells.
         watched = watch is not Watch.IGNORE and not files.is_taken_up
-        figures = figures_for(decomposition.net, service)
+        figures = figures_for(net, service)
+        driver = SimulatedDriver(cell, net, files.cell)
         host = Host(
             decomposition,
-            SimulatedDriver(cell, decomposition.net, files.cell),
+            driver,
             files.recorder,
             speed=1.0 if speed is None else speed,
             overdue_seconds=overdue_seconds,
@@ -207,11 +209,12 @@ def execute(
             resume=resume,
             said=said,
             begin_seconds=files.begin_seconds,
-            monitor=Monitor(decomposition.net, plant) if watched else None,
+            monitor=Monitor(net, plant) if watched else None,
             stop_at_divergence=watch is Watch.STOP,
             figures=figures,
             log=log,
             tell=tell,
+            latched=driver.latched,
         )
         situation = run_to_the_end(host, service, figures, virtual=speed is None)
     delivered = tuple(workpiece.id for workpiece in cell.delivered)
@@ -279,6 +282,7 @@ def run_bound(
             stop_at_divergence=watch is Watch.STOP,
             figures=figures,
             log=log,
+            latched=lambda: bound_driver(binding, bundle.net, latched=True),
         )
         situation = run_to_the_end(host, service, figures)
         recorder = files.recorder

@@ -7,6 +7,7 @@ Asked at quiescence, when no message is under way, the joint marking and the pro
   has seen nothing;
 - *held*: after a restart; nothing moves until an operator resumes, and nothing can be resumed while it is unknown what
   became of a command;
+- *latched*: after an emergency stop, until an operator resets it; then it is held;
 - *fault*: the driver reported one, or a command is overdue: sent longer ago than its limit and not completed. A net
   cannot tell a slow machine from a dead one; only time does, so a fault is never concluded from the marking.
 """
@@ -31,6 +32,7 @@ class State(StrEnum):
     FAULT = "fault"
     PAUSED = "paused"
     HELD = "held"
+    LATCHED = "latched"
     STOPPED = "stopped"
     DONE = "done"
 

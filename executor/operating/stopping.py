@@ -7,8 +7,8 @@ machine where it is. Where all machines are here it takes no time. *Stop at the 
 in, and the run ends when the cell is at rest; a host among others takes its votes back when it is at rest, and goes on
 if an order comes before the word that none is open. *Emergency stop*: the safe outputs first, before anything is
 written or said, and whatever has become of coordinator and link; what was decided is applied all the same, so that
-nobody waits for it, and its commands are asked after at the restart. A *fault* of the driver, or a command that is
-overdue, does the same by itself.
+nobody waits for it, and its commands are asked after at the restart, or at the reset (`latch.py`). A *fault* of the
+driver, or a command that is overdue, does the same by itself, and is not reset.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ def stop(run: Host, *, at_end_of_cycle: bool = False) -> None:
         if not run.driver.close():
             run.acts.forgo(ending.beginnings(run.net))
             run.ends_at_home = True
-    elif not run.stopping:
+        return
+    run.is_to_end = True
+    if not run.stopping:
         if run.is_whole and run.groups.storing is not None:
             run.make_safe()  # at the end of the run otherwise, which follows at once
         run.ended_by = run.ended_by or ("stopped by the operator" if run.is_whole else "")
@@ -40,9 +42,9 @@ def stop(run: Host, *, at_end_of_cycle: bool = False) -> None:
 
 
 def emergency_stop(run: Host, reason: str) -> None:
-    """Drive the safe outputs at once, before anything is written or said; the run ends, and can be taken up."""
+    """Drive the safe outputs at once, before anything is written or said; it can be reset, or the run ends."""
     run.make_safe()
-    run.ended_by, run.is_emergency = f"emergency stop: {reason}", True
+    run.emergency = reason
     _end_soon(run, "emergency stop", reason=reason)
 
 
@@ -84,8 +86,8 @@ def _end_soon(run: Host, note: str, **data: str) -> None:
         run.acts.leave()
     if run.clock is not None:
         if not run.is_whole:
-            run.clock.loop.call_later(SETTLE_SECONDS, _wait_no_longer, run)
-        run.clock.loop.call_later(run.patience.seconds, run.groups.give_up)
+            run.waiting.append(run.clock.loop.call_later(SETTLE_SECONDS, _wait_no_longer, run))
+        run.waiting.append(run.clock.loop.call_later(run.patience.seconds, run.groups.give_up))
 
 
 def _wait_no_longer(run: Host) -> None:

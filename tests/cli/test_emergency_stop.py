@@ -161,3 +161,56 @@ def test_open_contact_stops_the_machines_of_its_controller_and_the_run_stays_sto
         for process in processes:
             process.kill()
             process.communicate()
+
+
+def test_host_whose_coordinator_is_dead_is_latched_by_its_contact_and_goes_on_when_it_is_reset_and_resumed(
+    bundle: str, lamp: Lamp, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bind, token, log = tmp_path / "cell.bind.yaml", str(tmp_path / "token"), tmp_path / "log"
+    bind.write_text(BINDING.format(port=lamp.end.port))
+    serve = ["--serve", f"127.0.0.1:{free_port()}", "--token-file", token, "--log", str(log)]
+    mine, at = [bundle, "--bind", str(bind), *serve], f"tcp/127.0.0.1:{free_port()}"
+    other = [bundle, "--controller", "b", "--coordinator", "--listen", at, "--dry-run", "0"]
+    other += ["--journal", str(tmp_path / "journal")]
+    mine += ["--controller", "a", "--join", at]
+
+    def operate(*command: str) -> str:
+        main(["operate", f"http://{serve[1]}", *command, "--token-file", token])
+        return capsys.readouterr().out
+
+    processes = [started(*mine), started(*other)]
+    try:
+        until(lambda: lamp.machine.outputs == [False], "the start")
+        lamp.show("sensor", value=True)
+        until(lambda: lamp.machine.orders, "a command that both controllers had to agree on")
+        processes[1].kill()
+        lamp.show("button", value=False)
+        until(lambda: len(lamp.machine.outputs) >= 3, "the safe outputs, by the stop and by the next connection")
+        until(lambda: "before it can be reset: plc: 'button' is not closed" in operate("situation"), "the latch")
+        assert "refused: plc: 'button' is not closed" in operate("reset")
+        assert "firable_latched 1.0" in operate("metrics")
+        lamp.show("button", value=True)
+        until(lambda: "it can be reset" in operate("situation"), "that it may be reset")
+        assert operate("resume").startswith("latched")
+        assert operate("reset").startswith("held")
+        processes.append(started(*other, "--resume"))
+        lamp.show("sensor", value=False)  # then they may take it back, and do it again
+        assert len(lamp.machine.orders) == 1, "nothing moves by a reset"
+        until(lambda: not operate("resume").startswith("held"), "the resumption")
+        until(lambda: "a.free" in operate("situation").splitlines()[1], "a transition of both")
+        lamp.show("sensor", value=True)
+        until(lambda: len(lamp.machine.orders) == 2, "the next command")
+        assert processes[0].poll() is None
+        told = [json.loads(line)["event"] for line in log.read_text().splitlines()]
+        assert [event for event in told if event in {"emergency stop", "not reset", "reset", "taken up"}] == [
+            "emergency stop",
+            "not reset",
+            "reset",
+            "taken up",
+        ]
+        operate("stop")
+        processes[0].communicate(timeout=60)
+    finally:
+        for process in processes:
+            process.kill()
+            process.communicate()

@@ -156,6 +156,7 @@ def test_an_operator_stops_the_machines_of_one_host_although_its_coordinator_nev
         assert main(["operate", told.group(), "situation", "--token-file", token]) == 0
         assert "G2 is ready here, and is decided by the coordinator" in capsys.readouterr().out
         assert main(["operate", told.group(), "emergency-stop", "--token-file", token]) == 0
+        assert main(["operate", told.group(), "stop", "--token-file", token]) == 0
         out, _ = process.communicate(timeout=60)
     finally:
         process.kill()

@@ -48,9 +48,18 @@ def served(bundle: Path, tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str]
         process.communicate()
 
 
-def operate(address: str, command: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    assert main(["operate", address, command, "--token-file", str(folder / "token")]) == 0
+def operate(address: str, command: str, folder: Path, capsys: pytest.CaptureFixture[str], *, code: int = 0) -> str:
+    assert main(["operate", address, *command.split(), "--token-file", str(folder / "token")]) == code
     return capsys.readouterr().out
+
+
+def until_told(
+    address: str, words: str, folder: Path, capsys: pytest.CaptureFixture[str], command: str = "situation"
+) -> str:
+    deadline = time.monotonic() + SECONDS_MAX
+    while words not in (told := operate(address, command, folder, capsys)):
+        assert time.monotonic() < deadline, told
+    return told
 
 
 def test_an_operator_pauses_steps_resumes_and_stops_a_run_at_once(
@@ -66,6 +75,9 @@ def test_an_operator_pauses_steps_resumes_and_stops_a_run_at_once(
     assert "firable_firings_total" in operate(address, "metrics", folder, capsys)
     operate(address, "resume", folder, capsys)
     operate(address, "emergency-stop", folder, capsys)
+    until_told(address, "latched: emergency stop: by token", folder, capsys)
+    assert operate(address, "resume", folder, capsys).startswith("latched")
+    operate(address, "stop", folder, capsys)
     out, _ = process.communicate(timeout=SECONDS_MAX)
     assert process.returncode == 3, "whether all workpieces go through is not known"
     report = json.loads(out)["reports"][0]["run"]
@@ -75,6 +87,30 @@ def test_an_operator_pauses_steps_resumes_and_stops_a_run_at_once(
     assert {note.data.get("what") for note in notes} >= {"pause", "step", "resume", "emergency-stop"}
     stopped = next(note.at_seconds for note in notes if note.note == "emergency stop")
     assert not [e for e in trace.events if isinstance(e, CommandSent) and e.at_seconds > stopped]
+    assert main(["replay", str(folder / "run.trace"), "--net", str(bundle)]) == 0
+
+
+def test_an_operator_resets_an_emergency_stop_says_what_a_machine_did_and_resumes(
+    served: tuple[subprocess.Popen[str], str, Path], bundle: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    process, address, folder = served
+    assert "there is no emergency stop" in operate(address, "reset", folder, capsys, code=1)
+    until_told(address, "robot.to_cv1", folder, capsys)
+    operate(address, "emergency-stop", folder, capsys)
+    until_told(address, "latched", folder, capsys)
+    assert operate(address, "reset", folder, capsys).startswith("held")
+    told = until_told(address, "nobody knows what became of it", folder, capsys)
+    place = re.search(r"say (\S+)=done", told)
+    assert place is not None
+    assert operate(address, "resume", folder, capsys).startswith("held")
+    assert "nobody asks after mc.fix" in operate(address, "say mc.fix=done", folder, capsys, code=1)
+    operate(address, f"say {place[1]}=not-received", folder, capsys)
+    assert not operate(address, "resume", folder, capsys).startswith("held")
+    until_told(address, "robot.grasp_cv1", folder, capsys)
+    operate(address, "stop", folder, capsys)
+    out, _ = process.communicate(timeout=SECONDS_MAX)
+    report = json.loads(out)["reports"][0]["run"]
+    assert (process.returncode, report["message"]) == (3, "stopped by the operator")
     assert main(["replay", str(folder / "run.trace"), "--net", str(bundle)]) == 0
 
 

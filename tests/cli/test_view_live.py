@@ -88,6 +88,13 @@ def test_an_emergency_stop_sends_no_command_any_more(chromium: Browser, bundle: 
         expect(page.locator(".events .fired").first).to_be_attached()
         page.get_by_role("button", name="Emergency stop").click()
         expect(page.get_by_role("alert").or_(page.locator(".banner"))).to_contain_text("emergency stop: by token")
+        state(page, "latched")
+        expect(page.get_by_role("button", name="Pause")).to_be_disabled()
+        page.get_by_role("button", name="Reset").click()
+        state(page, "held")
+        expect(page.get_by_role("button", name="Reset")).to_have_count(0)
+        expect(page.get_by_role("button", name="Resume")).to_be_enabled()
+        page.get_by_role("button", name="Stop", exact=True).click()
         assert process.wait(timeout=60) == 3
     events = read_trace(trace).events
     stopped = next(e.at_seconds for e in events if getattr(e, "note", "") == "emergency stop")

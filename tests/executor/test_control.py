@@ -21,6 +21,7 @@ from cryptography.x509.oid import NameOID
 from firable.cli.run import run
 from firable.executor.operating.control import Endpoint, new_token, serving, tls_context
 from firable.executor.operating.situation import Situation, State
+from firable.executor.protocol.commands import Answer
 from firable.nets.diagnostics import InputError
 
 TOKEN = "a-token-of-some-length"
@@ -51,6 +52,14 @@ class Told:
 
     def emergency_stop(self, reason: str) -> None:
         self.log.append(f"emergency stop {reason}")
+
+    def reset(self) -> tuple[str, ...]:
+        self.log.append("reset")
+        return ("D: 'button' is not closed",)
+
+    def say(self, place: str, answer: Answer) -> bool:
+        self.log.append(f"say {place} {answer.name}")
+        return place == "robot.grasp"
 
     def commanded(self, command: str, by: str) -> None:
         self.log.append(f"{by}: {command}")
@@ -96,10 +105,36 @@ def test_every_command_reaches_the_run_with_the_name_of_who_gave_it() -> None:
     ]
 
 
+def test_a_reset_and_what_is_said_of_a_command_are_answered_by_what_is_against_them() -> None:
+    async def ask(session: ClientSession, url: str) -> None:
+        for path, refused in [
+            ("reset", ["D: 'button' is not closed"]),
+            ("say?place=robot.grasp&answer=not received", []),
+            ("say?place=robot.free&answer=done", ["nobody asks after robot.free"]),
+            ("say?place=robot.grasp&answer=unknown", ["say done, working, not received"]),
+        ]:
+            async with session.post(f"{url}/{path}", headers=BEARER) as answer:
+                assert (await answer.json())["refused"] == refused
+
+    log = with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask)
+    assert [line for line in log if "token" not in line] == [
+        "reset",
+        "say robot.grasp NOT_RECEIVED",
+        "say robot.free DONE",
+    ]
+    assert log[0] == "token: reset"
+
+
 @pytest.mark.parametrize("headers", [{}, {"Authorization": "Bearer wrong"}, {"Authorization": f"Basic {TOKEN}"}])
 def test_who_shows_no_token_learns_nothing_and_moves_nothing(headers: dict[str, str]) -> None:
     async def ask(session: ClientSession, url: str) -> None:
-        for method, path in [("POST", "/stop"), ("POST", "/resume"), ("GET", "/situation"), ("GET", "/metrics")]:
+        for method, path in [
+            ("POST", "/stop"),
+            ("POST", "/resume"),
+            ("POST", "/reset"),
+            ("GET", "/situation"),
+            ("GET", "/metrics"),
+        ]:
             async with session.request(method, url + path, headers=headers) as answer:
                 assert answer.status == 401
                 assert "robot" not in await answer.text()

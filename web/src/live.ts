@@ -47,7 +47,7 @@ interface Now {
 const SILENT_MS = 2500;
 const RETRY_MS = 1000;
 const EVENTS_SHOWN = 200;
-const BAD = new Set(["fault", "deadlock"]);
+const BAD = new Set(["fault", "deadlock", "latched"]);
 const SIGNS: Record<string, [string, string]> = {
   ready: ["●", "ready"], yes: ["✓", "votes yes"], promised: ["◐", "has promised"], no: ["○", "not ready"], ordered: ["…", "has its order"],
   applied: ["✓", "has applied"], lost: ["✗", "not connected"], unknown: ["?", "not known here"],
@@ -66,6 +66,7 @@ export class Live {
   private readonly buttons: HTMLButtonElement[] = [];
   private readonly pauseButton: HTMLButtonElement;
   private readonly stepButton: HTMLButtonElement;
+  private readonly resetButton: HTMLButtonElement;
   private heard = performance.now();
   private now: Now | null = null;
   private lost = false;
@@ -86,6 +87,9 @@ export class Live {
     this.stepButton = button("Step", "step", "While paused, fire one transition");
     button("Stop at end of cycle", "stop-at-end", "Let no new work in, and end when the cell is empty");
     button("Stop", "stop", "Stop every machine where it is, and end the run");
+    // A button of its own: one that turns into Resume under a second click would start machines.
+    this.resetButton = button("Reset", "reset", "After an emergency stop: have the machines asked what they did. Nothing moves before Resume");
+    this.resetButton.hidden = true;
     button("Emergency stop", "emergency-stop", "Drive the safe outputs at once. This is no safety function: the wired one is", "emergency");
     const lanes = h("section", { class: "machines", "aria-label": "Machines" }, this.lanes.element);
     if (start.net.places.some((place) => place.machine !== null)) this.frame.below.append(lanes);
@@ -191,6 +195,9 @@ export class Live {
     const over = now.ended || state === "stopped" || state === "done" || state === "fault";
     for (const one of this.buttons) one.disabled = over && !one.classList.contains("emergency");
     if (!over) this.stepButton.disabled = !now.paused;
+    const latched = state === "latched";
+    this.resetButton.hidden = !latched;
+    if (latched) this.pauseButton.disabled = this.stepButton.disabled = true;
   }
 
   private showWaits(now: Now): void {
@@ -233,7 +240,12 @@ export class Live {
 
   private async command(path: string, words: string): Promise<void> {
     try {
-      const answer = await ask<{ fired?: string | null }>(path, {});
+      const answer = await ask<{ fired?: string | null; refused?: string[] }>(path, {});
+      if (answer.refused?.length) {
+        announce(`${words} is refused: ${answer.refused.join("; ")}.`);
+        this.frame.hint.textContent = `${words} is refused: ${answer.refused.join("; ")}.`;
+        return;
+      }
       if (path === "step") announce(answer.fired ? `${answer.fired} has fired.` : "Nothing is enabled.");
       else announce(`${words}: done.`);
       if (path === "step" && !answer.fired) this.frame.hint.textContent = "Nothing is enabled: no step was done.";

@@ -2,76 +2,19 @@
 
 import asyncio
 import io
-import re
-import socket
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable
 
-from support.cells import decomposition_of, plant_of
+from support.served_cells import DECOMPOSITION, NET, Served, served
 
-from firable.executor.cell.plant import Disturbance, Drops, NeverCompletes, Plant
+from firable.executor.cell.plant import Drops, NeverCompletes
 from firable.executor.drivers.bench import until
-from firable.executor.drivers.binding import Binding, parse_binding
 from firable.executor.drivers.bound import bound_driver
-from firable.executor.drivers.far_side.cell import CellServer
-from firable.executor.drivers.far_side.end import FarEnd
-from firable.executor.drivers.far_side.ends import binding_text, ends_of
-from firable.executor.drivers.far_side.serial_device import SerialEnd
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import Situation, State
 from firable.nets.interchange import net_digest
 from firable.semantics.replaying import replay
 from firable.semantics.trace import parse_trace
-
-DECOMPOSITION = decomposition_of("one_robot")
-NET = DECOMPOSITION.net
-
-
-@dataclass
-class Served:
-    """A cell that is served, and what it said."""
-
-    binding: Binding
-    plant: Plant
-    cell: CellServer
-    said: list[str] = field(default_factory=list)
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
-@asynccontextmanager
-async def served(
-    workpieces: int, *disturbances: Disturbance, speed: float = 50.0, knows_numbers: bool = True
-) -> AsyncIterator[Served]:
-    """The one-robot cell over Modbus and a serial line, fifty times as fast as it would be."""
-    line = SerialEnd()
-    line.line.open()
-    text = binding_text(NET, {"modbus": str(free_port()), "serial": line.line.near}, plant_of("one_robot").sensors)
-    if not knows_numbers:
-        numbers = r"number: holding (\d+), taken: input (\d+), done: input (\d+), failed: input (\d+)"
-        bits = r"request: coil \1, taken: discrete 1\2, done: discrete 1\3, failed: discrete 1\4"
-        text, count = re.subn(numbers, bits, text)
-        assert count
-    binding = parse_binding(text)
-    ends: dict[str, FarEnd] = {**ends_of(binding.without({"serial"})), "serial": line}
-    plant = Plant(plant_of("one_robot"), workpieces=workpieces, disturbances=disturbances)
-    said: list[str] = []
-    cell = CellServer(binding, NET, plant, ends, speed=speed, tell=lambda _, what: said.append(what))
-    await cell.start()
-    running = asyncio.create_task(cell.run())
-    try:
-        yield Served(binding, plant, cell, said)
-    finally:
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
-        await cell.stop()
 
 
 async def executed(one: Served, done: Callable[[], object], *, overdue_seconds: float = 20.0) -> Situation:

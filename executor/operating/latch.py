@@ -1,0 +1,113 @@
+"""After an emergency stop: the process stays, with the safe outputs driven, until a person has reset it.
+
+A life of a host ends by an emergency stop as by any other: what was decided is applied, what was done is durable, the
+driver has stopped the machines, the link is closed. Where somebody can reset it, an operator at the terminal or one
+who is served from elsewhere, the next life begins at once, *latched*, and by the way of a restart: the machines of the
+protocol are made of what the journal holds, and are held (`restart.py`). So there is one way back into the middle of a
+run, whether its process has ended or not, and what is proved and rehearsed of it is so of both. The link is there
+again, so that nobody elsewhere waits for what was promised here; and the driver is a new one that is latched, too
+(`drivers.driver.Latched`): it drives the safe outputs on every connection and watches the contacts.
+
+Three words lead back to a cell that moves, and none is said by a program. The contact is closed, at the button. The
+*reset* is refused as long as anything is against it, a contact that is open or a device that does not answer; then the
+machines are asked what became of each command, and where they cannot tell, the operator says it. And the run is
+*resumed*. What was said beforehand, when the process was started, counts for none of it: a reset must not start a
+machine by itself (EN ISO 13850, 4.1.4).
+
+The process ends as before where nobody could reset it; where the end was asked for as well; where something failed
+besides: a fault, a driver that hangs. Where a device has not confirmed its safe outputs it stays, and goes on trying.
+
+Rejected: to go on with the machines of the protocol as they are, held anew. It is shorter, and a second way back that
+must be right in every marking. Rejected: a fault that latches likewise. A fault is of the program or of a device that
+does not do what it should, and a new process is the better answer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+from firable.executor.drivers.driver import Latched
+from firable.executor.operating import restart
+from firable.executor.operating.situation import Situation, State
+
+if TYPE_CHECKING:
+    from firable.executor.operating.host import Host
+
+LATCHED: Final = "latched"
+"""The kind of note of what is to be done before a reset."""
+_LOOK_SECONDS: Final = 0.2
+"""So often it is looked for what is against a reset."""
+
+
+@dataclass
+class Latch:
+    """An emergency stop that nobody has reset."""
+
+    reason: str
+    driver: Latched
+    was_reset: asyncio.Event = field(default_factory=asyncio.Event)
+
+
+def may_stay(run: Host) -> bool:
+    """Whether a host that has been stopped goes on latched, as far as it is known before its driver has ended."""
+    somebody = run.served or run.operated
+    is_wanted = run.emergency is not None and not run.fault and not run.is_to_end
+    return is_wanted and somebody and run.latched is not None
+
+
+def stays(run: Host, driver: asyncio.Task[None]) -> bool:
+    """Whether it does, once all of it has ended."""
+    own = asyncio.current_task()
+    if own is not None and own.cancelling():  # Ctrl-C, while the safe outputs were driven
+        return False
+    has_failed = driver.done() and not driver.cancelled() and driver.exception() is not None
+    return may_stay(run) and not has_failed
+
+
+def reset(run: Host) -> tuple[str, ...]:
+    """End the latch, so that the machines are asked what became of their commands; returns what is against it."""
+    if run.latch is None:
+        return ("there is no emergency stop to be reset",)
+    if run.stopping:
+        return ("the run is ending",)
+    if against := tuple(run.latch.driver.against()):
+        run.note("not reset", message="; ".join(against))
+        return against
+    run.latch.driver.release()
+    run.latch.was_reset.set()
+    run.latch = None
+    run.emergency = None
+    run.note("reset")
+    return ()
+
+
+async def take_up(run: Host, found: restart.TakingUp) -> None:
+    """Wait until the latch is reset, if there is one, and tell of what is against it; then as after a restart."""
+    said = ""
+    while (latch := run.latch) is not None:
+        if (now := told(run)) != said:
+            said = now
+            run.told(LATCHED, said)
+        with suppress(TimeoutError):
+            await asyncio.wait_for(latch.was_reset.wait(), _LOOK_SECONDS)
+    await restart.take_up(run, found)
+
+
+def told(run: Host) -> str:
+    """The latch in words, and what there is to do."""
+    if run.latch is None:
+        return ""
+    against = "; ".join(run.latch.driver.against())
+    todo = (
+        f"before it can be reset: {against}" if against else "it can be reset; then nothing moves until it is resumed"
+    )
+    return f"emergency stop: {run.latch.reason}; the machines are held safe; {todo}"
+
+
+def situation(run: Host) -> Situation:
+    """What a latched host is doing."""
+    others = "; ".join(sentence for sentence in run.peers.waits() if "is held" not in sentence)
+    return Situation(State.LATCHED, run.marking, (), "; ".join(filter(None, (told(run), others))), is_emergency=True)
