@@ -16,11 +16,11 @@ from typing import Final
 
 from firable.executor.protocol.messages import ProtocolError
 from firable.executor.simulation.faults import KINDS, Faults
-from firable.executor.simulation.judge import Subject
+from firable.executor.simulation.judge import RunFailedError, Subject
 from firable.executor.simulation.machinery import MachineError
 from firable.executor.simulation.recovery import ProgressLostError, recover
 from firable.executor.simulation.timekeeper import TimeLimitError
-from firable.executor.simulation.world import REAL, Machines, RunFailedError, World
+from firable.executor.simulation.world import REAL, Machines, World
 from firable.nets.diagnostics import InputError
 
 STEPS: Final = (50, 800)

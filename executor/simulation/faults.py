@@ -42,6 +42,7 @@ KINDS: Final[Mapping[str, str]] = MappingProxyType(
         "step": "the operator steps",
         "stop": "the operator stops everything, and starts it again",
         "leave": "the operator stops one host, and starts it again; some stay after all",
+        "emergency": "an emergency stop at one host, whose process stays, and is reset later",
     }
 )
 """Each kind of fault, and what it does. To add one: a row here, and where `Faults` is asked for it."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
+from firable.executor.simulation.hosts import emergency_stop, ends, latch, reset
 from firable.executor.simulation.process import Process
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def happen(world: World) -> None:
     for kind, amount in world.faults.intensities.items():
         if kind in _HAPPENINGS and world.draw.random() < 0.5 * amount:
             _HAPPENINGS[kind](world)
-    needy = [process for process in world.processes if process.machine is None or process.is_held]
+    needy = [process for process in world.processes if process.machine is None or process.is_held or process.is_safe]
     if needy and world.draw.random() < 0.4:
         tend(needy[int(world.draw.random() * len(needy))], world)
     for job in world.cell.working:
@@ -33,9 +34,13 @@ def happen(world: World) -> None:
 
 
 def tend(process: Process[Any], world: World) -> None:
-    """Restart a process that is down; resume a controller that is held."""
+    """Restart a process that is down; latch one that is stopped, reset one that is latched; resume one that is held."""
     if process.machine is None:
         world.restart(process)
+    elif process.is_latched:
+        reset(world, process)
+    elif process.is_safe:
+        latch(world, process)
     elif process.is_held:
         release(process, world)
 
@@ -109,7 +114,7 @@ def _stop(world: World) -> None:
 
 def _leave(world: World) -> None:
     process = world.any_controller()
-    if (machine := process.machine) is None:
+    if (machine := process.machine) is None or process.is_safe:
         return
     if not machine.leaving:
         if world.draw.random() < 0.3:
@@ -118,7 +123,7 @@ def _leave(world: World) -> None:
     elif world.draw.random() < 0.1:
         stay(world, process)
     elif not machine.awaited and not any(promise.promised for promise in machine.promises.values()):
-        world.ends(process)
+        ends(world, process)
 
 
 def stay(world: World, process: Process[LocalController]) -> None:
@@ -127,6 +132,14 @@ def stay(world: World, process: Process[LocalController]) -> None:
     if process.machine is not None:
         process.machine.stay()
         world.turn(process)
+
+
+def _emergency(world: World) -> None:
+    process = world.any_controller()
+    if world.cell.working and world.draw.random() < 0.5:  # the hard moment: a machine is at work
+        process = world.controllers[world.subject.sender_of[world.cell.working[0].place]]
+    if world.draw.random() < 0.3:
+        emergency_stop(world, process)
 
 
 def _crash(world: World) -> None:
@@ -188,5 +201,6 @@ _HAPPENINGS: Final[Mapping[str, Callable[[World], None]]] = MappingProxyType(
         "step": _step,
         "stop": _stop,
         "leave": _leave,
+        "emergency": _emergency,
     }
 )

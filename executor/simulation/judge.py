@@ -20,6 +20,10 @@ from firable.semantics.player import FiringSet, Player
 _REMEMBERED_MAX = 20_000
 
 
+class RunFailedError(AssertionError):
+    """What happened is none of what may happen."""
+
+
 @dataclass(frozen=True)
 class RememberingPlayer(Player):
     """The reference player, who answers a question that was asked before from memory."""

@@ -12,6 +12,7 @@ firings and changes of signals have happened, although nobody was told: a restar
 from __future__ import annotations
 
 import random
+from collections import deque
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
@@ -43,12 +44,20 @@ class Process(Generic[Machine]):
     outbox: Outbox[Act] = field(default_factory=Outbox[Act])
     clock: Clock = field(default_factory=Clock)
     """It began anew with the process."""
+    leaving: deque[Effect] = field(default_factory=deque[Effect])
+    """What is durable, and about to leave."""
+    has_acted: bool = False
+    """Whether anything was done by what has left meanwhile."""
     queue: list[Sending] = field(default_factory=list)
     """The commands that its driver keeps."""
     void: set[tuple[str, int]] = field(default_factory=set)
     """The commands in the outbox whose token has left, by place and entry."""
     is_held: bool = False
     """Whether it has restarted, and no operator has resumed it yet."""
+    is_safe: bool = False
+    """Whether there was an emergency stop: its machines stand, and nothing is given to them."""
+    is_latched: bool = False
+    """Whether, after that, its machine has been made anew, and nobody has reset it."""
     cut_off: bool = False
     """Whether no message reaches it or leaves it."""
 
@@ -82,6 +91,11 @@ class Process(Generic[Machine]):
         self.queue.append(sending)
         return False
 
+    def make_safe(self) -> None:
+        """Have the driver drop what it keeps, and give the machines nothing more."""
+        self.is_safe = True
+        self.queue.clear()
+
     def give_up(self, places: Collection[str]) -> list[Sending]:
         """The tokens of these places have left: returns what the driver kept of theirs, and keeps no more."""
         waiting = [effect for act in self.outbox for effect in act.leaving if isinstance(effect, Sending)]
@@ -93,14 +107,17 @@ class Process(Generic[Machine]):
     def kill(self) -> list[Effect]:
         """End at once; returns what had happened, though nothing of it was told to anybody."""
         kept = self.disk.crash()
-        happened: list[Effect] = []
+        happened: list[Effect] = [effect for effect in self.leaving if isinstance(effect, Firing | Taken)]
         for act in self.outbox:
             if not kept:
                 break
             kept -= act.writes
             happened += [effect for effect in act.leaving if isinstance(effect, Firing | Taken)]
         self.outbox.clear()
+        self.leaving.clear()
+        self.has_acted = False
         self.queue.clear()
         self.void.clear()
+        self.is_safe = self.is_latched = False
         self.machine = None
         return happened

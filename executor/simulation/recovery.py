@@ -73,7 +73,8 @@ def mend(world: World) -> None:
         world.sync_all(process)
         tend(process, world)
     for process in world.processes:
-        tend(process, world)
+        for _ in range(3):  # one that is stopped is latched, reset and resumed
+            tend(process, world)
 
 
 def check_leaving(world: World) -> None:

@@ -47,24 +47,19 @@ from firable.executor.protocol.messages import (
 from firable.executor.simulation.clock import Clock
 from firable.executor.simulation.disk import DiskFailedError
 from firable.executor.simulation.faults import Faults
-from firable.executor.simulation.happenings import happen
-from firable.executor.simulation.judge import Subject
+from firable.executor.simulation.judge import RunFailedError, Subject
 from firable.executor.simulation.machinery import Job, Machinery
 from firable.executor.simulation.process import Process
+from firable.executor.simulation.steps import something
+from firable.executor.simulation.telling import COORDINATOR, told
 from firable.executor.simulation.timekeeper import Timekeeper
 from firable.nets.net import Marking
 from firable.semantics.replaying import Replayer
 from firable.semantics.trace import CommandSent, End, Event, Fired, Header, SignalChanged, Trace
 
-COORDINATOR = "coordinator"
-THE = f"the {COORDINATOR}"
 SECONDS_PER_STEP: Final = 0.01
 STEPS_PER_LIMIT: Final = (10, 400)
 _LOGGED_STEPS = 60
-
-
-class RunFailedError(AssertionError):
-    """What happened is none of what may happen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +137,7 @@ class World:
         for _ in range(steps):
             self.step += 1
             self.let_pass(self.step_seconds)
-            self._something()
+            something(self)
 
     def let_pass(self, seconds: float) -> None:
         """Let so much time pass, as each clock shows it."""
@@ -151,15 +146,7 @@ class World:
 
     def told(self) -> Iterator[str]:
         """The last steps in words."""
-        for step, what, about in self.log:
-            match about:
-                case Report() | Vote() | Acknowledgement():
-                    words = f"{what} from {about.controller} at {about.coordinator or THE}: {_shown(about)}"
-                case VoteRequest() | Decision() | Hello():
-                    words = f"{what} from {about.coordinator or THE} at {about.controller}: {_shown(about)}"
-                case _:
-                    words = f"{what}: {_shown(about)}" if about else what
-            yield f"{step:5}  {words}"
+        return told(self.log)
 
     # --- Acts
 
@@ -175,12 +162,19 @@ class World:
             for effect in effects:
                 if isinstance(effect, Firing):
                     self._left(process, effect.transition)
-        if process.act(effects):
-            lazy = self.faults["unsynced"]
-            if at_once:
-                self.sync_all(process)
-            elif not lazy or self.draw.random() >= lazy:
-                self.sync(process)
+        if not process.act(effects):
+            return
+        if process.leaving:  # what is done by what leaves comes behind all of that
+            process.has_acted = True
+        elif at_once:
+            self.sync_all(process)
+        else:
+            self._sync_soon(process)
+
+    def _sync_soon(self, process: Process[Any]) -> None:
+        lazy = self.faults["unsynced"]
+        if not lazy or self.draw.random() >= lazy:
+            self.sync(process)
 
     def sync_all(self, process: Process[Any]) -> None:
         """Let a process make durable all that it wrote until now, whatever comes of it."""
@@ -205,16 +199,16 @@ class World:
             self.kill(process)
             return
         torn = 0.05 * self.faults["torn"]
-        for i, effect in enumerate(leaving):
-            if process.machine is None:  # its disk has failed at what came before, which a machine had taken
-                self._happened(leaving[i:])
-                return
+        process.leaving.extend(leaving)
+        while process.leaving:
             if torn and self.draw.random() < torn:
                 self.note("killed between commit and sending", process.name)
-                self._happened(leaving[i:])
                 self.kill(process)
                 return
-            self._leave(process, effect)
+            self._leave(process, process.leaving.popleft())
+        if process.has_acted:
+            process.has_acted = False
+            self._sync_soon(process)
 
     def _leave(self, process: Process[Any], effect: Effect) -> None:
         match effect:
@@ -233,6 +227,8 @@ class World:
                 if (place, entry) in process.void:
                     process.void.remove((place, entry))
                     self.note("given up", (process.name, place, entry))
+                elif process.is_safe:
+                    self.note("kept back", (process.name, place, entry))
                 elif self.faults["queued"] and self.draw.random() < 0.7 * self.faults["queued"]:
                     self.counts["queued"] += 1
                     self.note("waits for its line", (process.name, place, entry))
@@ -250,6 +246,8 @@ class World:
 
     def _given(self, process: Process[Any], sending: Sending) -> None:
         machine = process.machine
+        if process.is_safe:
+            raise RunFailedError(f"a machine is given the command of '{sending.place}' after an emergency stop")
         if machine is not None and sending.place not in machine.subnet.names(machine.marking):
             raise RunFailedError(f"a machine is given the command of '{sending.place}', which its token has left")
         self.note("is given", (sending.place, sending.entry))
@@ -325,12 +323,15 @@ class World:
         process.is_held = bool(kept)
         controller = process.machine = self.machines.controller.restored(decomposition, process.name, kept)
         self.act(process, controller.start(), at_once=True)
-        # What sensors show is told anew, in its time.
-        names = (signal.name for signal in controller.subnet.signals if signal.name in self.values)
-        self.telling += [(name, self.values[name], None) for name in names]
+        self.show_sensors(process)
         for place, entry in controller.commands.questions:
             if process.machine:
                 self.answer(process, place, entry, self._asked(place, entry))
+
+    def show_sensors(self, process: Process[Any]) -> None:
+        """Let what the sensors of a controller show be told anew, in its time."""
+        names = (s.name for s in self.subject.decomposition.subnet(process.name).signals if s.name in self.values)
+        self.telling += [(name, self.values[name], None) for name in names]
 
     def coordinating(self, process: Process[Any]) -> str | None:
         """The coordinator that is in a process; None of a controller's."""
@@ -353,27 +354,6 @@ class World:
             self.note("killed", process.name)
             self.counts["kills"] += 1
             self._happened(process.kill())
-
-    def ends(self, process: Process[LocalController]) -> None:
-        """Let the host of a controller end in order, which leaves nothing open."""
-        self.note("ends in order", process.name)
-        self.sync(process)
-        if process.machine is None:
-            return
-        for coordinator in (each.machine for each in self.coordinators.values() if each.machine is not None):
-            for opened in coordinator.rounds.values():
-                is_waited_for = process.name in coordinator.ordered(opened)
-                if opened.committed is None or not is_waited_for or process.name in opened.acknowledged:
-                    continue
-                # Who has restarted since it gave its word has forgotten what was acknowledged, and will hear it again.
-                is_anew = coordinator.epoch > process.machine.above[coordinator.name].epoch
-                order = Decision(process.name, opened.number, opened.committed, 0, -1, 0, coordinator.name)
-                if not is_anew or process.machine.applies(order):
-                    raise RunFailedError(f"{process.name} ends in order, and its order of '{opened.committed}' is open")
-            if votes := coordinator.ready[process.name] & coordinator.of_free.get(process.name, frozenset()):
-                raise RunFailedError(f"{process.name} ends in order, and its votes for {sorted(votes)} still count")
-        self.counts["ends"] += 1
-        self.kill(process)
 
     def restart(self, process: Process[Any]) -> None:
         """Start a process that is down."""
@@ -404,13 +384,13 @@ class World:
             case Decision(committed=str(name)) if receiver.machine.applies(message):
                 self._left(receiver, name)
         self.act(receiver, receiver.machine.receive(message))
-        if to_controller and not self._is_slow():
+        if to_controller and not self.is_slow():
             self.turn(controller)
 
     def turn(self, process: Process[Any]) -> None:
         """Let a controller fire if it may and can, and report what that changed."""
         self.tick(process)
-        if process.machine is not None and not self.paused and not self._is_slow():
+        if process.machine is not None and not self.paused and not self.is_slow():
             self.act(process, process.machine.fire())
         if process.machine is not None:
             self.act(process, process.machine.report())
@@ -429,7 +409,8 @@ class World:
             self.counts["timers set"] += sum(isinstance(effect, Taken) for effect in effects)
             self.act(process, effects)
 
-    def _is_slow(self) -> bool:
+    def is_slow(self) -> bool:
+        """Whether a process lets what it could do wait."""
         slow = self.faults["slow"]
         return slow > 0 and self.draw.random() < slow
 
@@ -441,32 +422,13 @@ class World:
         if process.machine is not None:
             self.note("shows", (signal, value, entry))
             self.act(process, process.machine.read(signal, value, entry))
-            if not self._is_slow():
+            if not self.is_slow():
                 self.turn(process)
 
     def completed(self, job: Job) -> None:
         """A machine has ended a command, and shows it."""
         if job.signal is not None:
             self.telling.append((job.signal, True, job.entry))
-
-    # --- One step
-
-    def _something(self) -> None:
-        choice = self.draw.random()
-        if choice < 0.60:
-            self._network()
-        elif choice < 0.65:
-            self.turn(self.any_controller())
-        elif choice < 0.84:
-            self._machines()
-        elif choice < 0.92:
-            waiting = [process for process in self.processes if process.outbox]
-            if waiting:
-                self.sync(waiting[int(self.draw.random() * len(waiting))])
-            else:
-                self._resend()
-        else:
-            happen(self)
 
     def any_controller(self) -> Process[LocalController]:
         """A controller, drawn."""
@@ -476,85 +438,3 @@ class World:
     def any_process(self) -> Process[Any]:
         """A process, drawn."""
         return self.processes[int(self.draw.random() * len(self.processes))]
-
-    def _network(self) -> None:
-        faults, draw = self.faults, self.draw
-        if self.late and draw.random() < (0.05 if self.in_flight else 0.3):
-            self.in_flight.append(self.late.pop(int(draw.random() * len(self.late))))
-        if not self.in_flight:  # what was lost is sent again, or the cell goes on
-            if draw.random() < 0.3:
-                self._resend()
-            else:
-                self._machines()
-            return
-        index = int(draw.random() * len(self.in_flight)) if faults["reordering"] else 0
-        message = self.in_flight.pop(index)
-        if faults["duplication"] and draw.random() < 0.4 * faults["duplication"]:
-            self.counts["doubled"] += 1
-            self.late.append(message)
-        if faults["loss"] and draw.random() < 0.5 * faults["loss"]:
-            self.note("lost", message)
-            self.counts["lost"] += 1
-        else:
-            self.deliver(message)
-
-    def _resend(self) -> None:
-        process = self.any_process()
-        if process.machine is not None:
-            self.act(process, process.machine.resend())
-
-    def _machines(self) -> None:
-        waiting = [process for process in self.controllers.values() if process.queue]
-        if waiting and self.draw.random() < 0.3:
-            self.reach(waiting[int(self.draw.random() * len(waiting))])
-            return
-        draw = self.draw.random()
-        if draw < 0.4 and self.telling:
-            self.tell(*self.telling.pop(0))
-        elif draw < 0.8 and self.cell.working and self.draw.random() >= 0.9 * self.faults["late"]:
-            job = self.cell.complete()
-            if job is not None:
-                self.completed(job)
-        elif self.values:
-            self._sense()
-
-    def _sense(self) -> None:
-        """A sensor changes: mostly to what a transition waits for, as in a cell that is at work, else at random."""
-        sensors, draw = self.subject.sensors, self.draw
-        if draw.random() < 0.75:
-            wanted = [
-                gate.signal
-                for t in self.judge.player.firable(self.judge.marking)
-                for gate in self.net.transitions[t].external
-                if self.values.get(gate.signal, gate.wanted) != gate.wanted
-            ]
-            if not wanted:
-                return
-            signal = wanted[int(draw.random() * len(wanted))]
-        else:
-            signal = sensors[int(draw.random() * len(sensors))]
-        self.values[signal] = not self.values[signal]
-        self.telling.append((signal, self.values[signal], None))
-
-
-def _shown(about: object) -> str:
-    match about:
-        case Report(readiness=readiness):
-            return f"enabled: {_names(readiness.transitions)}"
-        case VoteRequest():
-            return f"round {about.round}: promise {_names(about.transitions)}?"
-        case Vote():
-            return f"round {about.round}: {_names(about.promised)} promised"
-        case Decision():
-            return f"round {about.round}: {about.committed or 'nothing'} is committed"
-        case Acknowledgement():
-            return f"round {about.round} obeyed"
-        case Hello():
-            return f"has restarted, epoch {about.epoch}"
-        case tuple():
-            return " ".join(map(str, about))
-    return str(about)
-
-
-def _names(names: Iterable[str]) -> str:
-    return ", ".join(sorted(names)) or "nothing"

@@ -135,17 +135,20 @@ def test_latched_run_is_not_resumed_before_it_is_reset_and_may_be_latched_again(
         )
         host.served = True
         run = asyncio.create_task(host.main())
-        for _ in range(2):
-            await until(lambda: sum(recorder.firings.values()) > 5, "firings")
+
+        async def reset_and_resumed(fired: int) -> None:
             host.emergency_stop("a person")
             await until(lambda: host.situation().state is State.LATCHED, "the latch")
-            fired = sum(recorder.firings.values())
             assert not host.resume()
             assert all(controller.held for controller in host.controllers.values())
             assert host.reset() == ()
             assert host.reset() == ("there is no emergency stop to be reset",)
             await until(host.resume, "the answers of the machines")
-            await until(lambda fired=fired: sum(recorder.firings.values()) > fired, "that it goes on")
+            await until(lambda: sum(recorder.firings.values()) > fired, "that it goes on")
+
+        await until(lambda: sum(recorder.firings.values()) > 5, "firings")
+        for _ in range(2):
+            await reset_and_resumed(sum(recorder.firings.values()) + 2)
         host.emergency_stop("a person")
         await until(lambda: host.situation().state is State.LATCHED, "the latch")
         assert host.now_seconds() > 5.0

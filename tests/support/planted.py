@@ -169,6 +169,13 @@ class ForgetsSignals(LocalController):
         yield from ()
 
 
+class LeavesUntaken(LocalController):
+    """A token without completion goes on although no machine has taken its command."""
+
+    def _is_enabled(self, transition: Compiled) -> bool:
+        return transition.enabled(self.word)
+
+
 class AppliesTwice(LocalController):
     """An order that comes again is carried out again."""
 
@@ -433,6 +440,13 @@ class CountsQueuedCommandsAsSent(Process[Any]):
         return True
 
 
+class KeepsCommandsOverAnEmergencyStop(Process[Any]):
+    """What the driver keeps for a line that is down is given to its machine although there was an emergency stop."""
+
+    def make_safe(self) -> None:
+        self.is_safe = True
+
+
 CONTROLLERS: tuple[type[LocalController], ...] = (
     KeepsNoPromise,
     KeepsNoMarking,
@@ -481,6 +495,7 @@ PROCESSES: tuple[type[Process[Any]], ...] = (
     LetsOutWhatWasDoneMeanwhile,
     LetsOutWhatWroteNothing,
     CountsQueuedCommandsAsSent,
+    KeepsCommandsOverAnEmergencyStop,
 )
 
 PLANTED: dict[str, Machines] = {
@@ -508,5 +523,6 @@ PROVOKED_BY: dict[str, tuple[str, ...]] = {
     "LetsOutWhatWasDoneMeanwhile": ("unsynced", "crash"),
     "LetsOutWhatWroteNothing": ("unsynced", "crash"),
     "CountsQueuedCommandsAsSent": ("queued",),
+    "KeepsCommandsOverAnEmergencyStop": ("queued", "emergency"),
 }
 """The kinds of faults that bring some of them out soonest; the others, and these too, are found with kinds drawn."""
