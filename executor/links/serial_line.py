@@ -118,6 +118,10 @@ class SerialLink:
         except (OSError, ValueError) as error:  # pyserial's own error is an OSError
             raise cannot_open(self.port, str(error)) from None
         descriptor = self.line.fileno()
+        # It may have run before: whoever was heard then is met anew, and meets somebody else.
+        self.instance, self.reader, self.polled = os.urandom(8).hex(), FrameReader(), -1
+        self.peers = {address: _Peer() for address in self.peers}
+        self.unsent.clear()
         self.listener = listener
         self.broken = loop.create_future()
         loop.add_reader(descriptor, self._readable, descriptor)

@@ -121,8 +121,8 @@ class ZenohLink:
             self.session = self.listener = None
             self.claims.clear()
             self.publishers.clear()
-            self.samples.clear()
             await asyncio.to_thread(session.close)
+            self.samples.clear()  # what an earlier session has told is not so in a later one
 
     def send(self, sender: str, receiver: str, message: Message) -> None:
         """Publish a message; where its receiver is not connected it is lost."""
