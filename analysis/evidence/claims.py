@@ -11,13 +11,15 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from firable.nets.formula import And, Constant, Formula, Holds, Not, Or, Start, format_formula
+from firable.nets.formula import And, Constant, Formula, Holds, Not, Or, Start, format_formula, parse_formula
 from firable.nets.net import Fairness, Marking, Net
+from firable.nets.queries import QueryKind
 from firable.nets.temporal import (
     Eventually,
     Exists,
     ForAll,
     Globally,
+    Logic,
     Temporal,
     TemporalNot,
     format_temporal,
@@ -104,6 +106,11 @@ class Claim:
         return self.goal
 
 
+def tidy(formula: Formula) -> Formula:
+    """The formula as it is read back from its text: equal to every other that is written the same."""
+    return parse_formula(format_formula(formula))
+
+
 def as_ctl(claim: Claim) -> Temporal | None:
     """The formula of CTL that says the same; None where there is none.
 
@@ -123,6 +130,13 @@ def as_ctl(claim: Claim) -> Temporal | None:
         case ClaimKind.CTL:
             return claim.goal
     return None
+
+
+def temporal_claim(logic: Logic | QueryKind, formula: Temporal, *, proved: bool) -> Claim:
+    """The claim that a formula of a logic holds in M0, or that it does not."""
+    if logic.value == Logic.CTL.value:
+        return Claim(ClaimKind.CTL, formula if proved else negation_in_ctl(formula))
+    return Claim(ClaimKind.LTL if proved else ClaimKind.NOT_LTL, formula)
 
 
 def negation_in_ctl(formula: Temporal) -> Temporal:

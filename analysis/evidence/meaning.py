@@ -19,7 +19,8 @@ from collections.abc import Collection, Iterable, Iterator
 from itertools import combinations, permutations
 
 from firable.analysis.deadline import NEVER, Deadline
-from firable.analysis.evidence.claims import Claim, ClaimKind, marking_of, negation_in_ctl
+from firable.analysis.evidence.by_goals import said_by_goals
+from firable.analysis.evidence.claims import Claim, ClaimKind, marking_of, temporal_claim, tidy
 from firable.analysis.evidence.read_off import eager_cycle, read_off
 from firable.analysis.evidence.refusal import in_time
 from firable.nets.formula import (
@@ -35,8 +36,6 @@ from firable.nets.formula import (
     Or,
     Sign,
     Start,
-    format_formula,
-    parse_formula,
 )
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty, Transition
 from firable.nets.queries import Query, QueryKind
@@ -54,11 +53,6 @@ from firable.nets.temporal import (
 )
 from firable.semantics.conflict import jointly_openable, structural_conflicts
 from firable.semantics.trace import Discipline
-
-
-def tidy(formula: Formula) -> Formula:
-    """The formula as it is read back from its text: equal to every other that is written the same."""
-    return parse_formula(format_formula(formula))
 
 
 def contact(net: Net, *, openable: bool = False) -> Formula:
@@ -339,7 +333,7 @@ def _served(shown: Shown, proved: bool) -> bool:
 
 def _property(shown: Shown, of: Property | TemporalProperty, proved: bool) -> bool:
     if isinstance(of, TemporalProperty):
-        return temporal_claim(of.logic, of.formula, proved=proved) in shown
+        return _temporal(shown, of.logic, of.formula, proved)
     return property_claim(of, proved=proved) in shown
 
 
@@ -359,18 +353,18 @@ def property_claim(of: Property, *, proved: bool) -> Claim:
             return Claim(kind, of.formula, of.then or Constant(value=False), of.fairness)
 
 
-def temporal_claim(logic: Logic | QueryKind, formula: Temporal, *, proved: bool) -> Claim:
-    """The claim that a formula of a logic holds in M0, or that it does not."""
-    if logic.value == Logic.CTL.value:
-        return Claim(ClaimKind.CTL, formula if proved else negation_in_ctl(formula))
-    return Claim(ClaimKind.LTL if proved else ClaimKind.NOT_LTL, formula)
+def _temporal(shown: Shown, logic: Logic | QueryKind, formula: Temporal, proved: bool) -> bool:
+    if temporal_claim(logic, formula, proved=proved) in shown:
+        return True
+    branching = logic.value == Logic.CTL.value
+    return branching and said_by_goals(shown.net, formula, shown.__contains__, holds=proved)
 
 
 def _query(shown: Shown, query: Query, proved: bool) -> bool:
     net, every = shown.net, [t.name for t in shown.net.transitions]
     match query.kind:
         case QueryKind.CTL | QueryKind.LTL if query.formula is not None:
-            return temporal_claim(query.kind, query.formula, proved=proved) in shown
+            return _temporal(shown, query.kind, query.formula, proved)
         case QueryKind.LIVE:
             return all(map(shown.live, every)) if proved else any(map(shown.nonlive, every))
         case QueryKind.QUASI_LIVE:

@@ -40,9 +40,9 @@ from typing import Any, Final
 
 from firable.analysis._engine import BudgetExceeded, IncompleteGraph
 from firable.analysis.deadline import Deadline
-from firable.analysis.evidence.claims import Claim
+from firable.analysis.evidence.claims import Claim, temporal_claim
 from firable.analysis.evidence.document import Document, Record
-from firable.analysis.evidence.meaning import property_claim, temporal_claim
+from firable.analysis.evidence.meaning import property_claim
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.goal import Limits

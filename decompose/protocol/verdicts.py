@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from firable.analysis.deadline import Deadline
-from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.claims import Claim, ClaimKind, tidy
 from firable.analysis.evidence.document import Document, Record
-from firable.analysis.evidence.meaning import tidy
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.goal import Limits

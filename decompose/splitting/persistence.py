@@ -54,9 +54,8 @@ from firable.analysis._engine import BudgetExceeded
 from firable.analysis.check import FIRST_MARKINGS
 from firable.analysis.deadline import Deadline
 from firable.analysis.evidence.certificate import Certificate, FiringSequence, InductiveInvariant
-from firable.analysis.evidence.claims import Claim, ClaimKind
+from firable.analysis.evidence.claims import Claim, ClaimKind, tidy
 from firable.analysis.evidence.document import Document, Record
-from firable.analysis.evidence.meaning import tidy
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.goal import Finding, Limits

@@ -111,6 +111,20 @@ LABELS: dict[str, Callable[[], Evidence]] = {
 }
 
 
+@pytest.mark.parametrize("name", ["M0 is left out", "a firing leads out", "the goal is inside"])
+def test_a_large_set_is_refused_for_the_same_reasons(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
+    with pytest.raises(InputError, match="does not show what it claims"):
+        check_evidence(LABELS[name]())
+
+
+def test_a_large_set_that_is_closed_is_shown_in_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("firable.analysis.evidence.checking.checker.EDGES_MAX", 0)
+    found = check_evidence(never(LOOP, "a and b", Markings((1, 2))))
+    assert found.shown
+    assert found.method == "2 markings and 2 firings looked through in columns"
+
+
 def waits(of: Net, fairness: Fairness, ranks: Mapping[str, tuple[int, ...]], **helpful: str) -> Evidence:
     """Ranks of some of the markings of four places: which of a and b, asked or done."""
     markings = [of.marking(names) for names in (["a", "asked"], ["b", "asked"], ["a", "done"], ["b", "done"])]

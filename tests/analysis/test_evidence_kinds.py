@@ -25,9 +25,9 @@ from firable.analysis.evidence.certificate import FiringSequence
 from firable.analysis.evidence.checking.checker import check_document, check_evidence
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.checking.obligations import obligations
-from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking, marking_of, without_start
+from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking, marking_of, tidy, without_start
 from firable.analysis.evidence.document import Document, document_from_text, seal
-from firable.analysis.evidence.meaning import commands_clash, completions_clash, contact, tidy
+from firable.analysis.evidence.meaning import commands_clash, completions_clash, contact
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.evidence.producing.producer import evidence_of_report

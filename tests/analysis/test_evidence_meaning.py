@@ -14,7 +14,7 @@ from firable.analysis.check import check
 from firable.analysis.evidence.certificate import FiringSequence
 from firable.analysis.evidence.checking.checker import check_document
 from firable.analysis.evidence.checking.obligation import Evidence
-from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking
+from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking, tidy
 from firable.analysis.evidence.meaning import (
     commands_clash,
     competing,
@@ -23,7 +23,6 @@ from firable.analysis.evidence.meaning import (
     senders,
     some_firable,
     suffices,
-    tidy,
 )
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.report import report_on

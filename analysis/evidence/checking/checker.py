@@ -35,6 +35,7 @@ from firable.analysis.evidence.certificate import (
     Theorem,
     Unfolded,
 )
+from firable.analysis.evidence.checking.closed import Closed
 from firable.analysis.evidence.checking.diagrams import Diagrams
 from firable.analysis.evidence.checking.labelling import LabelledSpace, labelled
 from firable.analysis.evidence.checking.listed import Listed, Part
@@ -69,6 +70,8 @@ from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
 
 TIMEOUT_MS: Final = 60_000
+EDGES_MAX: Final = 100_000
+"""Of how many listed markings all firings are kept where nothing but their being closed is asked."""
 
 _SHOWS: Final = {
     FiringSequence: {
@@ -169,6 +172,7 @@ class _Checker:
     timeout_ms: int
     _spaces: list[tuple[Net, Markings | Diagram, Listed | Diagrams]] = field(default_factory=list)
     _parts: list[tuple[Net, Markings, Part]] = field(default_factory=list)
+    _sets: list[tuple[Net, Markings, Closed]] = field(default_factory=list)
 
     def check(self, evidence: Evidence) -> Checked:
         """Check one claim."""
@@ -245,6 +249,14 @@ class _Checker:
         self._spaces.append((evidence.net, of, made))
         return made
 
+    def _closed(self, net: Net, of: Markings) -> Closed:
+        for known_net, known, closed in self._sets:
+            if known_net is net and known is of:
+                return closed
+        made = Closed(net, of.markings, self.deadline)
+        self._sets.append((net, of, made))
+        return made
+
     def _part(self, evidence: Evidence, of: Markings) -> Part:
         """Markings of which nothing is asked but what fires in them: never one of `_spaces`, which are closed."""
         for net, known, part in self._parts:
@@ -261,7 +273,13 @@ class _Checker:
         return space
 
     def _labelled(self, evidence: Evidence, of: Markings | Diagram, labels: tuple[Label, ...]) -> Checked:
-        space, claim = self._space(evidence, of), evidence.claim
+        claim = evidence.claim
+        never = claim.kind is ClaimKind.NEVER and not labels and evidence.discipline is Discipline.INTERLEAVING
+        if never and isinstance(of, Markings) and len(of.markings) > EDGES_MAX:
+            closed = self._closed(evidence.net, of)
+            closed.require_never(claim.state_goal)
+            return Checked(shown=True, method=closed.method)
+        space = self._space(evidence, of)
         if isinstance(space, Diagrams):
             space.deadline = self.deadline
         if claim.kind is ClaimKind.NEVER and not labels:

@@ -20,12 +20,12 @@ from firable.analysis.evidence.certificate import (
     Diagram,
     FiringSequence,
     Labelling,
+    Reduction,
     Theorem,
     Unfolded,
 )
 from firable.analysis.evidence.checking.theorems import check_premises
-from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl, without_start
-from firable.analysis.evidence.meaning import tidy
+from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl, tidy, without_start
 from firable.analysis.evidence.producing.labels import TooLargeError, drawn, labelling
 from firable.analysis.evidence.producing.lacking import NO_TIME, LackingError
 from firable.analysis.evidence.producing.nevers import Nevers
@@ -45,7 +45,7 @@ from firable.analysis.evidence.producing.unfolding import unfolded_markings
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.spaces.space import StateSpace
 from firable.nets.diagnostics import InputError
-from firable.nets.formula import Formula
+from firable.nets.formula import Firable, Formula
 from firable.nets.net import Marking, Net
 from firable.nets.temporal import Temporal
 from firable.nets.verdict import Witness
@@ -164,6 +164,10 @@ class Certifier:
         for known, misses in self._ends:
             if misses(spelled):
                 return known
+        # After a deadlock there is one marking, and whatever does not hold in it is lost.
+        dead = self.deadlock
+        if dead is not None and (found := self._never_after(dead, goal, spelled)) is not None:
+            return found
 
         def lost(space: StateSpace[Any]) -> Any:
             return space.algebra.negation(space.backward(space.satisfying(goal)))
@@ -173,16 +177,20 @@ class Certifier:
             witness is None or not space.contains(lost(space), self.net.marking(witness.marking))
         ):
             witness = self.spaces.way(lost)
-        for way in (witness, self.deadlock):
-            if way is not None and (found := self._never_after(way, goal, spelled)) is not None:
-                return found
-        return None
+        return None if witness is None else self._never_after(witness, goal, spelled)
 
     def _never_after(self, way: Witness, goal: Formula, spelled: Formula) -> Continuation | None:
         """What shows that after this run the goal is never reached; kept, since it shows the same of other goals."""
         marking, net = self.net.marking(way.marking), self.net
         places = tuple(replace(place, marked=bool(marking >> p & 1)) for p, place in enumerate(net.places))
         net = replace(net, places=places, properties=())
+        spaces = Spaces(net, self.discipline, self.limits)
+        if (graph := spaces.graph) is not None and spaces.markings is not None:
+            if graph.satisfying(spelled).any():
+                return None
+            found = Continuation(way.firings, Labelling(spaces.markings))
+            self._ends.append((found, lambda other: not graph.satisfying(other).any()))
+            return found
         if self.spaces.symbolic is not None:
             symbolic = self.spaces.symbolic
             after = symbolic.engine.forward(
@@ -193,15 +201,12 @@ class Certifier:
             found = Continuation(way.firings, Labelling(_alone(drawn(symbolic, [after]))))
             self._ends.append((found, lambda other: not after & symbolic.satisfying(other)))
             return found
-        spaces = Spaces(net, self.discipline, self.limits)
-        if (graph := spaces.graph) is not None and spaces.markings is not None:
-            if graph.satisfying(spelled).any():
-                return None
-            found = Continuation(way.firings, Labelling(spaces.markings))
-            self._ends.append((found, lambda other: not graph.satisfying(other).any()))
-            return found
         shown = Nevers(spaces).certificate(spelled)
         return None if shown is None else Continuation(way.firings, shown)
+
+    def never_fires(self, name: str) -> Reduction | None:
+        """What shows on a smaller net that a transition is dead, where the run that decided left no markings behind."""
+        return self.nevers.reduced(Firable(name)) if self.spaces.given is None else None
 
     def theorem(self, claim: Claim) -> Theorem:
         """A theorem that says the claim; raises `LackingError` where none does."""
@@ -245,12 +250,22 @@ class Certifier:
                 net = replace(net, places=places, properties=())
             if self.discipline is Discipline.STEP:
                 raise LackingError(f"there are more than {MARKINGS_MAX:,} markings")
-            found = runs_by_search(net, tuple(names), Limits(self.spaces.part(0.5), self.limits.memory_bytes))
+            found, left = runs_by_search(net, tuple(names), Limits(self.spaces.part(0.5), self.limits.memory_bytes))
+            found += [self._run_firing(name, home) for name in left]
             return [FiringSequence((*prefix, *run)) for run in found]
         except NotFoundError as error:
             raise LackingError(str(error)) from None
         except (BudgetExceeded, IncompleteGraph):
             raise LackingError(NO_TIME) from None
+
+    def _run_firing(self, name: str, home: Marking | None) -> tuple[tuple[str, ...], ...]:
+        """A run from M0 that fires a transition which no search met, from whichever space there is."""
+        way = None
+        if home is None or home == self.net.initial_marking:
+            way = self.spaces.way(lambda space: space.satisfying(Firable(name)))
+        if way is None:
+            raise LackingError(f"no run was found that fires {name}")
+        return (*way.firings, (name,))
 
     def run_in_order(self, one: tuple[str, ...], others: tuple[str, ...]) -> InOrder | None:
         """A run that fires one of these, and one of those at a moment before or after it, and which two."""

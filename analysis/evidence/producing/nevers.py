@@ -57,7 +57,8 @@ class Nevers:
             return found
         if isinstance(spaces.given, SymbolicSpace) and (found := self._on_diagram(goal)) is not None:
             return found
-        return self.reduced(goal) or self._stubborn(goal) or self._on_diagram(goal) or self._induced(goal)
+        less = self.reduced(goal) or self._stubborn(goal)
+        return less or self._on_diagram(goal) or self._on_many(goal) or self._induced(goal)
 
     def contact_excluded(self) -> NeverCertificate | None:
         """What shows that the net is contact-free."""
@@ -76,6 +77,10 @@ class Nevers:
     def _on_diagram(self, goal: Formula) -> Labelling | None:
         symbolic, diagram = self.spaces.symbolic, self.spaces.diagram
         return None if symbolic is None or diagram is None or symbolic.satisfying(goal) else Labelling(diagram)
+
+    def _on_many(self, goal: Formula) -> Labelling | None:
+        graph, many = self.spaces.given, self.spaces.many
+        return None if many is None or graph is None or graph.count(graph.satisfying(goal)) else Labelling(many)
 
     def reduced(self, goal: Formula) -> Reduction | None:
         """The goal shown of a smaller net, in half of the time that is left."""

@@ -12,10 +12,11 @@ from functools import partial
 from itertools import combinations
 from typing import Final
 
+from firable.analysis.evidence.by_goals import goal_claim, said_by_goals
 from firable.analysis.evidence.certificate import Certificate, FiringSequence
 from firable.analysis.evidence.checking.obligations import played
 from firable.analysis.evidence.checking.runs import holds
-from firable.analysis.evidence.claims import TRUE, Claim, ClaimKind, is_marking
+from firable.analysis.evidence.claims import TRUE, Claim, ClaimKind, is_marking, temporal_claim, tidy
 from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.meaning import (
     commands,
@@ -29,8 +30,6 @@ from firable.analysis.evidence.meaning import (
     senders,
     some_firable,
     suffices,
-    temporal_claim,
-    tidy,
     tokens_at_least,
 )
 from firable.analysis.evidence.producing.claims import Certifier
@@ -42,8 +41,11 @@ from firable.analysis.verdicts.behaviour import DEADLOCK_FREE
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
 from firable.nets.net import Marking, Property, TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
+from firable.nets.temporal import Logic, Temporal, TemporalAnd, TemporalNot, TemporalOr
 from firable.nets.verdict import Status, Verdict, Witness
-from firable.semantics.player import Player
+from firable.semantics.algebra import BOOL
+from firable.semantics.formulas import evaluate
+from firable.semantics.player import Player, holds_in
 
 Shown = list[tuple[Claim, Certificate]]
 _FALSE: Final = Constant(value=False)
@@ -242,7 +244,10 @@ class _Verdicts:
         for name in verdict.subjects:
             claim = Claim(ClaimKind.NEVER if dead else ClaimKind.LOST, Firable(name))
             try:
-                yield claim, self.certifier.certify(claim, verdict.witness)
+                if not dead and (found := self.certifier.never_fires(name)):
+                    yield Claim(ClaimKind.NEVER, Firable(name)), found  # so it is not live
+                else:
+                    yield claim, self.certifier.certify(claim, verdict.witness)
             except LackingError as error:
                 reason = str(error)
                 continue
@@ -306,13 +311,45 @@ class _Verdicts:
         self, of: Property | TemporalProperty, verdict: Verdict, proved: bool
     ) -> Iterator[tuple[Claim, Certificate]]:
         if isinstance(of, TemporalProperty):
-            return self._one(temporal_claim(of.logic, of.formula, proved=proved), verdict.witness)
+            return self._temporal(of.logic, of.formula, verdict, proved)
         return self._one(property_claim(of, proved=proved), verdict.witness)
+
+    def _temporal(
+        self, logic: Logic | QueryKind, formula: Temporal, verdict: Verdict, proved: bool
+    ) -> Iterator[tuple[Claim, Certificate]]:
+        """A formula; of many markings, one of CTL that comes down to goals by these."""
+        if logic.value == Logic.CTL.value and self.certifier.spaces.graph is None:
+            try:
+                return iter(self._by_goals(formula, verdict.witness, holds=proved))
+            except LackingError:
+                pass  # it says more than goals do, or one of them is not shown: all markings may show it
+        return self._one(temporal_claim(logic, formula, proved=proved), verdict.witness)
+
+    def _by_goals(self, formula: Temporal, witness: Witness | None, *, holds: bool) -> Shown:
+        """Claims on goals that say of a formula of CTL that it holds in M0, or that it does not."""
+        match formula:
+            case TemporalNot(operand):
+                return self._by_goals(operand, witness, holds=not holds)
+            case TemporalAnd(operands) | TemporalOr(operands) if isinstance(formula, TemporalAnd) is holds:
+                return [pair for operand in operands for pair in self._by_goals(operand, witness, holds=holds)]
+            case TemporalAnd(operands) | TemporalOr(operands):
+                for operand in operands:
+                    try:
+                        return self._by_goals(operand, witness, holds=holds)
+                    except LackingError:
+                        continue
+        if said_by_goals(self.net, formula, lambda _: False, holds=holds):
+            return []  # it says so of M0
+        claim = goal_claim(formula, holds=holds)
+        if claim is None:
+            raise LackingError("it does not come down to goals")
+        fits = witness and evaluate(BOOL, self.net, claim.state_goal, holds_in(self.net.marking(witness.marking)))
+        return list(self._one(claim, witness if fits else None))
 
     def _query(self, query: Query, verdict: Verdict, proved: bool) -> Iterator[tuple[Claim, Certificate]]:
         match query.kind:
             case QueryKind.CTL | QueryKind.LTL if query.formula is not None:
-                return self._one(temporal_claim(query.kind, query.formula, proved=proved), verdict.witness)
+                return self._temporal(query.kind, query.formula, verdict, proved)
             case QueryKind.STABLE_MARKING:
                 return self._stable(proved)
             case QueryKind.ONE_SAFE:

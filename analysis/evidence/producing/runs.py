@@ -21,8 +21,7 @@ import numpy as np
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.compiled import engine_limits
 from firable.analysis.evidence.certificate import FiringSequence
-from firable.analysis.evidence.claims import is_marking
-from firable.analysis.evidence.meaning import tidy
+from firable.analysis.evidence.claims import is_marking, tidy
 from firable.analysis.goal import Limits
 from firable.analysis.reduction.reduce import reduce_for_liveness
 from firable.analysis.spaces.reachability import ReachabilityGraph
@@ -136,7 +135,7 @@ class _Run:
         self.fired.update(fired)
 
 
-def runs_by_search(net: Net, names: Sequence[str], limits: Limits) -> list[Run]:
+def runs_by_search(net: Net, names: Sequence[str], limits: Limits) -> tuple[list[Run], list[str]]:
     """Runs from M0 that fire these transitions under interleaving: by searches on the reduced net, then on this one.
 
     A transition of the reduced net stands for others that may fire where it may: the last firing of its run is theirs.
@@ -163,9 +162,7 @@ def runs_by_search(net: Net, names: Sequence[str], limits: Limits) -> list[Run]:
             if name in wanted and image is not None and (witness := found.witness(image)) is not None:
                 runs.append((*witness.firings[:-1], (name,)))
                 wanted -= {one for fired in runs[-1] for one in fired}
-    if wanted:
-        raise NotFoundError(f"no run was found that fires {min(wanted)}")
-    return runs
+    return runs, sorted(wanted)
 
 
 def maximal(net: Net, discipline: Discipline, witness: Witness) -> FiringSequence | None:

@@ -27,7 +27,12 @@ MARKINGS_MAX: Final = 20_000
 """How many markings are listed where a decision diagram would do as well."""
 WIDE_MAX: Final = 100_000
 """How many markings are listed where none would, or none is at hand: for responses, LTL, synchronous steps, CTL."""
+MANY_MAX: Final = 400_000
+"""How many markings are listed where no firings of them need to be kept, for what is never so."""
+DIGITS_MAX: Final = 2**25
+"""How many hexadecimal digits these may take."""
 _SECONDS: Final = 30.0
+_CLOCK_EVERY: Final = 4_096
 
 
 class Spaces:
@@ -69,6 +74,21 @@ class Spaces:
     def wide_markings(self) -> Markings | None:
         """The markings of `wide` as they are written."""
         return self.markings or (None if self.wide is None else listed(self.wide))
+
+    @cached_property
+    def many(self) -> Markings | None:
+        """All markings of a graph that is at hand, if they are not too many for a set that is closed, and no more."""
+        graph = self.given
+        if not isinstance(graph, ReachabilityGraph) or not graph.complete or self.discipline is Discipline.STEP:
+            return None
+        if graph.n_markings > MANY_MAX or graph.n_markings * -(-len(self.net.places) // 4) > DIGITS_MAX:
+            return None
+        found = list[Marking]()
+        for i in range(graph.n_markings):
+            if i % _CLOCK_EVERY == 0 and self.limits.deadline.over:
+                return None
+            found.append(graph.marking(i))
+        return Markings(tuple(found))
 
     @cached_property
     def symbolic(self) -> SymbolicSpace | None:
