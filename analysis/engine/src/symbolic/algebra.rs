@@ -141,7 +141,9 @@ impl Diagram {
                         self.calls.push(call); // into the room it came from
                         Step::Call(self.store.split(call.a, level).1, self.store.split(call.b, level).1)
                     } else {
-                        let node = self.store.node(level, call.lo, node)?;
+                        // Mostly one operand holds the other, so it is looked at before the table of all nodes.
+                        let known = [call.a, call.b].into_iter().find(|&of| self.store.is(of, level, call.lo, node));
+                        let node = known.map_or_else(|| self.store.node(level, call.lo, node), Ok)?;
                         if call.kept {
                             self.cache.put(&self.store.memory, op, 0, call.a, call.b, node)?;
                         }

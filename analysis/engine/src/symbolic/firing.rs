@@ -172,7 +172,7 @@ impl Saturation {
             *at = kept as u32;
         }
         let store = &mut shop.diagram.store;
-        let start = closed(store, &self.values[base..], shop.blocks.low(block))?;
+        let start = closed(store, &self.values[base..], shop.blocks.low(block), node)?;
         let fixed = if start == EMPTY || shop.agenda.at(block).is_empty() {
             Some(start)
         } else {
@@ -252,7 +252,7 @@ impl Saturation {
         if let Some(Frame::Fix { added: true, .. }) = self.frames.last() {
             let values = &mut self.values[base as usize..];
             values.sort_unstable_by_key(|value| value.bits);
-            result = closed(&mut shop.diagram.store, values, shop.blocks.low(block))?;
+            result = closed(&mut shop.diagram.store, values, shop.blocks.low(block), start)?;
         }
         shop.diagram.cache.put(&shop.diagram.store.memory, self.ops().1, block, start, within, result)?;
         self.leave(base as usize, result);

@@ -6,7 +6,9 @@
 //!
 //! To find each node of such a path by the table of all nodes is what a search would spend most of its time on, as nearly
 //! every look at that table misses the processor's caches. So the last node is remembered that was closed from
-//! values of the same hash, and looked at first: its nodes mostly stand side by side, as they were made in one go.
+//! values of the same hash, and looked at first: its nodes mostly stand side by side, as they were made in one go. Where
+//! that is another one, each part is compared with the same part of the node that the search began with, of which most
+//! values are left as they were.
 
 use super::cache::ANY;
 use super::zdd::{EMPTY, Node, Store};
@@ -37,8 +39,8 @@ pub(super) fn opened(store: &Store, node: Node, low: u32, bits: u32, values: &mu
     store.memory.push(values, Value { bits, node, within: ANY, grown: true })
 }
 
-/// The node of these values, which are in ascending order and not empty below.
-pub(super) fn closed(store: &mut Store, values: &[Value], low: u32) -> Result<Node, Stop> {
+/// The node of these values, which are in ascending order and not empty below; `like` is one that may share parts with it.
+pub(super) fn closed(store: &mut Store, values: &[Value], low: u32, like: Node) -> Result<Node, Stop> {
     match values {
         [] => Ok(EMPTY),
         [only] if only.bits == 0 => Ok(only.node),
@@ -53,7 +55,7 @@ pub(super) fn closed(store: &mut Store, values: &[Value], low: u32) -> Result<No
             if same(store, last, values, low, u32::MAX) {
                 return Ok(last);
             }
-            let node = cut(store, values, low, u32::MAX)?;
+            let node = cut(store, values, low, u32::MAX, like)?;
             store.set_last_of(hash, node);
             Ok(node)
         }
@@ -78,12 +80,18 @@ fn same(store: &Store, node: Node, values: &[Value], low: u32, mask: u32) -> boo
 }
 
 /// Makes the node of values that differ in the bits of a mask alone.
-fn cut(store: &mut Store, values: &[Value], low: u32, mask: u32) -> Result<Node, Stop> {
+fn cut(store: &mut Store, values: &[Value], low: u32, mask: u32, like: Node) -> Result<Node, Stop> {
     let Some(last) = values.last().filter(|last| last.bits & mask != 0) else { return Ok(values[0].node) };
     let at = (last.bits & mask).ilog2();
     let bit = 1 << at;
+    let level = low + at;
+    let mut like = like;
+    while store.level(like) > level {
+        like = store.lo(like);
+    }
+    let (like_lo, like_hi) = store.split(like, level);
     let split = values.partition_point(|value| value.bits & bit == 0);
-    let hi = cut(store, &values[split..], low, bit - 1)?;
-    let lo = if split == 0 { EMPTY } else { cut(store, &values[..split], low, bit - 1)? };
-    store.node(low + at, lo, hi)
+    let hi = cut(store, &values[split..], low, bit - 1, like_hi)?;
+    let lo = if split == 0 { EMPTY } else { cut(store, &values[..split], low, bit - 1, like_lo)? };
+    if store.is(like, level, lo, hi) { Ok(like) } else { store.node(level, lo, hi) }
 }
