@@ -5,7 +5,7 @@
 //! is accepted.
 
 use super::automaton::{Automaton, Edge};
-use crate::budget::{Memory, Stop};
+use crate::budget::{Memory, Stop, Watch};
 use crate::marking::{Width, linear_hash};
 use crate::stubborn::search::Prepared;
 use crate::table::{NONE, Table};
@@ -45,8 +45,15 @@ impl<'a> Product<'a> {
     }
 
     /// Adds a vertex that was not met; its number.
-    pub(super) fn add<W: Width>(&mut self, width: W, vertex: &[u64], most: usize) -> Result<u32, Stop> {
+    pub(super) fn add<W: Width>(
+        &mut self,
+        width: W,
+        vertex: &[u64],
+        most: usize,
+        watch: &mut Watch<'_>,
+    ) -> Result<u32, Stop> {
         let number = self.len();
+        self.table.make_room(width, 1, &self.memory, watch)?;
         if number.is_multiple_of(64) {
             self.memory.push(&mut self.closed, 0)?;
         }

@@ -141,7 +141,7 @@ impl<'a> Search<'a> {
         let all = self.product.automaton.all_marks;
         let mut vertex = self.product.prepared.net.initial.clone();
         vertex.push(0);
-        self.product.add(width, &vertex, self.most)?;
+        self.product.add(width, &vertex, self.most, watch)?;
         self.enter(0, &vertex, NONE, 0)?;
         while let Some(&Frame { vertex: top, .. }) = self.frames.last() {
             vertex.copy_from_slice(self.product.table.store.get(width, top as usize));
@@ -156,7 +156,7 @@ impl<'a> Search<'a> {
             self.product.edges += 1;
             self.product.step(&mut vertex, t, target);
             let Some(known) = self.product.find(width, &vertex) else {
-                let new = self.product.add(width, &vertex, self.most)?;
+                let new = self.product.add(width, &vertex, self.most, watch)?;
                 self.enter(new, &vertex, t, marks)?;
                 watch.found = Found { markings: self.product.len() as u64, edges: self.product.edges };
                 let (first, end) = self.frames[self.frames.len() - 1].firable;
@@ -279,6 +279,7 @@ mod tests {
     use super::*;
     use crate::budget::unwatched;
     use crate::lasso::automaton::{Admits, Edge};
+    use crate::marking::Fixed;
     use crate::net::{Net, Transition};
     use crate::stubborn::dependencies::literal;
     use crate::stubborn::formula::{Formula, Node};
@@ -342,5 +343,21 @@ mod tests {
         let limits = Limits { vertices: 100, memory_bytes: 100, ..limits };
         let found = search(&Prepared::new(rings()), &mut automaton, limits, &mut unwatched);
         assert_eq!((found.lasso, found.stop), (None, Some(Stop::Memory)));
+    }
+
+    #[test]
+    fn the_table_of_vertices_does_not_grow_past_the_end_of_time() {
+        let (prepared, mut automaton) = (Prepared::new(rings()), again_and_again(&[5], 6));
+        let mut product = Product::new(&prepared, &mut automaton, Memory::new(1 << 24)).expect("fits");
+        let (width, mut poll) = (Fixed::<2>, unwatched);
+        let mut late = Watch::new(Some(Instant::now()), &mut poll);
+        let mut add = |product: &mut Product<'_>, i: u64| product.add(width, &[i, 0], usize::MAX, &mut late);
+        assert_eq!((0..1 << 20).find_map(|i| add(&mut product, i).err()), Some(Stop::Time));
+        // What was met before is still there, and with more time there is room for more.
+        let met = product.len() as u64;
+        assert!(met > 0 && (0..met).all(|i| product.find(width, &[i, 0]) == Some(i as u32)));
+        let mut poll = unwatched;
+        let added = product.add(width, &[met, 0], usize::MAX, &mut Watch::new(None, &mut poll));
+        assert_eq!((added, product.find(width, &[met, 0])), (Ok(met as u32), Some(met as u32)));
     }
 }

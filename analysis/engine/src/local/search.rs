@@ -199,7 +199,7 @@ impl<'a> Local<'a> {
     /// Round after round with larger budgets, until the value in M0 is known.
     fn rounds<W: Width>(&mut self, width: W, first: usize, watch: &mut Watch<'_>) -> Result<bool, Stop> {
         let initial = self.prepared.net.initial.clone();
-        self.number(width, &initial)?;
+        self.number(width, &initial, watch)?;
         self.budget = first.max(1);
         let whole = self.formula.nodes.len() as u32 - 1;
         for round in 0.. {
@@ -219,12 +219,13 @@ impl<'a> Local<'a> {
     }
 
     /// The number of a marking, which is added where it was not met before.
-    fn number<W: Width>(&mut self, width: W, marking: &[u64]) -> Result<u32, Stop> {
+    fn number<W: Width>(&mut self, width: W, marking: &[u64], watch: &mut Watch<'_>) -> Result<u32, Stop> {
         let hash = linear_hash(width, marking);
         if let Some(known) = self.table.find(width, marking, hash) {
             return Ok(known);
         }
         let number = self.table.store.len();
+        self.table.make_room(width, 1, &self.memory, watch)?;
         self.table.insert(width, marking, hash, self.most, &self.memory)?;
         Ok(number as u32)
     }
@@ -312,7 +313,7 @@ impl<'a> Local<'a> {
         let mut found = Truth::False;
         for t in firable {
             self.flip(&mut bits, t);
-            let after = self.number(width, &bits)?;
+            let after = self.number(width, &bits, watch)?;
             self.flip(&mut bits, t);
             self.edges += 1;
             match self.value(width, one, after, outermost, watch)? {
@@ -411,7 +412,7 @@ impl<'a> Local<'a> {
             let t = way.firable[top.next];
             let mut bits = self.marking(width, top.marking);
             self.flip(&mut bits, t);
-            let after = self.number(width, &bits)?;
+            let after = self.number(width, &bits, watch)?;
             self.spare.push(bits);
             self.edges += 1;
             watch.found = Found { markings: self.table.store.len() as u64, edges: self.edges };

@@ -229,6 +229,7 @@ impl Search {
                 }
                 self.edges += 1;
                 let hash = hash ^ net.flip_hashes[t as usize];
+                self.table.make_room(width, 1, &self.memory, watch)?;
                 if self.table.insert(width, &after, hash, max, &self.memory)? {
                     self.memory.push(&mut self.parents, next as u32)?;
                     if let Goal::Formula(formula) = &mut goal
