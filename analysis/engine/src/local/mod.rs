@@ -21,3 +21,4 @@
 
 pub mod formula;
 pub mod search;
+mod until;

@@ -21,6 +21,7 @@ mod firing;
 mod hubs;
 pub mod image;
 pub mod listing;
+mod numbering;
 pub mod order;
 mod ordered;
 mod parts;
