@@ -4,9 +4,10 @@ The yardstick is what Zenoh alone needs, in the same run and with as many proces
 others, each answers, and the round trip is over when the last answer is there. A firing takes two phases, asking for
 promises and ordering what was decided, and the next one begins with the acknowledgements; so the goal is 1.3 round
 trips for each phase. Times are by the clock, because what is measured is waiting. The yardstick answers on Zenoh's own
-threads. A controller answers on its event loop, where its drivers and timers live, so there is a second yardstick: the
-same round trip between five event loops, each woken by Zenoh's thread once for all that comes before it looks, as the
-link does it, and doing nothing else. What a phase takes beyond that is the protocol's: messages read and written, acts.
+threads. A controller does so where its event loop sleeps (`executor/links/lending.py`), and where it is at work, with
+drivers and timers, the loop is woken. What a hand-over to the loop takes each time shows a second yardstick: the same
+round trip between five event loops, each woken by Zenoh's thread once for all that comes before it looks, and doing
+nothing else. What a phase takes beyond the first is the protocol's: messages read and written, acts.
 
     python benchmarks/linking.py controller c1 ADDRESS BUNDLE     a process of the firing
     python benchmarks/linking.py echo c1 ADDRESS BUNDLE           a process of the yardstick
