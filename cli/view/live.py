@@ -56,6 +56,8 @@ class LivePage:
         self.player = TokenPlayer.of(self.net)
         self.lanes = Lanes(self.net)
         self.followers: set[_Follower] = set()
+        self.drawing = asyncio.Lock()
+        self.drawn: str | None = None
         self.word: Word = -1
         self.states: dict[str, dict[str, Any]] = {}
         self.stage, self.why_no_view = self._stage(plant)
@@ -81,9 +83,16 @@ class LivePage:
             "here": here,
             "coordinators": [name or "the coordinator" for name in self.host.coordinators],
             "net": moment.structure(self.net),
-            "picture": draw_net(self.net, marking=0),
+            "picture": await self.picture(),
             "top": top_of(self.stage, self.why_no_view),
         }
+
+    async def picture(self) -> str:
+        """The drawing, made once and beside the event loop: of a large net it takes a second, and the cell runs on."""
+        async with self.drawing:
+            if self.drawn is None:
+                self.drawn = await asyncio.to_thread(draw_net, self.net, marking=0)
+            return self.drawn
 
     def _stage(self, plant: PlantModel | None) -> tuple[Stage | None, str]:
         if self.owners is not None:
@@ -124,7 +133,10 @@ class LivePage:
             while not ended:
                 ended = self.host.is_over and not may_stay(self.host)
                 frame = self.frame(follower, ended=ended)
-                await response.write(json.dumps(frame, separators=(",", ":")).encode() + b"\n")
+                try:
+                    await response.write(json.dumps(frame, separators=(",", ":")).encode() + b"\n")
+                except ConnectionError:  # the browser is gone
+                    break
                 if not ended:
                     await asyncio.sleep(1 / FRAMES_PER_SECOND)
                     await follower.something(HEARTBEAT_SECONDS - 1 / FRAMES_PER_SECOND)

@@ -36,3 +36,20 @@ export function announce(words: string): void {
 export const counted = (n: number, word: string): string => `${n.toLocaleString("en")} ${word}${n === 1 ? "" : "s"}`;
 
 export const calm = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+/** Draw when it is wanted, but never for more than a tenth of the time: what is large is drawn seldom, and nothing waits for it. */
+export function paced(draw: () => void): () => void {
+  let waiting = false;
+  let free = 0;
+  const drawn = (): void => {
+    waiting = false;
+    const begin = performance.now();
+    draw();
+    setTimeout(() => (free = performance.now() + 9 * (performance.now() - begin))); // with the browser's own share
+  };
+  return () => {
+    if (waiting) return;
+    waiting = true;
+    setTimeout(() => requestAnimationFrame(drawn), Math.max(0, free - performance.now()));
+  };
+}

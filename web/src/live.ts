@@ -2,7 +2,7 @@
 // nothing comes any more, that is said, and what is shown is marked as old: a page that looks alive and is not is the
 // one thing that must never be here.
 
-import { announce, counted, h } from "./dom";
+import { announce, counted, h, paced } from "./dom";
 import { banner, frame, panel, type Frame } from "./frame";
 import { Lanes, type Lane } from "./lanes";
 import { Picture } from "./picture";
@@ -47,6 +47,9 @@ interface Now {
 const SILENT_MS = 2500;
 const RETRY_MS = 1000;
 const EVENTS_SHOWN = 200;
+const COLUMNS_MAX = 12;
+/** When more fires between two frames, no eye follows the tokens on their way. */
+const FLYING_MAX = 6;
 const BAD = new Set(["fault", "deadlock", "latched"]);
 const SIGNS: Record<string, [string, string]> = {
   ready: ["●", "ready"], yes: ["✓", "votes yes"], promised: ["◐", "has promised"], no: ["○", "not ready"], ordered: ["…", "has its order"],
@@ -61,6 +64,12 @@ export class Live {
   private readonly waits = h("ul", { class: "list" });
   private readonly votes = h("table", { class: "votes" });
   private readonly rows = new Map<string, Votes>();
+  private readonly shownRows = new Map<string, HTMLElement>();
+  private readonly changedRows = new Set<string>();
+  private readonly drawVotes = paced(() => this.showVotes());
+  private readonly untold: Now["events"] = [];
+  private readonly drawEvents = paced(() => this.showEvents());
+  private readonly drawLanes = paced(() => this.showLanes());
   private readonly signals = h("ul", { class: "signals" });
   private readonly events = h("ol", { class: "log events", "aria-label": "What happened" });
   private readonly buttons: HTMLButtonElement[] = [];
@@ -140,8 +149,13 @@ export class Live {
 
   private watch(): void {
     if (this.now === null || this.now.ended || this.lost) return;
+    this.drawLanes();
+  }
+
+  private showLanes(): void {
+    if (this.now === null || this.lost) return;
     // Between two frames time goes on; it is shown only as long as the connection lives.
-    const since = Math.min(performance.now() - this.heard, 700) / 1000;
+    const since = this.now.ended ? 0 : Math.min(performance.now() - this.heard, 700) / 1000;
     this.lanes.draw(this.now.at + since * this.now.speed);
   }
 
@@ -155,14 +169,22 @@ export class Live {
     const flying = now.fired.filter((name, i) => now.fired.indexOf(name) === i);
     this.now = now;
     this.picture.show(now);
-    this.picture.fly(flying);
+    if (flying.length <= FLYING_MAX) this.picture.fly(flying);
     if (now.top) this.top.show(now.top, 0.2, now.speed);
     this.lanes.take(now.lanes);
-    this.lanes.draw(now.at);
+    this.drawLanes();
     this.showState(now);
-    this.showVotes(now);
+    for (const row of now.votes) {
+      this.rows.set(row.name, row);
+      this.changedRows.add(row.name);
+    }
+    if (now.votes.length > 0) this.drawVotes();
     this.showWaits(now);
-    this.showEvents(now);
+    if (now.events.length > 0) {
+      this.untold.push(...now.events);
+      this.untold.splice(0, Math.max(0, this.untold.length - EVENTS_SHOWN));
+      this.drawEvents();
+    }
     const on = new Set(now.signals);
     for (const one of this.signals.children as HTMLCollectionOf<HTMLElement>) {
       const value = on.has(one.dataset.signal!);
@@ -210,30 +232,43 @@ export class Live {
     this.waits.replaceChildren(...(lines.length > 0 ? lines.map((line, i) => h("li", { class: i < away.length ? "wait lost" : "wait" }, line)) : [h("li", { class: "none" }, none)]));
   }
 
-  private showVotes(now: Now): void {
-    if (now.votes.length === 0) return;
-    for (const row of now.votes) this.rows.set(row.name, row);
+  /** The rows that have changed; of many controllers a row names those that take part, instead of a column for each. */
+  private showVotes(): void {
+    const controllers = [...new Set([...this.rows.values()].flatMap((row) => row.parts.map((part) => part.controller)))];
+    const wide = controllers.length > COLUMNS_MAX;
+    if (this.shownRows.size !== this.rows.size) {
+      this.shownRows.clear();
+      for (const name of this.rows.keys()) this.shownRows.set(name, h("tr", {}));
+      const heads = wide ? [h("th", { scope: "col" }, "controllers")] : controllers.map((name) => h("th", { scope: "col" }, name));
+      this.votes.replaceChildren(
+        h("caption", { class: "unseen" }, "For each global transition, how each controller stands to it"),
+        h("thead", {}, h("tr", {}, h("th", { scope: "col" }, ""), ...heads)),
+        h("tbody", {}, ...this.shownRows.values()),
+      );
+      for (const name of this.rows.keys()) this.changedRows.add(name);
+    }
     const marked = (vote: string): HTMLElement => {
       const [sign, words] = SIGNS[vote] ?? ["?", vote];
       return h("span", { class: `vote ${vote}`, title: words }, h("i", { "aria-hidden": "true" }, sign), h("span", { class: "unseen" }, words));
     };
-    const controllers = [...new Set([...this.rows.values()].flatMap((row) => row.parts.map((part) => part.controller)))];
-    this.votes.replaceChildren(
-      h("caption", { class: "unseen" }, "For each global transition, how each controller stands to it"),
-      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, ""), ...controllers.map((name) => h("th", { scope: "col" }, name)))),
-      h("tbody", {}, ...[...this.rows.values()].map((row) => {
-        const of = new Map(row.parts.map((part) => [part.controller, part.vote]));
-        const all = row.parts.every((part) => ["ready", "yes", "promised", "applied", "ordered"].includes(part.vote));
-        return h("tr", { class: row.round || (all ? "all" : "") }, h("th", { scope: "row", title: row.says }, row.name, row.round ? h("span", { class: "soft" }, ` ${row.round}`) : null),
-          ...controllers.map((name) => h("td", {}, of.has(name) ? marked(of.get(name)!) : null)));
-      })),
-    );
+    for (const name of this.changedRows) {
+      const row = this.rows.get(name)!;
+      const shown = this.shownRows.get(name)!;
+      const of = new Map(row.parts.map((part) => [part.controller, part.vote]));
+      const all = row.parts.every((part) => ["ready", "yes", "promised", "applied", "ordered"].includes(part.vote));
+      shown.className = row.round || (all ? "all" : "");
+      const cells = wide
+        ? [h("td", {}, ...row.parts.flatMap((part) => [h("span", {}, ` ${part.controller} `), marked(part.vote)]))]
+        : controllers.map((one) => h("td", {}, of.has(one) ? marked(of.get(one)!) : null));
+      shown.replaceChildren(h("th", { scope: "row", title: row.says }, row.name, row.round ? h("span", { class: "soft" }, ` ${row.round}`) : null), ...cells);
+    }
+    this.changedRows.clear();
   }
 
-  private showEvents(now: Now): void {
-    if (now.events.length === 0) return;
+  private showEvents(): void {
+    const told = this.untold.splice(0);
     const atEnd = this.events.scrollTop + this.events.clientHeight >= this.events.scrollHeight - 8;
-    this.events.append(...now.events.map((event) => h("li", { class: event.kind }, h("span", { class: "soft" }, `${event.at.toFixed(1)} `), event.what)));
+    this.events.append(...told.map((event) => h("li", { class: event.kind }, h("span", { class: "soft" }, `${event.at.toFixed(1)} `), event.what)));
     while (this.events.children.length > EVENTS_SHOWN) this.events.firstElementChild!.remove();
     if (atEnd) this.events.scrollTop = this.events.scrollHeight;
   }
