@@ -2,15 +2,16 @@
 
 The simulation draws some of what may happen; here all of it happens. A *configuration* is the machines with what they
 have kept, the messages under way, and the commands that machines of the cell are at; it is left by every step that is
-possible in it, breadth first. The machines are the executor's own code: an act is a call of one of them on a copy. What
-an act of a machine does depends on this machine alone, so each is done once, and looked up whenever the same machine
-meets the same message in another configuration; the code runs some thousand times for a million configurations.
+possible in it, breadth first. The machines are the executor's own code: an act is a call of one of them on a copy,
+which is done once and then looked up (`repertoire`); the code runs some thousand times for a million configurations.
 
 What may happen: a message arrives, in any order; a controller fires or reports; whoever has something unanswered
-repeats it when nothing is under way; a command is completed; a sensor changes; a time begins, or is over. And with a
-*budget* for each: a message is lost; one arrives and stays under way; a machine is killed, before or after an act but
-before anything of it leaves, and restored from what it kept; the operator has everything undecided given up, or a
-controller leave, and stay after all. A controller that was restored is resumed at any time, with the answers of its
+repeats it when nothing is under way; a machine takes a command, at any time after it was sent, and completes it; a
+command that is still with its driver when its token leaves is given up; a sensor changes; a time begins, or is over.
+And with a *budget* for each: a message is lost; one arrives and stays under way; a machine is killed, before or after
+an act but before anything of it leaves, or without having heard what a machine of the cell has taken or done, and
+restored from what it kept, its driver with nothing; the operator has everything undecided given up, or a controller
+leave, and stay after all. A controller that was restored is resumed at any time, with the answers of its
 machines.
 
 Messages under way are a set: the same one twice is once, since one that stays is a copy too. Numbers are counted from
@@ -30,90 +31,29 @@ from typing import Any, Final
 
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.controller import LocalController
-from firable.executor.protocol.coordinator import Coordinator
-from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import (
     Decision,
     Effect,
     Firing,
     Hello,
-    Keep,
     Message,
     Sending,
     Taken,
     VoteRequest,
 )
-from firable.executor.protocol.token_player import TokenPlayer, Word
-from firable.executor.simulation.numbering import (
-    Collecting,
-    Kept,
-    Kind,
-    Ranking,
-    apply,
-    apply_message,
-    count_of,
-    forget_times,
-)
-from firable.executor.simulation.snapshots import clone, frozen
-from firable.nets.decomposition import Decomposition
-from firable.nets.net import SignalKind
-
-Job = tuple[str, int, bool]
-"""A command that a machine of the cell was given: its place, its entry, and whether it is done."""
+from firable.executor.protocol.token_player import Word
+from firable.executor.simulation.repertoire import NO_FAULTS, Act, Budget, Configuration, Job, Reached, Repertoire, Step
 
 
-@dataclass(frozen=True, slots=True)
-class Budget:
-    """How many faults of each kind a run may suffer."""
-
-    losses: int = 0
-    copies: int = 0
-    crashes: int = 0
-    giving_up: int = 0
-    leaving: int = 0
-    """How often a controller takes its votes back, because its host is about to end."""
-
-
-@dataclass(frozen=True, slots=True)
-class Configuration:
-    """Where everything stands; machines are numbers of `Explorer.machines`, in the order of `Explorer.names`."""
-
-    machines: tuple[int, ...]
-    under_way: frozenset[Message]
-    jobs: frozenset[Job]
-    budget: Budget
-    central: Word
-    """The marking of the central net, and its signals, after what has fired and was taken in so far."""
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """What happens: of which kind, in which machine, with what, and what the machine does; before and after it."""
-
-    kind: str
-    machine: int
-    about: object
-    effects: tuple[Effect, ...]
-    before: int
-    after: int
-    """The machine itself before and after, as numbers of `Explorer.machines`; its numbers not yet replaced."""
+class MachineError(AssertionError):
+    """A machine of the cell is commanded as it must not be, or not at all."""
 
 
 class NotATraceError(AssertionError):
     """What happened is none of the central net."""
 
 
-@dataclass(slots=True)
-class Stored:
-    """A machine and what it has kept; never changed, only copied."""
-
-    machine: LocalController | Coordinator
-    kept: Kept
-
-
 _FAULTS_ON_A_WAY: Final = 0.03
-Act = Callable[[Any], list[Effect]]
-"""A call of a machine."""
 Watcher = Callable[["Explorer", Configuration, Step, Configuration], None]
 
 
@@ -127,144 +67,8 @@ class Space:
     edges: dict[Configuration, list[tuple[Step, Configuration]]] = field(default_factory=dict)
 
 
-class Explorer:
+class Explorer(Repertoire):
     """Explores the machines of a decomposition."""
-
-    def __init__(
-        self,
-        decomposition: Decomposition,
-        *,
-        coordinator: type[Coordinator] = Coordinator,
-        controller: type[LocalController] = LocalController,
-        senses: bool = True,
-    ) -> None:
-        self.decomposition = decomposition
-        self.net = decomposition.net
-        self.classes = (coordinator, controller)
-        self.central = TokenPlayer.of(self.net)
-        self.coordinators = coordinators(decomposition)
-        self.names = (*self.coordinators, *(subnet.name for subnet in decomposition.subnets))
-        """Coordinators from the top down, then controllers in the order of the decomposition."""
-        self.owner_of = {s.name: self.names.index(n.name) for n in decomposition.subnets for s in n.signals}
-        sensors = [signal.name for signal in self.net.signals if signal.kind is SignalKind.SENSOR]
-        self.sensors = tuple(sensors) if senses else ()
-        self.machines: list[Stored] = []
-        self.numbered: dict[Hashable, int] = {}
-        self.acts: dict[Hashable, tuple[int, tuple[Effect, ...]]] = {}
-        self.found: dict[object, dict[Kind, set[int]]] = {}
-        self.mentioned: dict[object, int] = {}
-        self.mentions: dict[Hashable, int] = {}
-        self.rankings: dict[frozenset[int], Ranking] = {}
-
-    # --- Machines and acts
-
-    def machine(self, number: int) -> LocalController | Coordinator:
-        """A machine, to look at."""
-        return self.machines[number].machine
-
-    def _number(self, machine: LocalController | Coordinator, kept: Kept) -> int:
-        key = (type(machine), frozen(machine), frozen(sorted(kept.items(), key=lambda item: item[0])))
-        if (number := self.numbered.get(key)) is None:
-            number = self.numbered[key] = len(self.machines)
-            self.machines.append(Stored(machine, kept))
-        return number
-
-    def _act(self, number: int, key: Hashable, act: Act) -> tuple[int, tuple[Effect, ...]]:
-        if (known := self.acts.get((number, key))) is None:
-            stored = self.machines[number]
-            machine, kept = clone(stored.machine), dict(stored.kept)
-            effects = act(machine)
-            known = self.acts[number, key] = (self._kept(machine, kept, effects), tuple(effects))
-        return known
-
-    def _kept(self, machine: LocalController | Coordinator, kept: Kept, effects: Sequence[Effect]) -> int:
-        for effect in effects:
-            if isinstance(effect, Keep) and effect.value is None:
-                kept.pop(effect.key, None)
-            elif isinstance(effect, Keep) and effect.value is not None:
-                kept[effect.key] = effect.value
-        forget_times(machine)
-        return self._number(machine, kept)
-
-    def _restored(self, number: int, which: int) -> tuple[int, tuple[Effect, ...]]:
-        if (known := self.acts.get((number, "restart"))) is None:
-            kept = dict(self.machines[number].kept)
-            coordinator, controller = self.classes
-            machine: LocalController | Coordinator = (
-                coordinator.restored(self.decomposition, kept, self.names[which])
-                if which < len(self.coordinators)
-                else controller.restored(self.decomposition, self.names[which], kept)
-            )
-            effects = machine.start()
-            known = self.acts[number, "restart"] = (self._kept(machine, kept, effects), tuple(effects))
-        return known
-
-    # --- Configurations
-
-    def initial(self, budget: Budget) -> Configuration:
-        """Everything started for the first time."""
-        coordinator, controller = self.classes
-        made: list[LocalController | Coordinator]
-        made = [coordinator(self.decomposition, name) for name in self.coordinators]
-        made += [controller(self.decomposition, name) for name in self.names[len(made) :]]
-        numbers, under_way, central = [], set[Message](), Word(self.net.initial_marking)
-        for machine in made:
-            effects = machine.start()
-            numbers.append(self._kept(machine, {}, effects))
-            under_way |= {effect for effect in effects if isinstance(effect, Message)}
-        return self._counted(Configuration(tuple(numbers), frozenset(under_way), frozenset(), budget, central))
-
-    def _counted(self, found: Configuration) -> Configuration:
-        """The configuration with its numbers counted from the beginning."""
-        parts = (*found.machines, *found.under_way, *found.jobs)
-        key = frozenset(map(self._mentioned, parts))
-        if (ranking := self.rankings.get(key)) is None:
-            collected: dict[Kind, set[int]] = {}
-            for part in parts:
-                for kind, numbers in self._numbers(part).items():
-                    collected[kind] = collected.get(kind, set()) | numbers
-            ranking = self.rankings[key] = Ranking(collected.items(), self.coordinators)
-        if ranking.changes_nothing:
-            return found
-        return Configuration(
-            tuple(self._renumbered(number, ranking) for number in found.machines),
-            frozenset(apply_message(message, ranking) for message in found.under_way),
-            frozenset((p, ranking.entry(count_of(p, self.net), entry), done) for p, entry, done in found.jobs),
-            found.budget,
-            found.central,
-        )
-
-    def _mentioned(self, part: int | Message | Job) -> int:
-        """A number for all numbers that a part mentions."""
-        if (known := self.mentioned.get(part)) is None:
-            numbers = self._numbers(part)
-            key = tuple((kind, tuple(sorted(numbers[kind]))) for kind in sorted(numbers))
-            known = self.mentioned[part] = self.mentions.setdefault(key, len(self.mentions))
-        return known
-
-    def _numbers(self, part: int | Message | Job) -> dict[Kind, set[int]]:
-        if (known := self.found.get(part)) is None:
-            collecting = Collecting()
-            if isinstance(part, int):
-                apply(clone(self.machines[part].machine), self.machines[part].kept, collecting)
-            elif isinstance(part, tuple):
-                collecting.entry(count_of(part[0], self.net), part[1])
-            else:
-                apply_message(part, collecting)
-            known = self.found[part] = collecting.found
-        return known
-
-    def _renumbered(self, number: int, ranking: Ranking) -> int:
-        mine = self._numbers(number)
-        key = tuple((kind, n, ranking.ranks[kind][n]) for kind in sorted(mine) for n in sorted(mine[kind]))
-        if all(n == rank for _, n, rank in key):
-            return number
-        if (known := self.acts.get((number, key))) is None:
-            stored = self.machines[number]
-            machine = clone(stored.machine)
-            kept = apply(machine, stored.kept, ranking)
-            known = self.acts[number, key] = (self._number(machine, kept), ())
-        return known[0]
 
     # --- Steps
 
@@ -274,8 +78,10 @@ class Explorer:
             yield from self._arrives(at, message)
         for which in range(len(self.coordinators), len(self.names)):
             yield from self._acts_of(at, which)
-        for place, entry, done in at.jobs:
-            if not done:
+        for place, entry, how in at.jobs:
+            if how is Reached.SENT:
+                yield from self._taken(at, place, entry)
+            elif how is Reached.TAKEN:
                 yield from self._completes(at, place, entry)
         for sensor in self.sensors:
             which = self.owner_of[sensor]
@@ -323,18 +129,34 @@ class Explorer:
     def _answer(self, at: Configuration, place: str, entry: int) -> Answer:
         for job in at.jobs:
             if job[:2] == (place, entry):
-                return Answer.DONE if job[2] else Answer.WORKING
+                return Answer.DONE if job[2] is Reached.DONE else Answer.WORKING
         return Answer.NOT_RECEIVED
 
+    def _taken(self, at: Configuration, place: str, entry: int) -> Iterator[tuple[Step, Configuration]]:
+        """A machine takes a command, and its driver says so."""
+        taken = replace(at, jobs=at.jobs - {(place, entry, Reached.SENT)} | {(place, entry, Reached.TAKEN)})
+        which = self.names.index(str(self.net.place(place).owner))
+        sent = partial(_sent, place, entry)
+        yield from self._does(taken, "take", which, (place, entry), sent, always=True, before=at)
+        yield from self._unheard(taken, "take", which, (place, entry), at)
+
     def _completes(self, at: Configuration, place: str, entry: int) -> Iterator[tuple[Step, Configuration]]:
-        jobs = at.jobs - {(place, entry, False)} | {(place, entry, True)}
+        """A machine ends a command, and its driver says so."""
         completion = self.net.place(place).completion
-        done = Configuration(at.machines, at.under_way, jobs, at.budget, at.central)
         if completion is None:
             return
+        done = replace(at, jobs=at.jobs - {(place, entry, Reached.TAKEN)} | {(place, entry, Reached.DONE)})
         which = self.owner_of[completion]
         read = partial(_read, completion, entry)
         yield from self._does(done, "complete", which, (completion, entry), read, always=True, before=at)
+        yield from self._unheard(done, "complete", which, (completion, entry), at)
+
+    def _unheard(
+        self, at: Configuration, kind: str, which: int, about: Hashable, before: Configuration
+    ) -> Iterator[tuple[Step, Configuration]]:
+        """The same, and its controller is killed before it hears of it."""
+        if at.budget.crashes:
+            yield self._crashes(at, which, before, at.machines[which], (), f"{kind}, unheard crash", about)
 
     def _faults(self, at: Configuration) -> Iterator[tuple[Step, Configuration]]:
         budget = at.budget
@@ -366,16 +188,11 @@ class Explorer:
         before: Configuration | None = None,
     ) -> Iterator[tuple[Step, Configuration]]:
         number = at.machines[which]
-        after, effects = self._act(number, (kind, about), act)
+        after, effects = self.act(number, (kind, about), act)
         if after == number and not effects and not always:
             return
-        sent, more = after, effects
-        for effect in effects:
-            if isinstance(effect, Sending):
-                sent, kept = self._act(sent, effect, partial(_sent, effect))
-                more = (*more, *kept)
-        step = Step(kind, which, about, more, number, sent)
-        yield step, self._counted(self._left(at, which, sent, effects))
+        step = Step(kind, which, about, effects, number, after)
+        yield step, self.counted(self._left(at, which, after, effects))
         if at.budget.crashes and effects:
             # Killed behind the commit and before anything of it leaves.
             yield self._crashes(at, which, before or at, after, effects, kind, about)
@@ -390,21 +207,37 @@ class Explorer:
         kind: str = "crash",
         about: object = None,
     ) -> tuple[Step, Configuration]:
-        restored, started = self._restored(number, which)
-        step = Step(f"{kind}, crash" if effects else "crash", which, about, effects, before.machines[which], restored)
+        restored, started = self.restored(number, which)
+        step = Step(f"{kind}, crash" if effects else kind, which, about, effects, before.machines[which], restored)
         central = self.fired(at.central, effects)
         budget = _less(at.budget, "crashes")
-        left = self._left(Configuration(at.machines, at.under_way, at.jobs, budget, central), which, restored, started)
-        return step, self._counted(left)
+        own = self.names[which]  # what its driver has is lost with it
+        jobs = frozenset(j for j in at.jobs if j[2] is not Reached.SENT or self.net.place(j[0]).owner != own)
+        left = self._left(Configuration(at.machines, at.under_way, jobs, budget, central), which, restored, started)
+        return step, self.counted(left)
 
     def _left(self, at: Configuration, which: int, number: int, effects: tuple[Effect, ...]) -> Configuration:
         machines = (*at.machines[:which], number, *at.machines[which + 1 :])
-        sent = [e for e in effects if isinstance(e, Sending)]
-        jobs = at.jobs
-        for sending in sent:
-            jobs = frozenset(job for job in jobs if job[0] != sending.place) | {(sending.place, sending.entry, False)}
+        given_up = {job for job in at.jobs if self._is_given_up(job, at.machines[which], number, which)}
+        for place, _, _ in given_up:
+            if self.net.place(place).completion is None:
+                raise MachineError(f"the token of '{place}' has left before a machine had its command")
+        jobs = at.jobs - given_up
+        for sending in (effect for effect in effects if isinstance(effect, Sending)):
+            of_place = {job for job in jobs if job[0] == sending.place}
+            if any(entry >= sending.entry and how is not Reached.SENT for _, entry, how in of_place):
+                raise MachineError(f"command {sending.entry} of '{sending.place}' is given again")
+            jobs = jobs - of_place | {(sending.place, sending.entry, Reached.SENT)}
         messages = frozenset(effect for effect in effects if isinstance(effect, Message))
         return Configuration(machines, at.under_way | messages, jobs, at.budget, self.fired(at.central, effects))
+
+    def _is_given_up(self, job: Job, before: int, after: int, which: int) -> bool:
+        """Whether a command is still with the driver of a machine whose token has left its place by this act."""
+        place = self.net.place(job[0])
+        if job[2] is not Reached.SENT or place.owner != self.names[which] or before == after:
+            return False
+        machine = self.machines[after].machine
+        return isinstance(machine, LocalController) and place.name not in machine.subnet.names(machine.marking)
 
     def fired(self, central: Word, effects: Sequence[Effect]) -> Word:
         """The central net after what fired and was taken in; raises `NotATraceError`."""
@@ -424,7 +257,7 @@ class Explorer:
 
 def explore(
     explorer: Explorer,
-    budget: Budget = Budget(),
+    budget: Budget = NO_FAULTS,
     *,
     max_configurations: int = 200_000,
     watch: Watcher | None = None,
@@ -515,5 +348,5 @@ def _sense(sensor: str, value: bool, machine: LocalController) -> list[Effect]:
     return machine.read(sensor, value)
 
 
-def _sent(sending: Sending, machine: LocalController) -> list[Effect]:
-    return machine.sent(sending.place, sending.entry)
+def _sent(place: str, entry: int, machine: LocalController) -> list[Effect]:
+    return machine.sent(place, entry)

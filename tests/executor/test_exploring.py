@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 import support.abstraction
-from support import planted
+from support import gated_nets, planted
 from support.examples import FIRST_SEED, seeds
 from support.gated_nets import GATE_READ_AGAIN, SENSOR
 from support.layered_nets import cells_in_a_line, contending, left_below, shared_robot
@@ -26,8 +26,9 @@ from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import Firing, ProtocolError
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.executor.simulation.drawn import DRAWN
-from firable.executor.simulation.exploring import Budget, Configuration, Explorer, Space, Step, explore, wander
+from firable.executor.simulation.exploring import Explorer, MachineError, Space, explore, wander
 from firable.executor.simulation.numbering import Collecting, Ranking, apply
+from firable.executor.simulation.repertoire import Budget, Configuration, Reached, Step
 from firable.executor.simulation.snapshots import clone, frozen
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
@@ -35,6 +36,7 @@ from firable.nets.text import parse_net
 
 NETS = ["local_gate", "remote_gate", "local_conflict", "local_output_conflict", "read_before_order", "ring"]
 LAYERED = split(shared_robot())
+SHOWN = split(gated_nets.SHOWN)
 LOSS, COPY, CRASH, GIVE_UP = Budget(losses=1), Budget(copies=1), Budget(crashes=1), Budget(giving_up=1)
 
 
@@ -71,6 +73,32 @@ def test_with_a_crash_every_act_is_some_actions_of_the_proof_as_far_as_it_is_exp
     tie = LocalTie(decomposition_of(name))
     explored(name, CRASH, 3000, tie)
     assert tie.actions["restart"] > 0
+
+
+def test_a_machine_may_take_a_command_at_any_time_and_its_token_waits_for_that() -> None:
+    kinds: Counter[str] = Counter()
+    tie = LocalTie(SHOWN)
+
+    def watch(explorer: Explorer, at: Configuration, step: Step, after: Configuration) -> None:
+        tie(explorer, at, step, after)
+        kinds[step.kind] += 1
+        if any(how is Reached.SENT for _, _, how in at.jobs):
+            assert not any(isinstance(effect, Firing) and effect.transition == "back" for effect in step.effects)
+
+    for budget in (Budget(), LOSS):
+        assert explore(Explorer(SHOWN), budget, max_configurations=5000, watch=watch).complete
+    wander(Explorer(SHOWN), Budget(crashes=5), 1, 100, watch)  # crashes are too much to be explored to the end
+    assert {"take", "take, crash", "take, unheard crash"} <= set(kinds)
+
+
+@pytest.mark.parametrize(
+    ("fault", "budget"),
+    [(planted.LeavesUntaken, Budget()), (planted.SendsWithoutAsking, CRASH)],
+    ids=["early", "twice"],
+)
+def test_a_command_that_is_never_taken_or_given_again_is_found(fault: type[LocalController], budget: Budget) -> None:
+    with pytest.raises(MachineError):
+        explore(Explorer(SHOWN, controller=fault), budget, max_configurations=6000)
 
 
 def test_every_action_of_the_proof_is_met_with_faults_of_every_kind() -> None:

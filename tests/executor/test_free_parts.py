@@ -24,7 +24,8 @@ from firable.executor.protocol.messages import (
     VoteRequest,
 )
 from firable.executor.simulation.drawn import DRAWN
-from firable.executor.simulation.exploring import Budget, Explorer, NotATraceError, explore, wander
+from firable.executor.simulation.exploring import Explorer, NotATraceError, explore, wander
+from firable.executor.simulation.repertoire import Budget
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Net

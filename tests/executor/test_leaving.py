@@ -29,8 +29,9 @@ from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.messages import Decision, Hello, Readiness, Report, VoteRequest
 from firable.executor.simulation.campaign import Failed, Run, campaign, rehearse
 from firable.executor.simulation.drawn import DRAWN
-from firable.executor.simulation.exploring import Budget, Configuration, Explorer, Step, explore, wander
+from firable.executor.simulation.exploring import Explorer, explore, wander
 from firable.executor.simulation.judge import Subject
+from firable.executor.simulation.repertoire import Budget, Configuration, Step
 from firable.executor.simulation.world import Machines
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition

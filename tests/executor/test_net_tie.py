@@ -34,7 +34,8 @@ from firable.decompose.splitting.cut import split
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.messages import ProtocolError
 from firable.executor.simulation.drawn import DRAWN
-from firable.executor.simulation.exploring import Budget, Explorer, NotATraceError, Space, explore, wander
+from firable.executor.simulation.exploring import Explorer, NotATraceError, Space, explore, wander
+from firable.executor.simulation.repertoire import Budget
 from firable.nets.catalogue import catalogue_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Net, Transition

@@ -1,6 +1,7 @@
 """Nets of two controllers with gates: between a coordinated and a local transition, and on sensors."""
 
 from firable.nets.net import Controller, ExternalGate, Net, Place, Signal, Transition
+from firable.nets.text import parse_net
 
 
 def net_of(places: str, marked: str, *transitions: Transition) -> Net:
@@ -41,6 +42,18 @@ GATE_READ_AGAIN = net_of(
     Transition("l-back", ("a.x",), ("a.s",)),
 )
 """As `GATE_OF_A_LOCAL`, again and again."""
+
+SHOWN = parse_net("""\
+firable: 1
+cell: shown
+controllers:
+  a: {start: free, places: {free: , lamp: {send: {machine: A, command: OPEN}}}}
+  b: {start: idle, places: {idle: , has: }}
+transitions:
+  hand: {from: [a.free, b.idle], to: [a.lamp, b.has]}
+  back: {from: [a.lamp, b.has], to: [a.free, b.idle]}
+""")
+"""A command without completion: its token waits until a machine has taken it."""
 
 SENSOR = Net(
     "sensor",

@@ -34,7 +34,8 @@ from firable.executor.protocol.messages import (
     Vote,
     VoteRequest,
 )
-from firable.executor.simulation.exploring import Configuration, Explorer, Step
+from firable.executor.simulation.exploring import Explorer
+from firable.executor.simulation.repertoire import Configuration, Step
 from firable.nets.decomposition import Decomposition
 
 Key = tuple[Thing, ...]

@@ -47,8 +47,9 @@ from firable.executor.protocol.messages import (
     Vote,
     VoteRequest,
 )
-from firable.executor.simulation.exploring import Configuration, Explorer, Step
+from firable.executor.simulation.exploring import Explorer
 from firable.executor.simulation.numbering import Kept
+from firable.executor.simulation.repertoire import Configuration, Step
 from firable.nets.net import Marking
 from firable.semantics.algebra import BOOL
 from firable.semantics.firing import firable
