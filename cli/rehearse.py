@@ -60,7 +60,8 @@ def rehearse(
     with time limits, 'drawn-layered' those with coordinators under coordinators.
 
     Kinds of faults: loss, duplication, delay, reordering, partition, crash, torn, unsynced, disk, drift, jump, slow,
-    standstill, late, stuck, queued, flapping, stale, forgetful, pause, step, stop, leave.
+    standstill, late, stuck, queued, flapping, stale, forgetful, pause, step, stop, leave,
+    emergency.
     """
     from firable.executor.simulation.campaign import Run
 
