@@ -20,6 +20,7 @@ import public_nets
 import reacting
 import reading
 import splitting
+import viewing
 import whole_spaces
 from measuring import REPOSITORY, build_examples, is_busy, machine
 
@@ -34,6 +35,7 @@ BENCHMARKS: Final = {
     "executing": executing.tables,
     "reacting": reacting.tables,
     "lasting": lasting.tables,
+    "viewing": viewing.tables,
 }
 
 BUSY: Final = (
