@@ -20,6 +20,7 @@ from firable.decompose.protocol.shown import with_proof
 from firable.decompose.protocol.variant import ANY_FAULTS, NO_FAULTS, PROTOCOL, Faults, Variant
 from firable.decompose.protocol.wrong import WRONG, WrongProtocol, example
 from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.persistence import freed as freed_as_bundled
 from firable.decompose.verification import explored
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
@@ -185,11 +186,13 @@ def test_what_fires_never_takes_no_part_in_the_protocol() -> None:
 )
 def test_wrong_protocols_are_not_proved_and_their_files_are_refused(wrong: WrongProtocol) -> None:
     decomposition = split(example(wrong.example))
+    if wrong.variant.of_free:
+        decomposition = freed_as_bundled(decomposition)
     proof = prove_inductively(protocol_net(decomposition, wrong.variant, wrong.faults), TIMEOUT_MS)
     assert not any(proof.shows(name) for name in ("follows", "agrees", "complete")), sorted(proof.open_)
     for family in TITLES:
         forged = Examination(Bundle(decomposition, (), {f"{family}.smt2": proof.text}))
-        stated = StatedAnew(Voting(Cut(decomposition.net), family == "faults"))
+        stated = StatedAnew(Voting(Cut(decomposition.net), family == "faults", frozenset(decomposition.free)))
         with pytest.raises(NotShownError, match="is not what must be proved of the protocol of this net"):
             explored.same_text(forged, stated)
 
