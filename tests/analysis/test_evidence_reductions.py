@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import pytest
+from support.evidence import document
 from support.evidence_examples import EXAMPLES, reduced
 from support.examples import seeds
 from support.reduction_forging import drawn_net, drawn_steps, met, reached, taken
@@ -25,7 +26,7 @@ from firable.analysis.evidence.certificate import (
     Step,
     StubbornSets,
 )
-from firable.analysis.evidence.checking.checker import check_evidence
+from firable.analysis.evidence.checking.checker import check_document, check_evidence
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.checking.reductions import Draft
 from firable.analysis.evidence.claims import Claim, ClaimKind
@@ -232,6 +233,16 @@ FALSE: dict[str, Callable[[], Evidence]] = {
 def test_what_is_left_is_refused_where_it_does_not_show_the_goal(name: str) -> None:
     with pytest.raises(InputError, match="does not show what it claims"):
         check_evidence(FALSE[name]())
+
+
+def test_a_set_that_two_nets_without_transitions_share_is_looked_at_for_each() -> None:
+    net, space = net_of("c a", "t: a -> b", "u: d -> d"), Labelling(Markings((0b01,)))
+    true_of_c = Reduction(steps("irrelevant 0"), ("c", "b"), parse_formula("not c"), space)
+    false_of_b = Reduction(steps("early 0", "constant a"), ("b", "d"), parse_formula("b"), space)
+    first, second = of_rings(true_of_c, "not c", net), of_rings(false_of_b, "b", net)
+    assert check_evidence(first).shown
+    with pytest.raises(InputError, match=r"the goal \(b\) holds in a marking of the set"):
+        list(check_document(document(first, second)))
 
 
 @pytest.mark.parametrize("then", [SUM, StubbornSets(Markings((0b01, 0b10)), (0b11,), (0, 0))])

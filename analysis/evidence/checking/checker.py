@@ -236,9 +236,10 @@ class _Checker:
 
     def _space(self, evidence: Evidence, of: Markings | Diagram) -> Listed | Diagrams:
         for net, known, space in self._spaces:
-            # Of a continuation the net is made anew each time, with the same transitions.
-            same = net.transitions is evidence.net.transitions and net.initial_marking == evidence.net.initial_marking
-            if same and known is of:
+            # Of a continuation the net is made anew each time, with the same transitions. What a reduction leaves may
+            # have none, as all that is left by others; then the numbers of a marking stand for other places.
+            same = net.transitions is evidence.net.transitions and net.place_index == evidence.net.place_index
+            if same and net.initial_marking == evidence.net.initial_marking and known is of:
                 return space
         if isinstance(of, Diagram):
             if evidence.discipline.value != "interleaving":
