@@ -89,4 +89,6 @@ def _stay(run: Host, driver: Latched) -> None:
     if run.watching is not None:  # it knows of no machines in the middle of their work
         run.recorder.observers.remove(run.watching.seen)
         run.watching = None
+    met, is_due = run.peers.met, run.peers.is_due
     run.begin(resume=False)
+    run.peers.met, run.peers.is_due = met, is_due  # who was never reached before still was not
