@@ -60,7 +60,7 @@ def test_on_ways_through_larger_nets_with_free_parts_every_act_is_some_actions_o
     met: Counter[str] = Counter()
     for name, decomposition in larger().items():
         tie = LocalTie(decomposition)
-        wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 70, tie)
+        wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 150, tie)
         assert tie.actions["stand"] > 0 or not decomposition.free, name
         met += tie.actions
     assert met["apply-free"] > 0
