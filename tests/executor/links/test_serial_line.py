@@ -129,13 +129,12 @@ def test_a_dead_station_does_not_keep_the_others_waiting() -> None:
     async def main() -> None:
         async with over_a_serial_line() as rig:
             here, there = rig.link(Greeting("d", (COORDINATOR,))), rig.link(Greeting("d", ("robot",)))
-            there.reader, polls = (counting := CountingReader()), counting.polls
-            async with running(here), running(there) as robot:
+            async with asyncio.timeout(60), running(here), running(there) as robot:
                 await robot.until_told(("connected", COORDINATOR))
-                polls.clear()
-                while len(polls) < 40:
+                there.reader = counting = CountingReader()  # a link that runs begins with a reader of its own
+                while len(counting.polls) < 40:
                     await asyncio.sleep(0.05)
-                assert polls.count(2) > 20  # of three that are dead, each is asked one time in five
+                assert counting.polls.count(2) > 20  # of three that are dead, each is asked one time in five
 
     asyncio.run(main())
 
