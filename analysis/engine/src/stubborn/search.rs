@@ -271,6 +271,8 @@ impl Search {
 struct Chooser<'a> {
     closure: Closure<'a>,
     deletion: Deletion,
+    /// What the keys of deadlocks have brought, each closed.
+    closing: Effort,
     /// What deletion has brought.
     deleting: Effort,
     thorough: bool,
@@ -283,6 +285,7 @@ impl<'a> Chooser<'a> {
         Chooser {
             closure: Closure::new(&prepared.dependencies, places, count),
             deletion: Deletion::new(places, count),
+            closing: Effort::default(),
             deleting: Effort::default(),
             thorough,
             literals: Vec::new(),
@@ -321,6 +324,11 @@ impl<'a> Chooser<'a> {
         let (closure, literals, thorough) = (&mut self.closure, &mut self.literals, self.thorough);
         match goal {
             Goal::Deadlock { .. } => {
+                // As many closures as transitions are firable; on some nets none of them is ever smaller than all.
+                let all = closure.firable().len();
+                if all < 2 || !self.closing.is_worth_it() {
+                    return;
+                }
                 for at in 0..closure.firable().len() {
                     let key = closure.firable()[at];
                     // A key that fires is a member itself; only one that changes nothing may leave nothing to fire.
@@ -332,6 +340,7 @@ impl<'a> Chooser<'a> {
                     literals.extend(closure.net.conditions(key).iter().map(|&l| negation(l)));
                     closure.consider(marking, literals, &[], thorough);
                 }
+                self.closing.note(closure.best.firable.len() < all);
             }
             Goal::Formula(formula) => {
                 for choice in formula.choices().into_iter().take(CHOICES_MAX) {
