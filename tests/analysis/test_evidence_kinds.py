@@ -175,7 +175,7 @@ def nets_with_properties(draw: st.DrawFn) -> tuple[Net, tuple[Query, ...]]:
 
 @pytest.mark.parametrize("discipline", DISCIPLINES)
 @given(question=nets_with_properties())
-@examples(40)
+@examples(20)
 def test_whatever_is_decided_of_a_small_net_is_shown(
     discipline: Discipline, question: tuple[Net, tuple[Query, ...]]
 ) -> None:

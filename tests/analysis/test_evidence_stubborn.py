@@ -54,7 +54,7 @@ def refusal(evidence: Evidence) -> str:
 
 
 @given(data=st.data())
-@examples(150)
+@examples(75)
 def test_a_goal_has_stubborn_sets_iff_it_is_never_met(data: st.DataObject) -> None:
     of = data.draw(NETS)
     graph = explore(of)

@@ -151,7 +151,7 @@ def shows(evidence: Evidence) -> bool:
 
 
 @given(question=asked(), data=st.data())
-@examples(150)
+@examples(75)
 def test_the_markings_that_a_formula_asks_for_show_it_iff_it_holds_and_none_can_be_spared(
     question: tuple[Net, Temporal], data: st.DataObject
 ) -> None:

@@ -60,7 +60,7 @@ def decided_as_over_sets(net: Net, formula: Temporal, turn: Turn) -> bool:
 
 
 @pytest.mark.parametrize("turn", [FIXED, DRAWN])
-@examples(60)
+@examples(30)
 @given(st.data(), st.one_of(ring_nets(), ring_nets(signals=True), lively_nets(), dense_nets(signals=True)))
 def test_a_formula_is_decided_as_over_sets_in_either_order(turn: Turn, data: st.DataObject, net: Net) -> None:
     formula = data.draw(ltl_formulas(*names(net), leaves=6))

@@ -102,7 +102,7 @@ def fails(net: Net, truth: nx.MultiDiGraph[Marking], p: Formula, q: Formula, fai
 
 
 @pytest.mark.parametrize("fairness", Fairness)
-@examples(120)
+@examples(60)
 @given(situation=SITUATIONS, p=FORMULAS, q=FORMULAS)
 def test_leads_to_fails_iff_some_set_of_markings_recurs_fairly(
     fairness: Fairness, situation: tuple[Net, Discipline], p: Formula, q: Formula

@@ -56,7 +56,7 @@ def test_exactly_the_deadlocks_of_the_whole_graph_are_found(net: Net, thorough: 
         assert found.witness is None
 
 
-@examples(120)
+@examples(60)
 @given(st.data())
 def test_a_goal_is_reachable_iff_the_whole_graph_reaches_it_and_at_the_same_distance(data: st.DataObject) -> None:
     net = data.draw(NETS)

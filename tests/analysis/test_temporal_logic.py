@@ -97,7 +97,7 @@ def markings_of(graph: ReachabilityGraph, column: Column) -> Markings:
     return frozenset(graph.marking(index) for index in indexes(column))
 
 
-@examples(60)
+@examples(30)
 @given(asked(linear=False), st.sampled_from(Discipline))
 def test_ctl_holds_where_its_definition_says_over_both_spaces(question: tuple[Net, Temporal], how: Discipline) -> None:
     net, formula = question
@@ -107,7 +107,7 @@ def test_ctl_holds_where_its_definition_says_over_both_spaces(question: tuple[Ne
     assert markings_of(graph, Ctl(Sets(graph)).of(formula)) == expected
 
 
-@examples(40)
+@examples(20)
 @given(asked(linear=False))
 def test_the_evidence_of_ctl_is_a_run_of_the_net(question: tuple[Net, Temporal]) -> None:
     net, formula = question

@@ -123,7 +123,7 @@ def test_two_things_of_one_name_keep_their_former_owners_in_a_common_controller(
 
 
 @given(owned_nets(), st.integers(1, 3))
-@examples(40)
+@examples(20)
 def test_a_proposal_owns_everything_once_and_changes_nothing_else(net: Net, n: int) -> None:
     net = bare(net)
     if best_by_force(hypergraph(net), n, *hypergraph(net).bounds(n, 2.0)) is None:

@@ -257,7 +257,7 @@ def test_paths_within_a_set_are_those_of_networkx(net: Drawn, step: bool, data: 
     assert graph.backward(bitmap(graph, targets), sorted(within)) == bitmap(graph, can)
 
 
-@examples(250)
+@examples(125)
 @given(net=nets(), step=st.booleans(), data=st.data())
 def test_one_edge_back_is_that_of_the_definition(net: Drawn, step: bool, data: st.DataObject) -> None:
     naive, graph = Naive(net, step=step), explored(net, step=step)
@@ -271,7 +271,7 @@ def test_one_edge_back_is_that_of_the_definition(net: Drawn, step: bool, data: s
     assert graph.before(sorted(targets), sorted(by)) == bytes(any(f & by for f in edges) for edges in fired_into)
 
 
-@examples(250)
+@examples(125)
 @given(net=nets(), step=st.booleans(), data=st.data())
 def test_endless_runs_are_those_into_cycles_within_the_set(net: Drawn, step: bool, data: st.DataObject) -> None:
     graph = explored(net, step=step)
@@ -286,7 +286,7 @@ def test_endless_runs_are_those_into_cycles_within_the_set(net: Drawn, step: boo
     assert graph.endless(None if within is None else bitmap(graph, within)) == bitmap(graph, endless)
 
 
-@examples(250)
+@examples(125)
 @given(net=nets(), step=st.booleans(), data=st.data())
 def test_components_are_those_of_networkx(net: Drawn, step: bool, data: st.DataObject) -> None:
     graph = explored(net, step=step)

@@ -238,7 +238,7 @@ def test_value_from_before_a_command_is_not_taken_for_its_completion() -> None:
     assert beside_keeping(controller.fire()) == [Firing("back")]
 
 
-@examples(150)
+@examples(75)
 @given(owned_nets(), st.integers(0, 2**16), st.sampled_from(NETWORKS))
 def test_rounds_side_by_side_never_meet_at_a_promise(net: Net, seed: int, kinds: tuple[str, ...]) -> None:
     class Alone(LocalController):
@@ -298,7 +298,7 @@ def test_closed_rounds_are_forgotten() -> None:
     assert max(len(machine.closed) for machine in machines if machine is not None) <= 2
 
 
-@examples(200)
+@examples(100)
 @given(owned_nets(), st.data())
 def test_compiled_transitions_are_enabled_and_fire_as_the_reference_says(net: Net, data: st.DataObject) -> None:
     player, reference = TokenPlayer.of(net), Player(net)

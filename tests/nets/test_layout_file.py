@@ -35,7 +35,7 @@ transitions:
 """
 
 
-@examples(60)
+@examples(30)
 @given(whole_nets())
 def test_a_net_drawn_by_its_own_layout_file_looks_the_same(net: Net) -> None:
     kept = parse_layout(format_layout(arranged(net)))
@@ -77,7 +77,7 @@ def test_what_is_new_is_put_in_and_the_rest_stays_in_its_order() -> None:
         assert any(set(track) <= set(one) for one in after)
 
 
-@examples(60)
+@examples(30)
 @given(whole_nets(), whole_nets())
 def test_the_layout_of_another_net_spoils_no_picture(net: Net, other: Net) -> None:
     where = layout(net, arranged(other))

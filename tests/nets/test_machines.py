@@ -287,7 +287,7 @@ class Twin:
 
 
 @pytest.mark.seeds
-@pytest.mark.parametrize("seed", seeds(40))
+@pytest.mark.parametrize("seed", seeds(20))
 def test_the_loop_and_the_simulated_cell_obey_the_same_laws(seed: int) -> None:
     draw = random.Random(seed)
     twin = Twin(free_cell(), bench())

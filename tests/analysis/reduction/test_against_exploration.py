@@ -78,7 +78,7 @@ def test_goals_of_nets_whose_transitions_compete_are_kept(chunk: int) -> None:
         check(net, part_of(draw, net, draw.getrandbits(len(net.places)), 4))
 
 
-@examples(150)
+@examples(75)
 @given(st.data())
 def test_a_goal_is_reachable_in_the_reduced_net_exactly_if_it_is_in_the_original(data: st.DataObject) -> None:
     net = data.draw(NETS)
@@ -91,7 +91,7 @@ def test_there_is_a_deadlock_in_the_reduced_net_exactly_if_there_is_one_in_the_o
     check(net, Deadlock())
 
 
-@examples(60)
+@examples(30)
 @given(NETS)
 def test_a_transition_is_live_or_dead_exactly_if_its_image_is(net: Net) -> None:
     original, reduced = NaiveSpace(net), reduce_for_liveness(net)
