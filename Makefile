@@ -8,7 +8,8 @@ BIN := $(VENV)/bin
 MADE := $(VENV)/made
 CRATE := analysis/engine
 CARGO_OPTIONS := --locked --manifest-path $(CRATE)/Cargo.toml
-PYTEST_OPTIONS ?= -q -n auto --dist loadfile
+# Some tests wait for links, devices and browsers, so one worker more than there are processors.
+PYTEST_OPTIONS ?= -q -n $(shell echo $$(($$(nproc 2>/dev/null || echo 1) + 1))) --dist loadfile
 # A campaign: how many times the examples of a test run, from which seed, and in which folder of tests.
 FACTOR ?= 20
 SEED := $(shell date +%s)
@@ -39,9 +40,11 @@ help: ## these lines
 demo: $(MADE)/install ## check, prove, bundle and run the one-robot cell, and see another one deadlock
 	@BIN=$(BIN) sh docs/demo.sh
 
-# The type checker works on one processor, and so does the compiler of a crate: side by side they take half as long.
-test: $(MADE)/develop $(MADE)/rust-tools ## lint, format, types, and all tests
-	$(MAKE) --jobs=2 --output-sync=target lint test-rust
+# The type checker works on one processor, and so does the compiler of a crate: side by side they take half as long. The
+# crate is checked and tested while the environment is made, of which the longest is the same crate, optimised as shipped.
+# What make says to its own children (MAKEFLAGS) is kept from cargo, which takes it for an order to wait for make.
+test: $(MADE)/rust-tools ## lint, format, types, and all tests
+	$(MAKE) --jobs=2 --output-sync=target $(MADE)/develop lint-rust test-rust lint-python
 	$(MAKE) test-python
 
 lint: lint-python lint-rust ## what `make test` checks before it tests
@@ -63,10 +66,10 @@ lint-rust-format: $(MADE)/rust-tools
 	cargo fmt --manifest-path $(CRATE)/Cargo.toml --check
 
 lint-clippy: $(MADE)/rust-tools
-	cargo clippy --quiet $(CARGO_OPTIONS) --all-targets --all-features -- -D warnings
+	MAKEFLAGS= cargo clippy --quiet $(CARGO_OPTIONS) --all-targets --all-features -- -D warnings
 
-test-rust: $(MADE)/develop
-	cargo test $(CARGO_OPTIONS) --quiet
+test-rust: $(MADE)/venv
+	MAKEFLAGS= cargo test $(CARGO_OPTIONS) --quiet
 
 test-python: $(MADE)/develop
 	$(BIN)/pytest $(PYTEST_OPTIONS)
