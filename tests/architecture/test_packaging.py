@@ -15,7 +15,8 @@ ROOMS = ("nets", "semantics", "analysis", "decompose", "executor", "cli")
 
 
 UNOPTIMISED = {
-    f"CARGO_PROFILE_RELEASE_{key}": value for key, value in (("LTO", "off"), ("OPT_LEVEL", "0"), ("CODEGEN_UNITS", "16"))
+    f"CARGO_PROFILE_RELEASE_{key}": value
+    for key, value in (("LTO", "off"), ("OPT_LEVEL", "0"), ("CODEGEN_UNITS", "16"))
 }
 """What a wheel holds and needs does not go by how fast its code is, which takes the compiler two minutes."""
 
