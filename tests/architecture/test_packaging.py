@@ -21,14 +21,14 @@ UNOPTIMISED = {
 """What a wheel holds and needs does not go by how fast its code is, which takes the compiler two minutes."""
 
 
-def run(*command: str | Path, code: int = 0, cwd: Path | None = None, **environment: str) -> str:
+def run(*command: str | Path, code: int = 0, cwd: Path | None = None, also: dict[str, str] | None = None) -> str:
     done = subprocess.run(
         [str(part) for part in command],
         capture_output=True,
         text=True,
         check=False,
         cwd=cwd,
-        env={**os.environ, **environment},
+        env={**os.environ, **(also or {})},
     )
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout + done.stderr
@@ -38,7 +38,7 @@ def run(*command: str | Path, code: int = 0, cwd: Path | None = None, **environm
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel that `python -m build` makes, which is built from the sdist that it makes first."""
     dist = tmp_path_factory.mktemp("dist")
-    run(sys.executable, "-m", "build", "--outdir", dist, ROOT, **UNOPTIMISED)
+    run(sys.executable, "-m", "build", "--outdir", dist, ROOT, also=UNOPTIMISED)
     (wheel,) = dist.glob("*.whl")
     return wheel
 
