@@ -273,6 +273,8 @@ struct Chooser<'a> {
     deletion: Deletion,
     /// What the keys of deadlocks have brought, each closed.
     closing: Effort,
+    /// What thorough closures of keys have brought beyond quick ones.
+    thinking: Effort,
     /// What deletion has brought.
     deleting: Effort,
     thorough: bool,
@@ -286,6 +288,7 @@ impl<'a> Chooser<'a> {
             closure: Closure::new(&prepared.dependencies, places, count),
             deletion: Deletion::new(places, count),
             closing: Effort::default(),
+            thinking: Effort::default(),
             deleting: Effort::default(),
             thorough,
             literals: Vec::new(),
@@ -329,16 +332,11 @@ impl<'a> Chooser<'a> {
                 if all < 2 || !self.closing.is_worth_it() {
                     return;
                 }
-                for at in 0..closure.firable().len() {
-                    let key = closure.firable()[at];
-                    // A key that fires is a member itself; only one that changes nothing may leave nothing to fire.
-                    let least = usize::from(!closure.net.flipped(key).is_empty());
-                    if closure.best.firable.len() <= least {
-                        continue;
-                    }
-                    literals.clear();
-                    literals.extend(closure.net.conditions(key).iter().map(|&l| negation(l)));
-                    closure.consider(marking, literals, &[], thorough);
+                close_keys(closure, literals, marking, false);
+                let quick = closure.best.firable.len();
+                if thorough && self.thinking.is_worth_it() {
+                    close_keys(closure, literals, marking, true);
+                    self.thinking.note(closure.best.firable.len() < quick);
                 }
                 self.closing.note(closure.best.firable.len() < all);
             }
@@ -353,6 +351,21 @@ impl<'a> Chooser<'a> {
             }
             Goal::Firing(wanted) => closure.consider(marking, &[], wanted, thorough),
         }
+    }
+}
+
+/// Closes each key of a deadlock that may do better than the best so far.
+fn close_keys(closure: &mut Closure<'_>, literals: &mut Vec<Literal>, marking: &[u64], thorough: bool) {
+    for at in 0..closure.firable().len() {
+        let key = closure.firable()[at];
+        // A key that fires is a member itself; only one that changes nothing may leave nothing to fire.
+        let least = usize::from(!closure.net.flipped(key).is_empty());
+        if closure.best.firable.len() <= least {
+            continue;
+        }
+        literals.clear();
+        literals.extend(closure.net.conditions(key).iter().map(|&l| negation(l)));
+        closure.consider(marking, literals, &[], thorough);
     }
 }
 
