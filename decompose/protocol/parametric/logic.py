@@ -122,6 +122,9 @@ class Definition:
     parameters: tuple[Variable, ...]
     body: Formula
 
+    def __hash__(self) -> int:
+        return hash(self.name)  # the body is large, and is hashed wherever a script speaks of it
+
     def __call__(self, *terms: Term) -> Formula:
         """What it says of these."""
         assert [term.sort for term in terms] == [v.sort for v in self.parameters], f"{self.name} of other sorts"

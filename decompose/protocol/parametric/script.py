@@ -86,6 +86,8 @@ class Script:
         """For each definition, the versions of its relations of which it was spoken so far."""
         self._written: dict[str, str] = {}
         """The text of each definition, by its symbol: two of one name would be taken for one."""
+        self._defined: dict[str, Definition] = {}
+        """The definition itself, by its symbol: it is met very often, and spelled once."""
         self._shared = (0, 0)
         """How many declarations and lines of the body stand in what this one continues."""
 
@@ -95,6 +97,7 @@ class Script:
         copy.formulas = list(self.formulas)
         copy._sorts, copy._declared, copy._body = dict(self._sorts), dict(self._declared), list(self._body)
         copy._versions, copy._written = dict(self._versions), dict(self._written)
+        copy._defined = dict(self._defined)
         copy._moments = {definition: list(versions) for definition, versions in self._moments.items()}
         copy._shared = len(self._declared), len(self._body)
         return copy
@@ -194,6 +197,9 @@ class Script:
 
     def _define_once(self, definition: Definition) -> None:
         symbol = self._symbol(definition)
+        if self._defined.get(symbol) is definition:
+            return
+        self._defined[symbol] = definition
         self._define(definition.body)
         self._declare_sorts(v.sort for v in definition.parameters)
         typed = " ".join(f"({v.name} {v.sort.name})" for v in definition.parameters)
