@@ -26,7 +26,7 @@ from firable.nets.verdict import Status, spelled
 FOLDER: Final = os.environ.get("FIRABLE_NETS", "")
 SECONDS_MAX: Final = 5.0
 MEMORY_BYTES_MAX: Final = 6 << 30
-TESTED_MARKINGS_MAX: Final = 5_000_000
+TESTED_MARKINGS_MAX: Final = 3_000_000
 """Nets with fewer markings are in the tests, with all their figures."""
 VERDICTS: Final = {
     "contact-free": "contest_one_safe",

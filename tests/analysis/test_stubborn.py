@@ -106,8 +106,8 @@ def test_no_order_that_matters_is_left_out_of_nets_whose_transitions_compete(chu
 @pytest.mark.parametrize("chunk", range(4))
 def test_deadlocks_and_firings_of_every_net_of_the_small_scope(chunk: int) -> None:
     seen = 0
-    # All nets with one transition, and every 40th with two: initial markings of all of them.
-    for chosen in [*all_nets(2, 1), *all_nets(2, 2, 10 * chunk, 40)]:
+    # All nets with one transition, and every 20th with two: initial markings of all of them.
+    for chosen in [*all_nets(2, 1), *all_nets(2, 2, 5 * chunk, 20)]:
         for initial in range(4):
             net = net_with(2, chosen, initial)
             graph = explore(net)

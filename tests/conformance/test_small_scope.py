@@ -1,4 +1,4 @@
-"""Every net with up to two places and two transitions, all arcs, internal gates and markings: three texts, one meaning.
+"""Every net of two places and two transitions, all arcs, gates and markings, up to names: three texts, one meaning.
 
 The reference player gives the edges of every marking, under both disciplines. The engine's graph from every initial
 marking must be their closure, with the same numbers; the SMT encoding must have exactly these edges as its models,

@@ -91,7 +91,7 @@ class NothingIsOpen:
 @pytest.mark.parametrize("name", SMALL)
 def test_no_order_is_open_for_a_controller_that_has_left(name: str, free: bool, faults: str) -> None:
     watch = NothingIsOpen()
-    explore(Explorer(cut(name, free=free)), FAULTS[faults], max_configurations=1500, watch=watch)
+    explore(Explorer(cut(name, free=free)), FAULTS[faults], max_configurations=800, watch=watch)
     assert watch.left > 0
 
 

@@ -1,8 +1,8 @@
-"""Every net of a small scope: all arcs and internal gates over the places, up to the names of transitions."""
+"""Every net of a small scope: all arcs and internal gates over the places, up to the names of all nodes."""
 
 from collections.abc import Iterator
 from functools import cache
-from itertools import combinations_with_replacement, product
+from itertools import combinations_with_replacement, islice, product
 
 from firable.nets.net import Marking, Net, Place, Transition
 
@@ -33,6 +33,10 @@ def net_with(n_places: int, chosen: tuple[Shape, ...], initial: Marking = 0) -> 
 
 def all_nets(n_places: int, n_transitions: int, chunk: int = 0, chunks: int = 1) -> Iterator[tuple[Shape, ...]]:
     """The shapes of every net with this many places and transitions, or of one chunk of them."""
-    for number, chosen in enumerate(combinations_with_replacement(shapes(n_places), n_transitions)):
-        if number % chunks == chunk:
-            yield chosen
+    nets = filter(_is_first, combinations_with_replacement(shapes(n_places), n_transitions))
+    return islice(nets, chunk, None, chunks)
+
+
+def _is_first(chosen: tuple[Shape, ...]) -> bool:
+    """Whether no other order of the places gives a net that is earlier in the order of all."""
+    return chosen <= tuple(sorted(shape[::-1] for shape in chosen))
