@@ -142,8 +142,8 @@ impl<'a> Search<'a> {
         self.meet(&walker, &walker.firable, 0, &mut met);
         self.plan.forget();
         while path.len() < length && !self.open.is_empty() {
-            if walker.firable.is_empty() {
-                if self.found.deadlock.is_none() {
+            if walker.stuck() {
+                if walker.firable.is_empty() && self.found.deadlock.is_none() {
                     let whole = self.whole_path(self.archive[from].at, &path);
                     let (deadlock, places) = (&mut Target::Deadlock, self.net.places);
                     let needed = cut_down(self.dependencies, deadlock, &walker.marking, &whole, count, places);

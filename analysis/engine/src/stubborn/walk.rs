@@ -59,6 +59,8 @@ pub(super) struct Walker<'a> {
     /// For each transition how many of its conditions are false; those that never fire are not counted down.
     unmet: Vec<u32>,
     pub(super) firable: Vec<u32>,
+    /// How many of the firable ones change nothing when they fire.
+    idle: usize,
     position: Vec<u32>,
     /// The transitions that the last firing made firable, and some that it made so for a moment.
     pub(super) fresh: Vec<u32>,
@@ -71,6 +73,7 @@ impl<'a> Walker<'a> {
             marking: initial.to_vec(),
             unmet: vec![u32::MAX; transitions],
             firable: Vec::new(),
+            idle: 0,
             position: vec![0; transitions],
             fresh: Vec::new(),
         };
@@ -88,6 +91,7 @@ impl<'a> Walker<'a> {
         self.position[t as usize] = self.firable.len() as u32;
         self.firable.push(t);
         self.fresh.push(t);
+        self.idle += usize::from(self.net.flipped(t).is_empty());
     }
 
     /// Whether a transition is firable.
@@ -96,11 +100,17 @@ impl<'a> Walker<'a> {
     }
 
     fn remove(&mut self, t: u32) {
+        self.idle -= usize::from(self.net.flipped(t).is_empty());
         let at = self.position[t as usize];
         self.firable.swap_remove(at as usize);
         if let Some(&moved) = self.firable.get(at as usize) {
             self.position[moved as usize] = at;
         }
+    }
+
+    /// Whether no firing leads to another marking.
+    pub(super) fn stuck(&self) -> bool {
+        self.firable.len() == self.idle
     }
 
     /// Flips the places of a transition: fires it, or takes the firing back. Returns the work done.
@@ -201,7 +211,7 @@ fn find(
                 let needed = cut_down(dependencies, target, &walker.marking, &path, count, net.places);
                 return Ok(Some(without_loops(net, &needed)));
             }
-            if walker.firable.is_empty() {
+            if walker.stuck() {
                 break;
             }
             if *steps >= max_steps {
@@ -218,7 +228,7 @@ fn find(
             watch.tick(work)?;
         }
         if path.is_empty() {
-            return Ok(None); // M0 is a deadlock and not the target: there is nowhere to go
+            return Ok(None); // M0 is not the target, and there is nowhere to go
         }
     }
     Ok(None)
@@ -352,6 +362,22 @@ mod tests {
     fn lengths_follow_the_sequence_of_luby() {
         let first: Vec<u64> = (1..=15).map(luby).collect();
         assert_eq!(first, [1, 1, 2, 1, 1, 2, 4, 1, 1, 2, 1, 1, 2, 4, 8]);
+    }
+
+    #[test]
+    fn a_walk_that_only_idles_begins_again() {
+        // Once place 1 is filled first, all that is left to fire reads place 0 and changes nothing.
+        let fill = Transition::new(&[], &[1], &[], &[], &[]);
+        let take = Transition::new(&[0], &[1], &[], &[], &[]);
+        let idle = Transition::new(&[], &[], &[0], &[], &[]);
+        let net = Net::new(2, vec![fill, take, idle], &[0]).expect("well formed");
+        let dependencies = Dependencies::new(&net);
+        for seed in 0..20 {
+            let mut poll = unwatched;
+            let mut watch = Watch::new(None, &mut poll);
+            let (found, _) = walk(&net, &dependencies, &mut Target::Deadlock, seed, 100, &mut watch);
+            assert_eq!(found, Ok(Some(vec![1])));
+        }
     }
 
     #[test]
