@@ -189,8 +189,10 @@ fn every_operation_agrees_with_sets_of_masks() {
         both.check(found, &backward, "backward within");
         for (set, node) in [(&reach, root), (&within, within_node), (&targets, targets_node)] {
             let endless = both.naive.endless(set);
-            let found = watched(|watch| both.space.endless(&[], node, watch));
-            both.check(found, &endless, "endless");
+            for plain in [0, u64::MAX] {
+                let found = watched(|watch| both.space.endless_after(plain, &[], node, watch));
+                both.check(found, &endless, "endless");
+            }
         }
         let forward = both.naive.closure(&targets, |_| true);
         let found = watched(|watch| both.space.closure(&[], targets_node, ANY, false, watch));
@@ -311,8 +313,10 @@ fn runs_that_go_on_for_ever_are_told_from_those_that_a_set_or_a_chain_ends() {
         }
         let node = both.set(&set);
         let endless = both.naive.endless(&set);
-        let found = watched(|watch| both.space.endless(&[], node, watch));
-        both.check(found, &endless, "endless");
+        for plain in [0, 30, u64::MAX] {
+            let found = watched(|watch| both.space.endless_after(plain, &[], node, watch));
+            both.check(found, &endless, "endless");
+        }
     }
 }
 

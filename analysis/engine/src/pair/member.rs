@@ -232,6 +232,9 @@ impl Member {
                 if let Some(watch) = &mut watch {
                     watch.found.markings = work.before.markings + self.finds.fresh.len() as u64 + other.markings;
                     watch.found.edges = work.before.edges + self.edges + other.edges;
+                    if let Err(stop) = watch.tick(ROUND_EDGES as usize) {
+                        self.finds.end(End::Stopped(stop));
+                    }
                 }
             }
         }

@@ -14,8 +14,9 @@
 //!   on. So transitions that fire inside the set, but have no partner among the others that do, are on no cycle; where
 //!   none is left, no run goes on for ever, and the rest of the rounds is spared.
 //!
-//! Both are tried after 1, 2, 4, 8 ... rounds, so that what converges at once pays nothing for them. What they leave
-//! undecided the rounds decide; no answer depends on luck.
+//! Both are tried after 1, 2, 4, 8 ... rounds, so that what converges at once pays nothing for them, and not before the
+//! rounds have cost something: on a small diagram hundreds of them are done before one short cut is. What the short cuts
+//! leave undecided the rounds decide; no answer depends on luck.
 //!
 //! Sources: the fixed point is that of Emerson and Clarke (1980); cycles of a set by saturation are Zhao and Ciardo,
 //! "Symbolic computation of strongly connected components and fair cycles using saturation" (2011), whose transitive
@@ -32,6 +33,8 @@ use super::zdd::{EMPTY, Node, TERMINAL};
 use crate::budget::{Stop, Watch};
 use crate::stubborn::walk::Random;
 
+/// Results of the diagram's that the rounds take before a short cut is tried.
+const PLAIN: u64 = 1 << 16;
 /// Searches in vain, one after the other, that are made at least.
 const IN_VAIN: usize = 4;
 /// Markings that one search may meet.
@@ -42,6 +45,17 @@ const PER_RESULT: u64 = 16;
 impl Symbolic {
     /// The markings of a set from which a run can go on for ever inside it.
     pub fn endless(&mut self, roots: &[Node], set: Node, watch: &mut Watch<'_>) -> Result<Node, Stop> {
+        self.endless_after(PLAIN, roots, set, watch)
+    }
+
+    /// The same, by rounds alone until they have taken so many results of the diagram's.
+    pub fn endless_after(
+        &mut self,
+        plain: u64,
+        roots: &[Node],
+        set: Node,
+        watch: &mut Watch<'_>,
+    ) -> Result<Node, Stop> {
         let mut found = EMPTY;
         let mut left = set;
         let (mut rounds, mut pause) = (0, 1);
@@ -56,13 +70,14 @@ impl Symbolic {
             }
             left = fewer;
             rounds += 1;
-            if rounds < pause || left == EMPTY {
+            let spent = self.diagram().cache.work - begun;
+            if rounds < pause || spent < plain || left == EMPTY {
                 continue;
             }
-            pause *= 2;
+            pause = 2 * rounds;
             let hunt = hunt.get_or_insert_with(|| Hunt::new(self));
             // As much as the rounds have taken may be spent in vain, and something in any case.
-            let (spent, before) = (self.diagram().cache.work - begun, hunt.work as u64);
+            let before = hunt.work as u64;
             let mut in_vain = 0;
             while left != EMPTY && (in_vain < IN_VAIN || (hunt.work as u64 - before) / PER_RESULT < spent) {
                 let held = [roots, &[found, left]].concat();

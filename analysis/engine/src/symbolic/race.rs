@@ -3,7 +3,9 @@
 //! Which order of places is good shows only in the search, and late: on nets of the model-checking contest the winner is as
 //! often the one with the most nodes after the first rounds as the one with the fewest. So the candidates race: each
 //! computes some results, then the next one, and in the next round twice as many; all are kept for some rounds, which
-//! ends the race on most nets, then half drop out of each, until two are left, of which the second gets less. A
+//! ends the race on most nets, then half drop out of each, until two are left, of which the second gets less. Which of them
+//! is the first is said once: to change it whenever the other seems to get on better means to pay for both. The order that
+//! the net came in is spared for some rounds beside these, as what its author knew shows in no measure. A
 //! saturation has its own stack and can be left and gone on with, so nothing is done twice, and the race costs some
 //! times the search of the winner, against a good chance to be a thousand times faster. Where memory becomes short, the
 //! largest search is given up first. The rejected alternative, to go by the levels done alone, drops most winners early.
@@ -26,17 +28,21 @@ const FUEL: u64 = 1 << 15;
 const FUEL_PER_LEVEL: u64 = 16;
 /// How many times that each search has before the first drops out.
 const PATIENCE: u64 = 7;
+/// The rounds for which the order that the net came in, and its reverse, are spared when others drop out.
+const SPARED_ROUNDS: u32 = 2;
 /// The searches that are kept to the end, and how many times less than the first of them the others get.
 const FINALISTS: usize = 2;
 const RUNNER_UP: u64 = 4;
 
 /// Twins differ in their nodes by at most one in so many, after so many rounds.
-const TWINS_APART: usize = 20;
+const TWINS_APART: usize = 12;
 const ROUNDS_ALIKE: u32 = 2;
 
 /// A search in one order, which may be left and gone on with.
 struct Racer {
     order: Order,
+    /// Whether others run for the first places, and this one beside them.
+    spared: bool,
     begun: Option<(Ordered, Saturation, Node)>,
     /// The level that was reached before the last round.
     before: u32,
@@ -45,6 +51,15 @@ struct Racer {
 }
 
 impl Racer {
+    fn new(order: Order) -> Self {
+        Racer { order, spared: false, begun: None, before: 0, alike: 0 }
+    }
+
+    /// Whether its order is the one that the net came in, from either end.
+    fn is_as_given(&self) -> bool {
+        self.order.is_sorted() || self.order.iter().rev().is_sorted()
+    }
+
     /// Whether the order of another one is the reverse of this one's.
     fn is_reverse_of(&self, other: &Racer) -> bool {
         self.order.iter().eq(other.order.iter().rev())
@@ -86,25 +101,39 @@ impl Racer {
 }
 
 /// Keeps half of the field: in turn who has the fewest rounds to go at the pace of the last one, who has come farthest,
-/// and who has the fewest nodes for it. None of the three alone tells who wins.
-fn thin_out(field: &mut Vec<Racer>) {
-    let keep = FINALISTS.max(field.len() / 2);
-    let mut kept = Vec::new();
-    while kept.len() < keep && !field.is_empty() {
-        let rank = |racer: &Racer| {
-            let (done, nodes) = racer.standing();
-            let (left, gained) = (racer.order.len() - done as usize, done.saturating_sub(racer.before) as usize);
-            match kept.len() % 3 {
-                0 if gained > 0 => (left / gained, nodes),
-                0 => (usize::MAX, nodes),
-                1 => (left, nodes),
-                _ => (nodes / (done as usize + 1), nodes),
-            }
-        };
-        let best = (0..field.len()).min_by_key(|&at| rank(&field[at]));
-        kept.extend(best.map(|at| field.remove(at)));
+/// and who has the fewest nodes for it. None of the three alone tells who wins. Of the last two, the first by pace leads,
+/// unless the other has come half as far again. `thinned` counts the times; true where only the last two are left.
+fn thin_out(field: &mut Vec<Racer>, thinned: u32) -> bool {
+    let mut spared: Vec<Racer> = field.extract_if(.., |racer| racer.spared).collect();
+    if thinned == 1 || field.len() > FINALISTS {
+        let keep = FINALISTS.max(field.len() / 2);
+        let mut kept = Vec::new();
+        while kept.len() < keep && !field.is_empty() {
+            let rank = |racer: &Racer| {
+                let (done, nodes) = racer.standing();
+                let (left, gained) = (racer.order.len() - done as usize, done.saturating_sub(racer.before) as usize);
+                match kept.len() % 3 {
+                    0 if gained > 0 => (left / gained, nodes),
+                    0 => (usize::MAX, nodes),
+                    1 => (left, nodes),
+                    _ => (nodes / (done as usize + 1), nodes),
+                }
+            };
+            let best = (0..field.len()).min_by_key(|&at| rank(&field[at]));
+            kept.extend(best.map(|at| field.remove(at)));
+        }
+        if let [first, second] = &mut kept[..]
+            && 2 * second.standing().0 > 3 * first.standing().0
+        {
+            std::mem::swap(first, second);
+        }
+        let others = std::mem::replace(field, kept).into_iter();
+        spared.extend(others.filter(Racer::is_as_given).map(|racer| Racer { spared: true, ..racer }));
     }
-    *field = kept;
+    if thinned <= SPARED_ROUNDS {
+        field.append(&mut spared);
+    }
+    field.len() <= FINALISTS && !field.iter().any(|racer| racer.spared)
 }
 
 /// Whether two searches, both begun, stand at the same level with about as many nodes.
@@ -140,15 +169,15 @@ impl Symbolic {
             Some(orders) => orders,
             None => candidates(places, &transitions, watch)?,
         };
-        let racer = |order| Racer { order, begun: None, before: 0, alike: 0 };
-        let mut field: Vec<Racer> = orders.into_iter().map(racer).collect();
+        let mut field: Vec<Racer> = orders.into_iter().map(Racer::new).collect();
         let first = FUEL + FUEL_PER_LEVEL * places as u64;
-        let (mut fuel, mut spent) = (first, 0);
+        let (mut fuel, mut spent, mut thinned, mut settled) = (first, 0, 0, false);
         while !field.is_empty() {
             let mut at = 0;
             while at < field.len() {
                 let others: usize = field.iter().map(Racer::bytes).sum::<usize>() - field[at].bytes();
-                let share = if at > 0 && field.len() <= FINALISTS { fuel / RUNNER_UP } else { fuel };
+                let last_two = field.iter().filter(|racer| !racer.spared).count() <= FINALISTS;
+                let share = if at > 0 && last_two && !field[at].spared { fuel / RUNNER_UP } else { fuel };
                 match field[at].run(&transitions, &initial, bytes.saturating_sub(others), share, watch) {
                     Ok(Some(reach)) => {
                         if let Some(begun) = field.swap_remove(at).begun {
@@ -169,8 +198,9 @@ impl Symbolic {
             }
             spent += fuel;
             drop_twins(&mut field);
-            if spent >= PATIENCE * first {
-                thin_out(&mut field);
+            if spent >= PATIENCE * first && !settled {
+                thinned += 1;
+                settled = thin_out(&mut field, thinned);
             }
             field.iter_mut().for_each(|racer| racer.before = racer.standing().0);
             fuel *= 2;
@@ -185,14 +215,17 @@ mod tests {
     use crate::budget::unwatched;
 
     const ROOM: usize = 1 << 26;
+    /// Results that bring a search some of the way along the ring, a little farther, and far.
+    const SLOW: u64 = 400;
+    const NEAR: u64 = 600;
+    const FAR: u64 = 2000;
 
     /// Searches for the markings of a ring on which tokens go either way, one for each order of its places.
     fn field(orders: &[Order]) -> (Vec<Racer>, Vec<Transition>) {
         let places = orders[0].len() as u32;
         let moves = |from: u32, to: u32| Transition::new(&[from % places], &[to % places], &[], &[], &[]);
-        let racer = |order: &Order| Racer { order: order.clone(), begun: None, before: 0, alike: 0 };
         (
-            orders.iter().map(racer).collect(),
+            orders.iter().cloned().map(Racer::new).collect(),
             (0..places).flat_map(|at| [moves(at, at + 1), moves(at + 1, at)]).collect(),
         )
     }
@@ -241,6 +274,37 @@ mod tests {
             let (mut racers, transitions) = field(&two);
             (0..4).for_each(|_| round(&mut racers, &transitions, |_| 200));
             assert_eq!(racers.len(), if two.contains(&back) { 2 } else { 3 });
+        }
+    }
+
+    #[test]
+    fn of_the_last_two_the_first_by_pace_leads_unless_the_other_has_come_half_as_far_again() {
+        let [along, back, ..] = orders();
+        for (fuel, leader) in [(FAR, &back), (NEAR, &along)] {
+            let (mut racers, transitions) = field(&[along.clone(), back.clone()]);
+            round(&mut racers, &transitions, |at| if at == 0 { SLOW } else { fuel });
+            let (slow, far) = (racers[0].standing().0, racers[1].standing().0);
+            assert!(0 < slow && slow < far && (2 * far > 3 * slow) == (fuel == FAR), "{slow} {far}");
+            // Only the first has got on in the last round.
+            racers[1].before = far;
+            assert!(thin_out(&mut racers, 1));
+            assert_eq!((racers.len(), &racers[0].order), (2, leader));
+        }
+    }
+
+    #[test]
+    fn the_order_that_the_net_came_in_is_spared_for_two_rounds_beside_those_that_others_drop_out_of() {
+        let [along, back, across, crossed] = orders();
+        let other: Order = (0..90).map(|at| at * 11 % 90).collect();
+        let (mut racers, transitions) = field(&[across, crossed, other.clone(), other, along.clone(), back.clone()]);
+        // The last two have not begun, so that they are last by every measure.
+        let own = racers.split_off(4);
+        round(&mut racers, &transitions, |_| 400);
+        racers.extend(own);
+        for (thinned, left) in [(1, 5), (2, 4), (3, 2)] {
+            assert_eq!((thin_out(&mut racers, thinned), racers.len()), (thinned == 3, left));
+            let spared: Vec<&Order> = racers.iter().filter(|racer| racer.spared).map(|racer| &racer.order).collect();
+            assert_eq!(spared, if thinned < 3 { vec![&along, &back] } else { vec![] });
         }
     }
 
