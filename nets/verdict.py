@@ -12,7 +12,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from enum import StrEnum
-from typing import Any
+from typing import Any, Final
+
+TOKENS_MAX: Final = 200
+"""Of a marking with more tokens a witness may tell none: thousands of runs of a large net would fill a report."""
 
 
 class Status(StrEnum):
@@ -86,8 +89,8 @@ class Witness:
     """A firing sequence from M0: each element is the set of transitions fired together.
 
     A `cycle` that is not empty is fired for ever after the sequence. `marking` holds the places with a token where the
-    sequence (not the cycle) ends. `assignment` is a witness of another kind: values of the net's own names at one
-    instant that refute an obligation.
+    sequence (not the cycle) ends; it may be empty where these are more than `TOKENS_MAX`. `assignment` is a witness of
+    another kind: values of the net's own names at one instant that refute an obligation.
     """
 
     firings: tuple[tuple[str, ...], ...] = ()

@@ -73,7 +73,7 @@ from firable.nets.knowledge import undisturbing
 from firable.nets.net import Net
 from firable.nets.queries import Query
 from firable.nets.temporal import ForAll, Globally
-from firable.nets.verdict import Cost, Status, Verdict, Weight, Witness
+from firable.nets.verdict import TOKENS_MAX, Cost, Status, Verdict, Weight, Witness
 from firable.semantics.algebra import BOOL
 from firable.semantics.firing import firable
 from firable.semantics.player import FiringSet, holds_in
@@ -87,7 +87,6 @@ WALK_VOTES: Final = 64
 """With more votes open than this, a walk looks out for all of them before any is asked for by itself."""
 _WALK_SHARE: Final = 0.6  # of the time
 _DIAGRAM_SHARE: Final = 0.4  # of the time, for all markings in a diagram
-_TOKENS_MAX: Final = 200  # told of the marking after a run
 _ARCS: Final = "arcs: no other transition can take it back"
 _UNITS: Final = "arcs and P-invariants with one token"
 
@@ -331,8 +330,7 @@ class _Deciding:
         if not stands or not falls:
             raise WitnessError(f"'{self.net.transitions[last].name}' does not take back the yes of '{vote.part}'")
         note = f"before the last firing '{vote.part}' votes yes, after it no"
-        # Thousands of runs through a large net, each told with its thousands of tokens, would fill the report.
-        told = after if after.bit_count() <= _TOKENS_MAX else 0
+        told = after if after.bit_count() <= TOKENS_MAX else 0
         witness = self.witnesses.named([*run, (last,)], told, note=note)
         return no(tuple(by), witness, f"taken back by {listed(by)}")
 

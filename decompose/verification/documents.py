@@ -8,7 +8,7 @@ record shows is only claimed, and so is one that was left undecided; one that is
 every net, is missed.
 
 How a verdict was found, what that cost and the hint that it gives are told, not shown; nothing rests on them. Its
-witness is played.
+witness is played, and that of a vote which falls ends with who takes it back.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.formulas import Formula, Formulas
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import Answers
-from firable.decompose.verification.votes import PREFIX, question_of, votes
+from firable.decompose.verification.votes import PREFIX, Vote, question_of, votes
 from firable.decompose.verification.words import SENTENCES, sentence_of
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula as StateFormula
 from firable.nets.interchange import net_digest
 from firable.nets.net import Net
-from firable.nets.verdict import Status, Verdict, Weight
+from firable.nets.verdict import TOKENS_MAX, Status, Verdict, Weight
 from firable.semantics.player import NotFirableError, Player
 from firable.semantics.trace import Discipline
 
@@ -42,10 +42,18 @@ SUFFIX: Final = ".evidence.json"
 
 @dataclass
 class _Shown:
-    """What the documents show: the record of each name with its file, and the questions that are answered."""
+    """What the documents show: the record of each name with its file, and the answers to each question.
+
+    Two parts may ask the same, where two transitions read one place: then there are two answers.
+    """
 
     records: dict[str, tuple[CheckedRecord, str]] = field(default_factory=dict)
-    questions: dict[tuple[ClaimKind, Formula], tuple[CheckedRecord, str]] = field(default_factory=dict)
+    questions: dict[tuple[ClaimKind, Formula], list[tuple[CheckedRecord, str]]] = field(default_factory=dict)
+
+    def answer(self, kind: ClaimKind, question: Formula) -> tuple[CheckedRecord, str] | None:
+        """The next answer of this kind to a question, which is no other verdict's then."""
+        waiting = self.questions.get((kind, question))
+        return waiting.pop(0) if waiting else None
 
 
 def check_verdicts_on_the_net(examination: Examination, answers: Answers, timeout_ms: int) -> None:
@@ -62,7 +70,7 @@ def check_verdicts_on_the_net(examination: Examination, answers: Answers, timeou
         examination.verdict(name)  # nobody takes a warning out unnoticed
     for name in shown.records:
         raise NotShownError(f"the evidence on '{name}' belongs to no verdict of the bundle", "evidence", name)
-    for _, file in shown.questions.values():
+    for _, file in (one for waiting in shown.questions.values() for one in waiting):
         raise NotShownError(f"'{file}' answers a question that no verdict asks", "evidence", file)
 
 
@@ -112,7 +120,7 @@ def _read(
             goal = claim.goal
             if not isinstance(goal, StateFormula) or claim.kind not in {ClaimKind.NEVER, ClaimKind.REACHABLE}:
                 raise NotShownError(f"'{file}' claims '{claim}' of no verdict", "evidence", file)
-            shown.questions[claim.kind, question_of(goal, formulas)] = (one, file)
+            shown.questions.setdefault((claim.kind, question_of(goal, formulas)), []).append((one, file))
 
 
 def _ask_again(document: Document, file: str, answers: Answers, timeout_ms: int) -> None:
@@ -143,12 +151,32 @@ def _judge_votes(examination: Examination, formulas: Formulas, shown: _Shown) ->
                 raise NotShownError(f"the arcs alone show '{verdict.name}'", "verdicts", verdict.name)
             examination.judge(verdict, shown=True, method="the arcs: no other transition can take it back")
             continue
-        never, reachable = (
-            shown.questions.pop((k, vote.question), None) for k in (ClaimKind.NEVER, ClaimKind.REACHABLE)
-        )
+        never = shown.answer(ClaimKind.NEVER, vote.question)
+        reachable = None if never else shown.answer(ClaimKind.REACHABLE, vote.question)
         _by_record(examination, verdict, never or reachable, proved=never is not None)
+        if verdict.status is Status.VIOLATED:
+            _falls(examination, verdict, vote)
     if missing := sorted(name for name in demanded if name not in examination.by_name):
         raise NotShownError(f"there is no verdict on '{missing[0]}'", "verdicts", missing[0])
+
+
+def _falls(examination: Examination, verdict: Verdict, vote: Vote) -> None:
+    """The run that a fallen vote tells ends with who takes it back, and names nobody who could not."""
+    subject, witness, net = ("verdicts", verdict.name), verdict.witness, examination.bundle.net
+    if (
+        verdict.code
+        or len(set(verdict.subjects)) < len(verdict.subjects)
+        or not vote.accused.issuperset(verdict.subjects)
+    ):
+        raise NotShownError(f"'{verdict.name}' blames what cannot take the yes back", *subject)
+    if witness is None or not witness.firings or witness.cycle:
+        raise NotShownError(f"'{verdict.name}' does not tell how the yes is taken back", *subject)
+    player, before = Player(net), net.initial_marking
+    for fired in witness.firings[:-1]:
+        before = player.fire(before, [net.transition_index[name] for name in fired])
+    stands = vote.full.issubset(net.names(before)) and vote.empty.isdisjoint(net.names(before))
+    if not stands or not set(verdict.subjects).issuperset(witness.firings[-1]):
+        raise NotShownError(f"the firings of '{verdict.name}' do not end with who takes the yes back", *subject)
 
 
 def _judge(examination: Examination, verdict: Verdict, words: tuple[str, frozenset[Weight]], shown: _Shown) -> None:
@@ -202,7 +230,8 @@ def _play(examination: Examination, verdict: Verdict) -> None:
             after = player.fire(after, [net.transition_index[name] for name in fired])
     except (NotFirableError, KeyError):
         raise NotShownError(f"the firings of '{verdict.name}' cannot be played", "verdicts", verdict.name) from None
-    if witness.assignment or set(witness.marking) != set(net.names(marking)):
+    left_out = not witness.marking and marking.bit_count() > TOKENS_MAX
+    if witness.assignment or not (left_out or set(witness.marking) == set(net.names(marking))):
         raise NotShownError(f"the firings of '{verdict.name}' end elsewhere", "verdicts", verdict.name)
     if witness.cycle and after != marking:
         raise NotShownError(f"the cycle of '{verdict.name}' does not close", "verdicts", verdict.name)

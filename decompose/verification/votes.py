@@ -25,10 +25,16 @@ PREFIX: Final = "persistent."
 
 @dataclass(frozen=True, slots=True)
 class Vote:
-    """The verdict on a part in words, and the question on markings that it comes down to; None where arcs settle it."""
+    """The verdict on a part in words, and the question on markings that it comes down to; None where arcs settle it.
+
+    The yes needs some places `full` and some `empty`; each of the `accused` takes it back when it fires then.
+    """
 
     sentence: str
     question: Formula | None
+    full: frozenset[str]
+    empty: frozenset[str]
+    accused: frozenset[str]
 
 
 def votes(decomposition: Decomposition, formulas: Formulas) -> dict[str, Vote]:
@@ -54,7 +60,9 @@ def votes(decomposition: Decomposition, formulas: Formulas) -> dict[str, Vote]:
             stands = [formulas.literal(place, place in full) for place in (*sorted(full), *sorted(empty))]
             goal = formulas.all_of([*stands, formulas.any_of(formulas.variable(f"firable({u})") for u in accused)])
             sentence = f"once '{part.name}' votes yes, no transition but '{row.name}' takes the yes back"
-            found[f"{PREFIX}{part.name}"] = Vote(sentence, goal if accused and full.isdisjoint(empty) else None)
+            question = goal if accused and full.isdisjoint(empty) else None
+            asked = Vote(sentence, question, frozenset(full), frozenset(empty), frozenset(accused))
+            found[f"{PREFIX}{part.name}"] = asked
     return found
 
 

@@ -13,7 +13,7 @@ from firable.nets.net import Net, Place, Transition
 
 
 @given(st.data())
-@examples(100)
+@examples(50)
 def test_choice_that_meets_its_claims_is_maximal_and_without_conflict(data: st.DataObject) -> None:
     """Of a right choice they hold; of one that overlooks or invents places they hold only where nothing comes of it."""
     sets = st.frozensets(st.sampled_from("pqr"), min_size=1, max_size=2).map(sorted).map(tuple)

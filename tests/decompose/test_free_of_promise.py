@@ -39,7 +39,7 @@ def test_small_nets_go_right_without_the_promises_that_may_be_left_out(name: str
 
 
 @given(owned_nets())
-@examples(50)
+@examples(25)
 def test_no_run_goes_wrong_without_the_promises_that_may_be_left_out(net: Net) -> None:
     try:
         decomposition = split(net)

@@ -154,7 +154,7 @@ def test_a_row_decided_too_high_up_and_a_group_in_another_layer_are_refuted() ->
 
 
 @given(owned_nets(), st.data())
-@examples(25)
+@examples(13)
 def test_every_net_in_layers_is_proved_and_joined_back(net: Net, data: st.DataObject) -> None:
     names = [controller.name for controller in net.controllers]
     under = {name: data.draw(st.sampled_from([None, *names[:i]])) for i, name in enumerate(names)}

@@ -123,7 +123,7 @@ def test_two_things_of_one_name_keep_their_former_owners_in_a_common_controller(
 
 
 @given(owned_nets(), st.integers(1, 3))
-@examples(20)
+@examples(10)
 def test_a_proposal_owns_everything_once_and_changes_nothing_else(net: Net, n: int) -> None:
     net = bare(net)
     if best_by_force(hypergraph(net), n, *hypergraph(net).bounds(n, 2.0)) is None:
@@ -154,7 +154,7 @@ def best_by_force(graph: Hypergraph, n: int, low: int, high: int) -> int | None:
 
 
 @given(owned_nets(), st.integers(2, 3), st.sampled_from([0.3, 0.6, 1.5]))
-@examples(20)
+@examples(10)
 def test_what_is_called_optimal_is_what_trying_all_partitions_gives(net: Net, n: int, slack: float) -> None:
     graph = hypergraph(net)
     if len(graph.blocks) > 8:

@@ -144,7 +144,7 @@ def test_nets_of_the_catalogue_fulfil_the_side_conditions(name: str) -> None:
         assert violated(split(net)) == {}
 
 
-@examples(100)
+@examples(50)
 @given(owned_nets())
 def test_splits_of_random_nets_fulfil_the_side_conditions(net: Net) -> None:
     assert violated(split(net)) == {}
@@ -285,7 +285,7 @@ def test_parts_of_which_no_yes_is_taken_back_fulfil_the_condition_on_free_parts(
     assert violated(replace(decomposition, free=said)) == {}
 
 
-@examples(100)
+@examples(50)
 @given(owned_nets())
 def test_undisturbing_parts_of_random_nets_fulfil_the_condition_on_free_parts(net: Net) -> None:
     decomposition = split(net)

@@ -95,7 +95,7 @@ def agree(decomposition: Decomposition, found: Persistence) -> None:
 
 
 @given(owned_nets())
-@examples(60)
+@examples(30)
 def test_persistent_are_the_parts_whose_yes_no_firing_of_another_takes_back(net: Net) -> None:
     try:
         decomposition = split(net)
@@ -142,7 +142,7 @@ def asked_anew(decomposition: Decomposition) -> None:
 
 
 @given(owned_nets())
-@examples(60)
+@examples(30)
 def test_the_checker_asks_of_each_vote_what_the_producer_answers(net: Net) -> None:
     try:
         decomposition = split(net)
@@ -339,7 +339,7 @@ def test_bundle_holds_the_verdicts_on_votes_with_a_document_that_shows_them() ->
 
 
 @given(owned_nets())
-@examples(30)
+@examples(15)
 def test_what_a_walk_meets_is_what_takes_a_yes_back_and_its_run_leads_there(net: Net) -> None:
     try:
         decomposition = split(net)

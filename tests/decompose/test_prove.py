@@ -373,7 +373,7 @@ def _once(patched: pytest.MonkeyPatch, read: Any, first: Any, context: object, t
 
 
 @given(st.data())
-@examples(100)
+@examples(50)
 def test_choice_is_what_the_arbiter_decides_in_every_turn(data: st.DataObject) -> None:
     sets = st.frozensets(st.sampled_from("pqr"), min_size=1, max_size=2).map(sorted).map(tuple)
     net = Net(

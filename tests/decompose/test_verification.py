@@ -33,7 +33,7 @@ from firable.nets.catalogue import catalogue_net, family_net
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Controller, Net, Place, Transition
 from firable.nets.right_to_run import CHECKED, unproved
-from firable.nets.verdict import Cost, Status, Verdict, Weight
+from firable.nets.verdict import TOKENS_MAX, Cost, Status, Verdict, Weight
 
 CELLS = ("conceptual_one_robot", "one_robot", "two_robots_shared")
 
@@ -425,3 +425,21 @@ def test_an_unproved_bundle_is_refused_for_that() -> None:
     doubted = tuple(replace(v, status=Status.UNKNOWN) if v.name == "eq7.G1" else v for v in bundle.verdicts)
     with pytest.raises(InputError, match="F5002"):
         check_bundle(replace(bundle, verdicts=(*doubted, Verdict("x", Status.UNKNOWN, "x", "x"))))
+
+
+@pytest.mark.usefixtures("remembering")
+def test_a_vote_of_a_large_net_that_falls_is_told_without_its_tokens_and_shown_all_the_same() -> None:
+    idle = tuple(Place(f"a.idle{i}", "a", marked=True) for i in range(TOKENS_MAX))
+    marked = {"a.p": True, "a.q": False, "b.r": True, "b.s": False}
+    places = (*(Place(name, name[0], marked=token) for name, token in marked.items()), *idle)
+    transitions = (
+        Transition("t", ("a.p", "b.r"), ("a.q", "b.s")),
+        Transition("back", ("a.q", "b.s"), ("a.p", "b.r")),
+        Transition("away", ("b.r",), ("b.s",), permissive=("a.p",)),
+        Transition("home", ("b.s",), ("b.r",), permissive=("a.p",)),
+    )
+    bundle = make_bundle(check(Net("crowded", places, transitions, controllers=(Controller("a"), Controller("b")))))
+    fallen = [v for v in bundle.verdicts if v.name.startswith("persistent.") and v.status is Status.VIOLATED]
+    assert [v.witness.marking for v in fallen if v.witness is not None] == [()] * len(fallen)
+    assert fallen
+    assert all(one.shown for one in check_bundle(bundle))

@@ -210,6 +210,17 @@ def _verdict_changes(bundle: Bundle, verdict: Verdict) -> Iterator[tuple[str, Ve
         w = verdict.witness
         yield "witness too long", replace(verdict, witness=replace(w, firings=(*w.firings, *w.firings[:1], ("none",))))
         yield "witness ends elsewhere", replace(verdict, witness=replace(w, marking=w.marking[1:]))
+    if verdict.name.startswith("persistent.") and verdict.status is Status.VIOLATED and verdict.witness is not None:
+        w = verdict.witness
+        yield "code", replace(verdict, code="F1001")
+        yield "subjects", replace(verdict, subjects=(*verdict.subjects, "x"))
+        yield "blamed twice", replace(verdict, subjects=verdict.subjects * 2)
+        yield "nobody blamed", replace(verdict, subjects=())
+        yield "no witness", replace(verdict, witness=None)
+        yield "no firings", replace(verdict, witness=Witness(marking=bundle.net.names(bundle.net.initial_marking)))
+        others = (t.name for t in bundle.net.transitions if t.name not in verdict.subjects)
+        yield from ((f"{t} blamed", replace(verdict, subjects=(t,))) for t in others)
+        yield "witness goes on for ever", replace(verdict, witness=replace(w, cycle=w.firings[:1]))
     if verdict.name in {v.name for v in bundle.verdicts if v.evidence and v.evidence[0].endswith(".smt2")}:
         # Of an obligation every field is known.
         yield "method", replace(verdict, method="by hand")

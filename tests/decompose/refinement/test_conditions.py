@@ -146,7 +146,7 @@ def test_the_end_may_not_be_reached_by_a_role_that_was_released() -> None:
     assert any("'shelf' is lost" in problem.message for problem in task_problems(task(text), {}))
 
 
-@examples(60)
+@examples(30)
 @given(st.randoms(use_true_random=False))
 def test_the_conditions_of_a_random_task_are_what_plain_search_says(draw: random.Random) -> None:
     of = random_task(draw, "work", spoil=0.5)

@@ -182,7 +182,7 @@ def test_tasks_within_tasks_and_lent_resources_are_shown() -> None:
     assert checked["refinement.conceptual.effective-conflicts"].verdict.holds
 
 
-@examples(20)
+@examples(10)
 @given(st.randoms(use_true_random=False))
 def test_what_refine_makes_of_random_tasks_is_made_anew_and_related(draw: random.Random) -> None:
     tasks: dict[str, Task] = {}

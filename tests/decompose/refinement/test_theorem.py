@@ -50,7 +50,7 @@ def random_tasks(draw: random.Random) -> Catalogue:
     return tasks
 
 
-@examples(40)
+@examples(20)
 @given(st.randoms(use_true_random=False))
 def test_exploration_never_contradicts_what_is_carried_over(draw: random.Random) -> None:
     tasks = random_tasks(draw)
