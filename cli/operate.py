@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import ssl
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -39,8 +39,10 @@ class ServeOptions:
     open: bool = False
     """Whether the page of the run is opened in a browser."""
 
-    def service(self, plant: PlantModel | None = None) -> Service | None:
-        """The endpoint, whose address and token are told when it is there, or None; `plant` is what its page shows.
+    def service(self, bundle: str, plant: PlantModel | None = None) -> Service | None:
+        """The endpoint, whose address and token are told when it is there, or None.
+
+        Its page shows `plant`, and the net as the layout file beside `bundle` arranges it.
 
         Raises `InputError` F5060, F5062, and F1017 for a token that cannot be kept.
         """
@@ -60,7 +62,7 @@ class ServeOptions:
         tls = None if self.serve_tls is None else tls_context(*self.serve_tls, self.operators)
         token = new_token() if self.token_file is None else _token_kept(Path(self.token_file))
         endpoint = Endpoint(host.strip("[]"), int(port), token, tls)
-        return Service(endpoint, partial(self._served, token), partial(_page, plant=plant))
+        return Service(endpoint, partial(self._served, token), partial(_page, bundle=bundle, plant=plant))
 
     def _served(self, token: str, address: str) -> None:
         _tell_served(token, self.token_file, address)
@@ -70,10 +72,20 @@ class ServeOptions:
             show(f"{address}/#token={token}", open_it=not os.environ.get(NO_BROWSER))
 
 
-def _page(host: Host, plant: PlantModel | None) -> Page:
+def _page(host: Host, bundle: str, plant: PlantModel | None) -> Page:
+    from firable.cli.pictures import kept_layout
+    from firable.cli.text import show_diagnostic
+    from firable.cli.view.drawing import PLAIN, Look
     from firable.cli.view.live import LivePage
+    from firable.nets.diagnostics import InputError, Severity
 
-    return LivePage(host, plant)
+    try:
+        look = Look(kept_layout(host.net, bundle))
+    except InputError as error:  # what is wrong with its picture keeps no cell from running
+        look = PLAIN
+        for one in error.diagnostics:
+            show_diagnostic(replace(one, severity=Severity.WARNING))
+    return LivePage(host, plant, look)
 
 
 def serve_options(command: F) -> F:

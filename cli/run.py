@@ -145,7 +145,7 @@ def run(
         read = [path for path in (bundle, options.bind, plant_file, *trust, *secrets) if path is not None]
         _refuse_to_overwrite(trace, log, *read, *_files_beside(options.journal))
         model = None if plant_file is None else read_plant(plant_file)
-        service = served.service(model)
+        service = served.service(bundle, model)
         if options.is_one_of_several:
             said = _said(loaded.net, say, options.journal)
             return run_host_of(
@@ -195,11 +195,12 @@ def run(
 
 
 def _told(kind: str, sentence: str) -> None:
-    """What the report does not tell: a word of the operator that was of no use, an emergency stop that can be reset."""
+    """What the report does not tell: a word of no use, an emergency stop that can be reset, a disk that hangs."""
+    from firable.executor.operating.disk_watch import ANSWERS, HANGS
     from firable.executor.operating.latch import LATCHED
     from firable.executor.operating.restart import UNASKED
 
-    if kind in {UNASKED, LATCHED}:
+    if kind in {UNASKED, LATCHED, HANGS, ANSWERS}:
         click.echo(f"  {sentence}", err=True)
 
 

@@ -11,7 +11,8 @@ import click
 from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_text
 
 if TYPE_CHECKING:
-    from firable.executor.cell.plant import Disturbance, Plant
+    from firable.executor.cell.disturbances import Disturbance
+    from firable.executor.cell.plant import Plant
     from firable.executor.drivers.binding import Binding
     from firable.executor.drivers.far_side.cell import CellServer
     from firable.executor.drivers.far_side.end import FarEnd
@@ -204,7 +205,7 @@ def _disturbances(
     model: PlantModel, stuck: tuple[str, ...], drop: tuple[str, ...], hang: tuple[str, ...]
 ) -> list[Disturbance]:
     """What was asked to go wrong; a name that the cell has not is a mistake."""
-    from firable.executor.cell.plant import Drops, NeverCompletes, StuckSensor
+    from firable.executor.cell.disturbances import Drops, NeverCompletes, StuckSensor
     from firable.nets.diagnostics import did_you_mean
 
     found: list[Disturbance] = []

@@ -4,6 +4,10 @@ In virtual time the cell stands still while the person thinks, so the prompt wai
 is handed to the prompt, for the event loop that usually obeys it does not turn. In real time the machines go on: a
 thread reads what is typed. It reads the file descriptor and is waited for by nobody, because a thread that waits for a
 line in `input` keeps the program from ending, as does one that holds the lock of `sys.stdin`.
+
+The terminal may not be the only one who acts: a contact opens, somebody else resets or resumes (`--serve`). Then what
+was asked here is no question any more, and whatever is typed as its answer would be taken for that to another one: an
+Enter for the next step would set a run going that is held. So each question is withdrawn as soon as it is moot.
 """
 
 from __future__ import annotations
@@ -14,7 +18,7 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from typing import Protocol
 
@@ -30,11 +34,15 @@ _SAY = "  what did the machine do? PLACE=done, =working or =not-received, [s] st
 _POLL_SECONDS = 0.05
 
 
+class _MootError(Exception):
+    """What was asked is no question any more."""
+
+
 class _Typed(Protocol):
     """What the operator types."""
 
-    async def asked(self, prompt: str) -> str | None:
-        """The next line, after a prompt; None where there are no more."""
+    async def asked(self, prompt: str, is_moot: Callable[[], bool]) -> str | None:
+        """The next line, after a prompt; None where there are no more. Raises `_MootError` as soon as it is moot."""
         ...
 
     def unasked(self) -> bool:
@@ -48,8 +56,9 @@ class _TypedAtPrompt:
     def __init__(self, *, to_stderr: bool) -> None:
         self.to_stderr = to_stderr
 
-    async def asked(self, prompt: str) -> str | None:
-        """The next line, after a prompt; None at the end of the input and at Ctrl-C."""
+    async def asked(self, prompt: str, is_moot: Callable[[], bool]) -> str | None:
+        """The next line, after a prompt; None at the end of the input and at Ctrl-C. Nothing becomes moot meanwhile."""
+        del is_moot
         handler = signal.signal(signal.SIGINT, signal.default_int_handler)
         try:
             click.echo(prompt, nl=False, err=self.to_stderr)
@@ -73,14 +82,19 @@ class _TypedMeanwhile:
         self.ended = threading.Event()
         threading.Thread(target=self._read, daemon=True).start()
 
-    async def asked(self, prompt: str) -> str | None:
+    async def asked(self, prompt: str, is_moot: Callable[[], bool]) -> str | None:
         """The next line, after a prompt; None at the end of the input."""
+        if is_moot():
+            raise _MootError
         click.echo(prompt, nl=False, err=self.to_stderr)
-        while not self.lines:
+        while not is_moot():
+            if self.lines:
+                return self.lines.popleft()
             if self.ended.is_set() and not self.lines:  # the last lines come before the end
                 return None
             await asyncio.sleep(_POLL_SECONDS)
-        return self.lines.popleft()
+        click.echo(err=self.to_stderr)
+        raise _MootError
 
     def unasked(self) -> bool:
         """Whether a line has been typed before it was asked for; it is taken."""
@@ -100,19 +114,31 @@ class _TypedMeanwhile:
 def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
     """The operator of a run at a speed (None: virtual time), who talks on standard output or on standard error."""
 
-    async def key(typed: _Typed, prompt: str = _PROMPT, keys: Collection[str] = ("", "r", "e", "s")) -> str:
+    async def key(typed: _Typed, prompt: str, keys: Collection[str], is_moot: Callable[[], bool]) -> str | None:
+        """One of the keys; None where the question is moot."""
         while True:
-            line = await typed.asked(prompt)
+            try:
+                line = await typed.asked(prompt, is_moot)
+            except _MootError:
+                return None
             if line is None:
                 click.echo(err=to_stderr)
                 return "s"
             if line.strip().lower() in keys:
                 return line.strip().lower()
 
+    def is_held(host: Host) -> bool:
+        """Whether there was an emergency stop, or a restart, and nobody has taken the run up since."""
+        return host.emergency is not None or host.taking_up is not None
+
+    def is_elsewhere(host: Host) -> bool:
+        """Whether a run that was paused here is so no more."""
+        return is_held(host) or not host.paused
+
     async def stepped(host: Host) -> bool:
         """Fire one transition, waiting until one is enabled or the cell is stopped; False where none ever will be."""
         while (fired := await host.step()) is None:
-            if host.emergency is not None:
+            if is_elsewhere(host):
                 return True
             if host.at_rest:
                 return False
@@ -122,70 +148,84 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
         return True
 
     async def paused_again(host: Host, typed: _Typed) -> bool:
-        """Let the run go on until something is typed, which pauses it; False where it goes on to its end."""
+        """Let the run go on until it is paused, by something that is typed; False where it goes on to its end."""
         host.resume()
         if speed is None:
             return False
         click.echo("  running on; Enter pauses", err=to_stderr)
-        while not host.at_rest:
-            if host.emergency is not None:
-                return True
+        while not is_held(host) and not host.paused:
+            if host.at_rest:
+                return False
             if typed.unasked():
                 host.pause()
-                return True
             await asyncio.sleep(_POLL_SECONDS)
-        return False
-
-    async def taken_up(host: Host, typed: _Typed) -> bool:
-        """After a restart, or an emergency stop and its reset: say what became of the commands, and go on if wanted."""
-        while (found := host.taking_up) is not None or host.emergency is not None:
-            if host.latch is not None:
-                while typed.unasked():  # what was typed before it was asked for resets nothing
-                    pass
-                if await key(typed, _RESET, {"reset", "s"}) == "s":
-                    return False
-                for why in host.reset():
-                    click.echo(f"  not reset: {why}", err=to_stderr)
-                continue
-            if found is None or not found.is_final:
-                await asyncio.sleep(_POLL_SECONDS)
-                continue
-            for line in host.situation().message.split("; "):
-                click.echo(f"  {line}", err=to_stderr)
-            if uncertain(host):
-                if not await said(host, typed):
-                    return False
-            elif await key(typed, _TAKE_UP) == "s":
-                return False
-            else:
-                host.resume()
         return True
 
-    async def said(host: Host, typed: _Typed) -> bool:
-        """Say what became of a command that no machine can tell of; False where the operator wants an end instead."""
-        line = await typed.asked(_SAY)
+    async def taken_up(host: Host, typed: _Typed, *, was_stopped: bool = False) -> bool:
+        """After a restart, or an emergency stop and its reset: say what became of the commands, and go on if wanted."""
+        while is_held(host):
+            if host.latch is not None:
+                was_stopped = True
+                await reset(host, typed)
+            elif (found := host.taking_up) is None or not found.is_final:
+                await asyncio.sleep(_POLL_SECONDS)
+            else:
+                if was_stopped:  # nothing that was typed before this stands there takes the run up
+                    forget(typed)
+                    was_stopped = False
+                for line in host.situation().message.split("; "):
+                    click.echo(f"  {line}", err=to_stderr)
+                await (said(host, typed) if uncertain(host) else resumed(host, typed))
+            if host.is_to_end:
+                return False
+        return True
+
+    def forget(typed: _Typed) -> None:
+        """Take what was typed before it was asked for as said to nothing."""
+        while typed.unasked():
+            pass
+
+    async def reset(host: Host, typed: _Typed) -> None:
+        """Reset an emergency stop, or end the run."""
+        latch = host.latch
+        forget(typed)
+        match await key(typed, _RESET, {"reset", "s"}, lambda: host.latch is not latch):
+            case "s":
+                host.stop()
+            case "reset":
+                for why in host.reset():
+                    click.echo(f"  not reset: {why}", err=to_stderr)
+
+    async def resumed(host: Host, typed: _Typed) -> None:
+        """Take a run up that is held, or end it."""
+        found = host.taking_up
+        match await key(typed, _TAKE_UP, {"r", "s"}, lambda: host.taking_up is not found):
+            case "s":
+                host.stop()
+            case "r":
+                host.resume()
+
+    async def said(host: Host, typed: _Typed) -> None:
+        """Say what became of a command that no machine can tell of, or end the run."""
+        found = host.taking_up
+        try:
+            line = await typed.asked(_SAY, lambda: host.taking_up is not found or not uncertain(host))
+        except _MootError:
+            return
         if line is None or line.strip().lower() == "s":
-            return False
+            host.stop()
+            return
         place, _, word = line.strip().partition("=")
         with suppress(ValueError):  # no answer: then it is asked again
             host.say(place, Answer(word.replace("-", " ")))
-        return True
 
     async def operate(host: Host) -> None:
         typed: _Typed = (_TypedAtPrompt if speed is None else _TypedMeanwhile)(to_stderr=to_stderr)
         if not await taken_up(host, typed):
-            host.stop()
             return
         host.pause()
         while await stepped(host):
-            typed_now = await key(typed) if host.emergency is None else ""
-            if host.emergency is not None and typed_now != "s":
-                if not await taken_up(host, typed):
-                    host.stop()
-                    return
-                host.pause()
-                continue
-            match typed_now:
+            match await key(typed, _PROMPT, {"", "r", "e", "s"}, lambda: is_elsewhere(host)):
                 case "s":
                     host.stop()
                     return
@@ -193,6 +233,12 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
                     host.stop(at_end_of_cycle=True)
                     break
                 case "r" if not await paused_again(host, typed):
+                    return
+                case None if is_held(host):
+                    if not await taken_up(host, typed, was_stopped=True):
+                        return
+                    host.pause()
+                case None if not await paused_again(host, typed):  # somebody else has resumed it
                     return
         host.resume()
 

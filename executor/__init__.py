@@ -15,7 +15,7 @@ The voting protocol (`coordinator`, `controller`, `messages`) is pure: no clock,
 imports `semantics` and `nets` and nothing that proves.
 """
 
-from firable.executor.cell.plant import Disturbance, Drops, NeverCompletes, StuckSensor
+from firable.executor.cell.disturbances import Disturbance, Drops, NeverCompletes, StuckSensor
 from firable.executor.drivers.driver import Driver
 from firable.executor.operating.host import Host
 from firable.executor.operating.running import Operator, RunReport, Watch, execute, load, run

@@ -149,6 +149,7 @@ CODES: Final[dict[str, str]] = {
     "F5102": "not an address that the device has",
     "F5103": "unknown or unusable driver",
     "F5104": "a device that cannot be served here",
+    "F5105": "a device with machines of several hosts",
     # F6: evidence
     "F6001": "the evidence is damaged or malformed",
     "F6002": "the evidence does not show what it claims",

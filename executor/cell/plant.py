@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 
+from firable.executor.cell.disturbances import Disturbance, Disturbances
 from firable.nets.machines.plant_file import (
     Carry,
     Clamp,
@@ -57,36 +58,6 @@ class PlantFault:
 
 
 PlantReport = SensorChanged | CommandDone | PlantFault
-
-
-@dataclass(frozen=True, slots=True)
-class NeverCompletes:
-    """A disturbance: this command of this machine, the `occurrence`-th time (from 1), is taken and never done."""
-
-    machine: str
-    command: str
-    occurrence: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class StuckSensor:
-    """A disturbance: from a time on, the sensor shows one value whatever it sees."""
-
-    signal: str
-    value: bool
-    from_seconds: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Drops:
-    """A disturbance: when this command of this machine ends, the `occurrence`-th time, what it holds is lost."""
-
-    machine: str
-    command: str
-    occurrence: int = 1
-
-
-Disturbance = NeverCompletes | StuckSensor | Drops
 
 
 @dataclass(slots=True)
@@ -163,7 +134,7 @@ class Plant:
     ) -> None:
         self.model = model
         self.random = random.Random(seed)
-        self.disturbances = tuple(disturbances)
+        self.disturbances = Disturbances(disturbances)
         self.machines = {name: _MachineNow(machine, machine.hand) for name, machine in model.machines.items()}
         self.stations: dict[str, Workpiece | None] = dict.fromkeys(model.stations)
         self.clamped: set[str] = set()
@@ -181,9 +152,8 @@ class Plant:
         self.now_seconds = 0.0
         if workpieces:
             self._in(0.0, model.arrivals.jitter_s, _Arrival())
-        for disturbance in self.disturbances:
-            if isinstance(disturbance, StuckSensor):
-                self._in(disturbance.from_seconds, 0.0, _Stick())
+        for moment in self.disturbances.moments():
+            self._in(moment, 0.0, _Stick())
 
     @property
     def next_seconds(self) -> float | None:
@@ -320,8 +290,7 @@ class Plant:
                     raise _FaultError(f"{name} machines workpiece {workpiece.id}, which is not clamped")
                 if workpiece.processed:
                     raise _FaultError(f"{name} machines workpiece {workpiece.id} a second time")
-        never = NeverCompletes(name, busy.command, machine.times[busy.command])
-        if never not in self.disturbances:
+        if not self.disturbances.hangs(name, busy.command, machine.times[busy.command]):
             self._in(action.takes_s, action.jitter_s, _Finish(name, busy))
 
     def _finish(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
@@ -353,7 +322,7 @@ class Plant:
                 self._lying(station, f"{name} machines on {station}").processed += 1
             case Release(station=station):
                 self.clamped.discard(station)
-        if Drops(name, busy.command, machine.times[busy.command]) in self.disturbances:
+        if self.disturbances.drops(name, busy.command, machine.times[busy.command]):
             machine.holding = None
         machine.busy = None
         yield CommandDone(busy.ticket)
@@ -405,13 +374,8 @@ class Plant:
         return ((name, sensor) for name, sensor in self.model.sensors.items() if sensor.acknowledges == machine)
 
     def _sees(self, name: str, sensor: Sensor) -> bool:
-        for disturbance in self.disturbances:
-            if (
-                isinstance(disturbance, StuckSensor)
-                and disturbance.signal == name
-                and disturbance.from_seconds <= self.now_seconds
-            ):
-                return disturbance.value
+        if (shown := self.disturbances.shown(name, self.now_seconds)) is not None:
+            return shown
         if sensor.occupied is not None:
             return self.stations[sensor.occupied] is not None
         if sensor.acknowledges is not None:

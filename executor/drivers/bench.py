@@ -20,7 +20,9 @@ from firable.executor.drivers.far_side.machine import Machine
 from firable.nets.net import Net, Place
 from firable.nets.text import parse_net
 
-PATIENCE_S: Final = 20.0
+PATIENCE_S: Final = 60.0
+QUICK_S: Final = 0.5
+"""How long an answer may take where one is about not to come; where all do, a busy machine is given longer."""
 
 _NET: Final = """
 firable: 1
@@ -146,7 +148,7 @@ class Bench:
     net: Net
     needed: str = "0"
     start_s: float = PATIENCE_S
-    timeout_s: float = 0.5
+    timeout_s: float = 10.0
     button: bool = False
     """Whether the binding has the button of the machine as its emergency stop."""
     latched: bool = False

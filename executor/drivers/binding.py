@@ -220,11 +220,17 @@ class Binding:
         needed = {name: one for name, one in document.devices.items() if name not in devices}
         return replace(kept, document=document.model_copy(update={"devices": needed, "emergency_stop": contacts}))
 
-    def serving(self, names: Collection[str], controllers: Collection[str] | None = None) -> Binding:
+    def serving(
+        self,
+        names: Collection[str],
+        controllers: Collection[str] | None = None,
+        driven: Collection[str] | None = None,
+    ) -> Binding:
         """What the binding says of these signals and places, and the devices that they need.
 
-        Of the emergency stop, what is for one of these controllers. A device that is needed for that alone is only
-        looked at: its safe outputs and its heartbeat are for the host whose machines it has.
+        Of the emergency stop, what is for one of these controllers. A device that is not `driven` is only looked at;
+        where nobody says which are, one that is needed for that stop alone. Its safe outputs and its heartbeat are for
+        the host whose machines it has.
         """
         document = self.document
         contacts = {
@@ -236,10 +242,11 @@ class Binding:
         commands = {name: command for name, command in document.commands.items() if name in names}
         needed = {one.device for one in (*signals.values(), *commands.values()) if one is not None}
         watched = {one.device for one in contacts.values()} - needed
+        driven = needed if driven is None else driven
         devices = {
-            name: device if name in needed else _looked_at(device)
+            name: device if name in driven else _looked_at(device)
             for name, device in document.devices.items()
-            if name in needed | watched
+            if name in needed | watched or (name in driven and (device.safe or device.heartbeat is not None))
         }
         update = {"devices": devices, "emergency_stop": contacts, "signals": signals, "commands": commands}
         return replace(self, document=document.model_copy(update=update))

@@ -16,6 +16,7 @@ from firable.executor.drivers.completions import Completions
 from firable.executor.drivers.driver import Answer, Clock, Listener, Reading
 from firable.executor.drivers.fitting import misfits
 from firable.executor.drivers.keeping import ended, uninterrupted
+from firable.executor.drivers.sharing import masters, shared
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Net, Place, SignalKind
 
@@ -24,9 +25,9 @@ def bound_driver(binding: Binding, net: Net, part: Net | None = None, *, latched
     """The driver of a net's binding, or of a part of the net, whose machines are all that this host has.
 
     A `latched` one follows an emergency stop (`driver.Latched`).
-    Raises `InputError` F5101 where binding and net do not fit, and F1001 or F1003 where a file that a device needs, a
-    certificate or a key, cannot be read. One binding serves all hosts of a cell: each takes from
-    it the devices of its own machines.
+    Raises `InputError` F5101 where binding and net do not fit, F5105 where this host would have a device together with
+    another one, and F1001 or F1003 where a file that a device needs, a certificate or a key, cannot be read. One
+    binding serves all hosts of a cell: each takes from it the devices of its own machines.
     """
     if problems := misfits(binding, net):
         raise InputError(problems)
@@ -35,7 +36,11 @@ def bound_driver(binding: Binding, net: Net, part: Net | None = None, *, latched
     answered = frozenset(place.name for place in net.places if place.completion is not None)
     names = {*served.signal_index, *served.place_index}
     if part is not None:
-        binding = binding.serving(names, [controller.name for controller in part.controllers])
+        here = [controller.name for controller in part.controllers]
+        if together := tuple(shared(binding, net, here)):
+            raise InputError(together)
+        driven = [device for device, of in masters(binding, net).items() if of.issubset(here)]
+        binding = binding.serving(names, here, driven)
     if unreadable := tuple(binding.unreadable()):
         raise InputError(unreadable)
     return BoundDriver(binding, completions, answered, latched=latched)

@@ -26,6 +26,13 @@ AT_THE_END: Final = "stopped at the end of the cycle"
 
 def situation(run: Host) -> Situation:
     """What a host is doing, and what waits for what; exact at quiescence, as far as its machines know."""
+    found = _situation(run)
+    if hangs := run.groups.disk.sentence():
+        return replace(found, message="; ".join(filter(None, (hangs, found.message))))
+    return found
+
+
+def _situation(run: Host) -> Situation:
     others = "; ".join(sentence for sentence in run.peers.waits() if run.taking_up is None or "is held" not in sentence)
     if run.is_whole:
         waiting = tuple(blocked(run.recorder.player, run.recorder.word, run.dispatch.untaken))

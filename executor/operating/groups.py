@@ -13,7 +13,8 @@ and not a turn of the loop later in front of the next signal. That once: a net t
 
 The journal and the trace are written for these callbacks alone, so what fails there ends the run with the machines
 stopped, whoever called, and nothing leaves any more. A disk that never answers fails when a stop has waited for it as
-long as for anything that hangs: what it was given is as open as after a failed sync.
+long as for anything that hangs: what it was given is as open as after a failed sync. Before a stop it is told of
+(`disk_watch.py`).
 
 Rejected: to wait for the disk in the callback. It is the shortest text and, on a disk that answers at once, the
 quickest; but one that stands still for a second would keep a stop from the machines for that second.
@@ -24,6 +25,7 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING, Final
 
+from firable.executor.operating.disk_watch import DiskWatch
 from firable.executor.operating.uncut import Patience, uncut
 from firable.nets.diagnostics import Diagnostic, InputError
 
@@ -46,6 +48,7 @@ class Groups:
         self.is_working = False
         self.storing: asyncio.Future[None] | None = None
         """The sync that is under way on a thread."""
+        self.disk = DiskWatch(run)
         self.is_given_up = False
         """Whether nobody waits for it any more."""
 
@@ -80,6 +83,7 @@ class Groups:
             future = asyncio.get_running_loop().run_in_executor(None, storing)
             if not future.done():
                 self.storing = future
+                self.disk.asked()
                 future.add_done_callback(self._stored)
                 return
             future.result()
@@ -89,6 +93,7 @@ class Groups:
         """Do nothing more, and wait for the sync that is under way; returns what had to be given up."""
         if self.turn is not None:
             self.turn.cancel()
+        self.disk.end()
         if self.storing is None:
             return []
         hangs = self.is_given_up or await uncut([self.storing], patience)
@@ -148,6 +153,7 @@ class Groups:
             if self.run.outcome is None or self.run.outcome.done():
                 return  # ended by an error: nothing leaves any more
             self.run.leave(self.run.acts.let_go())
+            self.disk.answered()
             self.at_once()
         except Exception as error:
             self.run.broken(error)

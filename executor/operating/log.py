@@ -19,13 +19,14 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
 
+from firable.executor.operating.disk_watch import HANGS
 from firable.executor.operating.situation import Situation, State
 from firable.semantics.joining import APPLIED, STANDS, VOTED
 from firable.semantics.trace import Event, Noted
 
 LEVELS: Final[Mapping[str, int]] = MappingProxyType(
     {
-        **dict.fromkeys(("fault", "divergence", "emergency stop", "latched"), logging.ERROR),
+        **dict.fromkeys(("fault", "divergence", "emergency stop", "latched", HANGS), logging.ERROR),
         **dict.fromkeys(
             ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold"), logging.WARNING
         ),

@@ -16,6 +16,7 @@ from typing import Final
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Metric, Summary, generate_latest
 
+from firable.executor.operating.disk_watch import ANSWERS, HANGS
 from firable.executor.protocol.messages import Decision, Message, Vote
 from firable.nets.net import Net
 from firable.semantics.joining import APPLIED
@@ -92,6 +93,7 @@ class Metrics:
         self.faults = Counter(
             "firable_faults", "Faults, divergences and emergency stops told", ["kind"], registry=registry
         )
+        self.hangs = Gauge("firable_disk_hangs", "1 while the disk of the journal does not answer", registry=registry)
         self.latched = Gauge("firable_latched", "1 after an emergency stop, until it is reset", registry=registry)
         self.since: dict[str, float] = {}
         self.fired_at: dict[str, float] = {}
@@ -130,6 +132,8 @@ class Metrics:
                     self.faults.labels(note).inc()
                 if note in ("emergency stop", "reset"):
                     self.latched.set(note == "emergency stop")
+                if note in (HANGS, ANSWERS):
+                    self.hangs.set(note == HANGS)
 
     def message(self, message: Message, *, again: bool = False) -> None:
         """Count a message between a controller and the coordinator; `again` where it repeats an unanswered one."""

@@ -8,17 +8,12 @@ discrete-event systems", 1995) with the belief tracked on line instead of compil
 states as there are sets of markings, of which a run meets few.
 
 *Seen* are the firings, the commands sent and the signals taken; *hidden* is what machines, workpieces and sensors do by
-themselves. A signal is taken later than it changed: on the way lie a driver, a link, a promise that latches it. So
-what a signal is and what was taken of it may differ for `latency_seconds`, and no longer. Which firing was open by
-which sensor is not asked again (the replay asks it): those gates are stripped from the loop, because a vote may outlive
-its gate (O4). Those of completions stay, which only their command clears.
+themselves (`watched_loop.py`). A signal is taken later than it changed: on the way lie a driver, a link, a promise that
+latches it. So what a signal is and what was taken of it may differ for `latency_seconds`, and no longer.
 
 *Absence* is seen too, because a plant file has times: a command is done at the latest after its time, its jitter and
 the latency, but for one that waits until its place is free. A marking of the belief in which the machine is still at it
 is then dropped, as one whose signal should have been taken by now; what is left, if anything, explains the silence.
-
-The same markings are believed again and again, so what may happen hidden in one, and what must, is remembered, for a
-bounded number of them.
 
 The first divergence is the last: a model that the cell has left says nothing of what follows. Rejected: a twin, the
 simulated cell run beside the real one. It has one history where the belief has all, so it needs a tolerance for every
@@ -31,13 +26,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
-from firable.nets.machines.closing import close
-from firable.nets.machines.laws import PLANT, Laws
-from firable.nets.machines.loop import Sending
-from firable.nets.machines.plant_file import Carry, PlantModel, Put, Stop
+from firable.executor.operating.watched_loop import REMEMBERED, Move, WatchedLoop
+from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Marking, Net
 from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChanged, Trace
 
@@ -45,9 +38,6 @@ LATENCY_SECONDS: Final = 0.5
 """How long after its change a signal is taken at the latest, unless a caller knows better."""
 
 _NEVER: Final = -math.inf
-
-_REMEMBERED: Final = 10_000
-"""For how many markings it is remembered what may happen hidden in them, and what must."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,29 +65,6 @@ class Divergence:
     def __str__(self) -> str:
         touched = f" (touches {', '.join(self.places)})" if self.places else ""
         return f"{self.message}{touched}"
-
-
-@dataclass(frozen=True, slots=True)
-class _Move:
-    """A transition of the loop as masks over its places."""
-
-    needs: Marking
-    forbids: Marking
-    flips: Marking
-    says: str
-
-    def firable(self, marking: Marking) -> bool:
-        return marking & self.needs == self.needs and not marking & self.forbids
-
-
-@dataclass(frozen=True, slots=True)
-class _Work:
-    """A machine at a command: the place of the loop that says so, how long at most, and what it may wait for."""
-
-    busy: Marking
-    longest_seconds: float
-    waits_while_empty: Marking
-    """The place that says that the target is empty, if the command waits for it; no bit where it does not wait."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -130,44 +97,22 @@ class Monitor:
         latency_seconds: float = LATENCY_SECONDS,
         elsewhere: Collection[str] = (),
     ) -> None:
-        loop = close(_without_sensor_gates(net), model, sending=Sending.LATE)
-        laws = Laws(model, net)
         self.net = net
+        self.loop = WatchedLoop(net, model, elsewhere)
+        self.signals = self.loop.signals
         self.latency_seconds = latency_seconds
-        self.index = loop.net.place_index
-        moves = {one.name: _compiled(loop.net, t) for t, one in enumerate(loop.net.transitions)}
-        own = {variant for variants in loop.variants.values() for variant in variants}
-        self.firing = {name: [moves[one] for one in variants] for name, variants in loop.variants.items()}
-        unsent = {place: self._bit(name) for place, name in loop.unsent.items()}
-        every_unsent = _union(unsent.values())
-        sends = {name for name, move in moves.items() if name not in own and move.flips & every_unsent}
-        self.sending: dict[str, list[_Move]] = {place: [] for place in unsent}
-        self.refusing: dict[str, list[_Move]] = {place: [] for place in unsent}
-        for place, bit in unsent.items():
-            for name in sends:
-                if moves[name].flips & bit:
-                    (self.refusing if name in loop.accidents else self.sending)[place].append(moves[name])
-        self.hidden = [m for name, m in moves.items() if name not in own | sends and name not in loop.accidents]
-        self.hidden += [move for station in elsewhere for move in self._by_others(laws, station)]
-        self.signals = tuple(signal.name for signal in net.signals if signal.name in loop.shown)
-        """All but timers: that a time is over says nothing of the machines."""
         self.is_held: Callable[[str], bool] = lambda _: False
         """Whether a promise keeps a signal as it was; until it ends no change of it is taken."""
         self.held: set[str] = set()
         self.freed_seconds = dict.fromkeys(self.signals, _NEVER)
         """When a promise on each signal was last seen."""
-        self.shown = tuple((self._bit(place), means) for place, means in map(loop.shown.__getitem__, self.signals))
-        self.work = {place.name: self._work(laws, place.name, loop.at) for place in laws.commanding}
-        self.taken = [bool(loop.net.initial_marking & bit) == means for bit, means in self.shown]
-        self.hidden_in: dict[Marking, list[_Move]] = {}
+        self.taken = [bool(self.loop.initial & bit) == means for bit, means in self.loop.shown]
         self.demanded_in: dict[tuple[Marking, tuple[bool, ...]], _Demanded] = {}
-        self.shown_by: dict[Marking, list[int]] = {}
-        """For each change of the loop that a move makes, the indexes of the signals that it changes."""
         self.sent_seconds: dict[str, float] = {}
         self.marking = net.initial_marking
         self.divergence: Divergence | None = None
         """The first divergence; after it nothing is watched."""
-        self.belief = self._closed({loop.net.initial_marking: (_NEVER,) * len(self.signals)}, 0.0)
+        self.belief = self._closed({self.loop.initial: (_NEVER,) * len(self.signals)}, 0.0)
 
     def seen(self, event: Event) -> Divergence | None:
         """An event of a trace; the divergence that it shows, if it is the first."""
@@ -189,17 +134,17 @@ class Monitor:
         self.marking = self.marking & ~masks.inputs | masks.outputs
         message = f"'{transition}' fired, and the machines cannot have been where it leaves them"
         entered = self.net.transition(transition).outputs
-        return self._seen(at_seconds, self.firing[transition], transition, message, entered)
+        return self._seen(at_seconds, self.loop.firing[transition], transition, message, entered)
 
     def sent(self, at_seconds: float, place: str) -> Divergence | None:
         """The command of a place was sent to its machine."""
         if self.divergence is not None:
             return None
         believed = self._closed(self.belief, at_seconds)
-        refused = [move.says for move in self.refusing[place] if any(map(move.firable, believed))]
+        refused = [move.says for move in self.loop.refusing[place] if any(map(move.firable, believed))]
         message = refused[0] if refused else f"'{self.net.place(place).command}' was sent where it cannot be"
         self.sent_seconds[place] = at_seconds
-        return self._seen(at_seconds, self.sending[place], place, message, (place,))
+        return self._seen(at_seconds, self.loop.sending[place], place, message, (place,))
 
     def signal(self, at_seconds: float, name: str, value: bool) -> Divergence | None:
         """A controller has taken a new value of a signal, or cleared a completion by its command."""
@@ -215,7 +160,7 @@ class Monitor:
             # The command that clears it follows; until then the bit differs from what was taken, and not for long.
             self.belief = {m: (*since[:s], at_seconds, *since[s + 1 :]) for m, since in self.belief.items()}
             return None
-        bit, means = self.shown[s]
+        bit, means = self.loop.shown[s]
         believed = self._closed(self.belief, at_seconds)
         explained = {m: since for m, since in believed.items() if (bool(m & bit) == means) == value}
         message = f"'{name}' became {int(value)}, and nothing that the machines can have done explains it"
@@ -246,7 +191,7 @@ class Monitor:
         return None if due == math.inf else due
 
     def _seen(
-        self, at_seconds: float, moves: Iterable[_Move], subject: str, message: str, places: tuple[str, ...]
+        self, at_seconds: float, moves: Iterable[Move], subject: str, message: str, places: tuple[str, ...]
     ) -> Divergence | None:
         if self.divergence is not None:
             return None
@@ -274,27 +219,17 @@ class Monitor:
         while open_:
             marking = open_.pop()
             since = closed[marking]
-            for move in self._hidden(marking):
+            for move in self.loop.hidden_in(marking):
                 after, stamps = self._after(marking, since, move, at_seconds)
                 if self._add(closed, after, stamps):
                     open_.append(after)
         return closed
 
-    def _hidden(self, marking: Marking) -> list[_Move]:
-        """What may happen hidden in a marking."""
-        if (moves := self.hidden_in.get(marking)) is None:
-            if len(self.hidden_in) >= _REMEMBERED:
-                self.hidden_in.clear()
-            moves = self.hidden_in[marking] = [move for move in self.hidden if move.firable(marking)]
-        return moves
-
     def _after(
-        self, marking: Marking, since: tuple[float, ...], move: _Move, at_seconds: float
+        self, marking: Marking, since: tuple[float, ...], move: Move, at_seconds: float
     ) -> tuple[Marking, tuple[float, ...]]:
-        if (changed := self.shown_by.get(move.flips)) is None:
-            changed = self.shown_by[move.flips] = [s for s, (bit, _) in enumerate(self.shown) if move.flips & bit]
         stamps = since
-        for s in changed:
+        for s in self.loop.shown_by(move):
             stamps = (*stamps[:s], at_seconds, *stamps[s + 1 :])
         return marking ^ move.flips, stamps
 
@@ -322,12 +257,12 @@ class Monitor:
             return known
         works = [
             (place, work.longest_seconds, self.net.place(place).completion)
-            for place, work in self.work.items()
+            for place, work in self.loop.work.items()
             if marking & work.busy and not (work.waits_while_empty and not marking & work.waits_while_empty)
         ]
-        shown = [bool(marking & bit) == means for bit, means in self.shown]
+        shown = [bool(marking & bit) == means for bit, means in self.loop.shown]
         signals = [(s, name) for s, name in enumerate(self.signals) if shown[s] != self.taken[s]]
-        if len(self.demanded_in) >= _REMEMBERED:
+        if len(self.demanded_in) >= REMEMBERED:
             self.demanded_in.clear()
         self.demanded_in[key] = works, signals
         return works, signals
@@ -344,25 +279,15 @@ class Monitor:
             return math.inf
         return max(since_seconds, self.freed_seconds.get(signal, _NEVER)) if signal is not None else since_seconds
 
-    def _by_others(self, laws: Laws, station: str) -> Iterator[_Move]:
-        """What machines that are not seen may do at a station: each workpiece comes and goes, each sensor follows."""
-        ways = [self._bit(laws.empty(station)), *(self._bit(laws.has(station, kind)) for kind in laws.kinds)]
-        for before in ways:
-            yield from (_Move(before, after, before | after, "") for after in ways if after != before)
-        for name, sensor in laws.model.sensors.items():
-            if sensor.occupied == station and (sensor.may_flicker or sensor.may_linger):
-                bit = self._bit(f"{PLANT}.{name}.sensor" if f"{PLANT}.{name}.sensor" in self.index else name)
-                yield from (_Move(bit, 0, bit, ""), _Move(0, bit, bit, ""))
-
     def _told(self, missed: _Demand) -> tuple[str, str, tuple[str, ...]]:
         """Subject, message and places of a demand that was not met."""
         name = missed.subject
-        if name not in self.work:
+        if name not in self.loop.work:
             taken = int(self.taken[self.signals.index(name)])
             return name, f"'{name}' must be {1 - taken} by now, and is still {taken}", self._waiting_for(name)
         message = (
             f"'{self.net.place(name).command}', sent at {self.sent_seconds.get(name, 0.0):.1f} s, must be done after "
-            f"{self.work[name].longest_seconds:g} s at the latest, and nothing shows that it is"
+            f"{self.loop.work[name].longest_seconds:g} s at the latest, and nothing shows that it is"
         )
         return name, message, (name,)
 
@@ -374,24 +299,6 @@ class Monitor:
     def _with_token(self, places: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(name for name in places if self.marking >> self.net.place_index[name] & 1)
 
-    def _bit(self, place: str) -> Marking:
-        return 1 << self.index[place]
-
-    def _work(self, laws: Laws, place: str, at: Mapping[str, str]) -> _Work:
-        action = laws.action(self.net.place(place))
-        if isinstance(action, Stop):
-            return _Work(0, math.inf, 0)
-        target = None
-        if isinstance(action, Carry | Put) and action.when_full == "wait":
-            target = action.target if isinstance(action, Carry) else self._put_at(laws, place)
-        waits = self._bit(laws.empty(target)) if target is not None else 0
-        return _Work(self._bit(at[place]), action.takes_s + action.jitter_s, waits)
-
-    def _put_at(self, laws: Laws, place: str) -> str | None:
-        _, machine = laws.machine(self.net.place(place))
-        command = self.net.place(place).command
-        return machine.positions[dict(command.parameters)["at"]] if command is not None else None
-
 
 def watch(monitor: Monitor, trace: Trace) -> Divergence | None:
     """Hold a whole trace against the model, from its first event to its last line; the first divergence, if any."""
@@ -400,31 +307,3 @@ def watch(monitor: Monitor, trace: Trace) -> Divergence | None:
     if trace.end is not None:
         monitor.passed(trace.end.at_seconds)
     return monitor.divergence
-
-
-def _without_sensor_gates(net: Net) -> Net:
-    completions = {signal for place in net.places for signal in place.cleared}
-    return replace(
-        net,
-        transitions=tuple(
-            replace(one, external=tuple(gate for gate in one.external if gate.signal in completions))
-            for one in net.transitions
-        ),
-    )
-
-
-def _compiled(net: Net, t: int) -> _Move:
-    masks = net.masks[t]
-    return _Move(
-        masks.inputs | masks.permissive,
-        masks.outputs | masks.inhibitive,
-        masks.inputs | masks.outputs,
-        net.transitions[t].description,
-    )
-
-
-def _union(masks: Iterable[int]) -> int:
-    union = 0
-    for mask in masks:
-        union |= mask
-    return union

@@ -16,7 +16,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from firable.executor.cell.plant import Disturbance, Plant
+from firable.executor.cell.disturbances import Disturbance
+from firable.executor.cell.plant import Plant
 from firable.executor.drivers.binding import Binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.simulated import SimulatedDriver

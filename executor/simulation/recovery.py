@@ -22,6 +22,7 @@ from firable.executor.protocol.messages import Message, Report
 from firable.executor.protocol.token_player import Word
 from firable.executor.simulation.faults import Faults
 from firable.executor.simulation.happenings import pause, resume, stay, tend
+from firable.executor.simulation.letting_out import reach
 from firable.executor.simulation.world import World
 from firable.semantics.trace import End
 
@@ -149,7 +150,7 @@ def check_at_rest(world: World) -> None:
 def _round(world: World, *, at_work: bool = False) -> list[Message | str]:
     """Give everybody a turn, and let everything arrive in order; returns what did."""
     for process in world.controllers.values():
-        world.reach(process)
+        reach(world, process)
         world.turn(process)
         if process.machine is not None:
             world.act(process, process.machine.resend())

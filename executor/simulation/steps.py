@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from firable.executor.simulation.happenings import happen
+from firable.executor.simulation.letting_out import reach
 
 if TYPE_CHECKING:
     from firable.executor.simulation.world import World
@@ -64,7 +65,7 @@ def _resend(world: World) -> None:
 def _machines(world: World) -> None:
     waiting = [process for process in world.controllers.values() if process.queue]
     if waiting and world.draw.random() < 0.3:
-        world.reach(waiting[int(world.draw.random() * len(waiting))])
+        reach(world, waiting[int(world.draw.random() * len(waiting))])
         return
     draw = world.draw.random()
     if draw < 0.4 and world.telling:

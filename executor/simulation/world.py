@@ -32,22 +32,19 @@ from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.deciders import coordinators
 from firable.executor.protocol.messages import (
-    Acknowledgement,
     Decision,
     Effect,
     Firing,
     Hello,
     Message,
-    Report,
-    Sending,
     Taken,
-    Vote,
     VoteRequest,
 )
 from firable.executor.simulation.clock import Clock
 from firable.executor.simulation.disk import DiskFailedError
 from firable.executor.simulation.faults import Faults
 from firable.executor.simulation.judge import RunFailedError, Subject
+from firable.executor.simulation.letting_out import give_up, happened, let_out
 from firable.executor.simulation.machinery import Job, Machinery
 from firable.executor.simulation.process import Process
 from firable.executor.simulation.steps import something
@@ -55,7 +52,7 @@ from firable.executor.simulation.telling import COORDINATOR, told
 from firable.executor.simulation.timekeeper import Timekeeper
 from firable.nets.net import Marking
 from firable.semantics.replaying import Replayer
-from firable.semantics.trace import CommandSent, End, Event, Fired, Header, SignalChanged, Trace
+from firable.semantics.trace import End, Event, Header, Trace
 
 SECONDS_PER_STEP: Final = 0.01
 STEPS_PER_LIMIT: Final = (10, 400)
@@ -161,7 +158,7 @@ class World:
         if process.name in self.controllers:
             for effect in effects:
                 if isinstance(effect, Firing):
-                    self._left(process, effect.transition)
+                    give_up(self, process, effect.transition)
         if not process.act(effects):
             return
         if process.leaving:  # what is done by what leaves comes behind all of that
@@ -205,89 +202,10 @@ class World:
                 self.note("killed between commit and sending", process.name)
                 self.kill(process)
                 return
-            self._leave(process, process.leaving.popleft())
+            let_out(self, process, process.leaving.popleft())
         if process.has_acted:
             process.has_acted = False
             self._sync_soon(process)
-
-    def _leave(self, process: Process[Any], effect: Effect) -> None:
-        match effect:
-            case Firing(transition):
-                self._fired(transition)
-            case Taken(signal, value):
-                self._changed(signal, value)
-            case Sending(place, entry, again):
-                self.note("command", (process.name, place, entry))
-                self.counts["sent again"] += again
-                if process.is_held:
-                    raise RunFailedError(f"{process.name} commands '{place}' before the operator has resumed it")
-                # One that was given before a stop, and is to be given again, is in the trace already.
-                if not again or place in self.judge.owed:
-                    self._event(CommandSent(float(len(self.events)), place))
-                if (place, entry) in process.void:
-                    process.void.remove((place, entry))
-                    self.note("given up", (process.name, place, entry))
-                elif process.is_safe:
-                    self.note("kept back", (process.name, place, entry))
-                elif self.faults["queued"] and self.draw.random() < 0.7 * self.faults["queued"]:
-                    self.counts["queued"] += 1
-                    self.note("waits for its line", (process.name, place, entry))
-                    if process.hand(effect):
-                        self._sent(process, effect)
-                else:
-                    self._given(process, effect)
-            case VoteRequest() | Decision() | Report() | Vote() | Acknowledgement() | Hello():
-                self._send(effect)
-
-    def reach(self, process: Process[Any]) -> None:
-        """Let the lines of a process be up: its machines are given what its driver has kept."""
-        while process.queue:
-            self._given(process, process.queue.pop(0))
-
-    def _given(self, process: Process[Any], sending: Sending) -> None:
-        machine = process.machine
-        if process.is_safe:
-            raise RunFailedError(f"a machine is given the command of '{sending.place}' after an emergency stop")
-        if machine is not None and sending.place not in machine.subnet.names(machine.marking):
-            raise RunFailedError(f"a machine is given the command of '{sending.place}', which its token has left")
-        self.note("is given", (sending.place, sending.entry))
-        stuck = self.draw.random() < 0.3 * self.faults["stuck"]
-        self.cell.send(sending.place, sending.entry, stuck=stuck)
-        self._sent(process, sending)
-
-    def _sent(self, process: Process[Any], sending: Sending) -> None:
-        if process.machine is not None:
-            self.act(process, process.machine.sent(sending.place, sending.entry))
-
-    def _left(self, process: Process[Any], transition: str) -> None:
-        """Let a process give up the commands that a firing leaves behind."""
-        for sending in process.give_up(self.net.transition(transition).inputs):
-            self.note("given up", (process.name, sending.place, sending.entry))
-            if self.net.place(sending.place).completion is None:
-                raise RunFailedError(f"'{transition}' fires before a machine has the command of '{sending.place}'")
-
-    def _happened(self, effects: Iterable[Effect]) -> None:
-        """Tell the judge what is durable, though the process that did it was killed before it could say so."""
-        for effect in effects:
-            match effect:
-                case Firing(transition):
-                    self._fired(transition)
-                case Taken(signal, value):
-                    self._changed(signal, value)
-
-    def _fired(self, transition: str) -> None:
-        self.note("fires", transition)
-        self.counts["firings"] += 1
-        self.fired.add(transition)
-        self._event(Fired(float(len(self.events)), (transition,)))
-
-    def _changed(self, signal: str, value: bool) -> None:
-        self.note("taken in", (signal, value))
-        self._event(SignalChanged(float(len(self.events)), signal, value))
-
-    def _event(self, event: Event) -> None:
-        self.events.append(event)
-        self.judge.take(event)
 
     def _check_pause(self, effects: Iterable[Effect]) -> None:
         for effect in effects:
@@ -353,7 +271,7 @@ class World:
         if process.machine is not None:
             self.note("killed", process.name)
             self.counts["kills"] += 1
-            self._happened(process.kill())
+            happened(self, process.kill())
 
     def restart(self, process: Process[Any]) -> None:
         """Start a process that is down."""
@@ -364,7 +282,8 @@ class World:
 
     # --- Network
 
-    def _send(self, message: Message) -> None:
+    def send(self, message: Message) -> None:
+        """Put a message on its way, which may take very long."""
         if self.faults["delay"] and self.draw.random() < 0.4 * self.faults["delay"]:
             self.late.append(message)
         else:
@@ -382,7 +301,7 @@ class World:
         self.counts["arrived"] += 1
         match message:
             case Decision(committed=str(name)) if receiver.machine.applies(message):
-                self._left(receiver, name)
+                give_up(self, receiver, name)
         self.act(receiver, receiver.machine.receive(message))
         if to_controller and not self.is_slow():
             self.turn(controller)

@@ -9,12 +9,12 @@ import signal
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from support.link_rigs import free_port
+from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 
 from firable.cli.main import main
 from firable.executor.drivers.far_side.machine import Machine
@@ -52,6 +52,8 @@ devices:
     driver: modbus-tcp
     host: 127.0.0.1
     port: {port}
+    timeout_s: 30  # a loss would be an emergency stop of its own
+    start_s: 60
     safe: {{coil 3: false}}
     channels: {{A: {{number: holding 11, taken: input 10}}}}
 emergency_stop:
@@ -76,7 +78,7 @@ class Lamp:
 
     def run(self, work: object) -> None:
         assert asyncio.iscoroutine(work)
-        asyncio.run_coroutine_threadsafe(work, self.loop).result(20)
+        asyncio.run_coroutine_threadsafe(work, self.loop).result(PATIENCE_SECONDS)
 
     def show(self, role: str, *, value: bool) -> None:
         self.loop.call_soon_threadsafe(lambda: self.machine.show(role, value))
@@ -108,13 +110,6 @@ def started(*arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
-def until(condition: Callable[[], object], what: str) -> None:
-    end = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < end, what
-        time.sleep(0.01)
-
-
 @pytest.mark.parametrize("coordinator", ["in the same process", "frozen", "killed"])
 def test_open_contact_stops_the_machines_of_its_controller_and_the_run_stays_stopped(
     coordinator: str, bundle: str, lamp: Lamp, tmp_path: Path
@@ -140,7 +135,7 @@ def test_open_contact_stops_the_machines_of_its_controller_and_the_run_stays_sto
         lamp.show("button", value=False)
         until(lambda: len(lamp.machine.outputs) == 2, "the safe outputs")
         lamp.show("button", value=True)
-        said, _ = processes[0].communicate(timeout=60)
+        said, _ = processes[0].communicate(timeout=PATIENCE_SECONDS)
         assert processes[0].returncode == 3, said
         assert "emergency stop: plc: 'button' is open" in said
         assert (lamp.machine.outputs, len(lamp.machine.orders)) == ([False, False], 1)
@@ -153,7 +148,7 @@ def test_open_contact_stops_the_machines_of_its_controller_and_the_run_stays_sto
         lamp.show("button", value=False)
         again = started(*mine, "--resume")
         processes.append(again)
-        said, _ = again.communicate(timeout=60)
+        said, _ = again.communicate(timeout=PATIENCE_SECONDS)
         assert again.returncode == 3, said
         assert "emergency stop: plc: 'button' is open" in said
         assert len(lamp.machine.orders) == 1
@@ -209,8 +204,57 @@ def test_host_whose_coordinator_is_dead_is_latched_by_its_contact_and_goes_on_wh
             "taken up",
         ]
         operate("stop")
-        processes[0].communicate(timeout=60)
+        processes[0].communicate(timeout=PATIENCE_SECONDS)
     finally:
         for process in processes:
             process.kill()
             process.communicate()
+
+
+def test_person_at_the_terminal_is_asked_for_the_reset_as_soon_as_the_contact_opens(
+    bundle: str, lamp: Lamp, tmp_path: Path
+) -> None:
+    bind = tmp_path / "cell.bind.yaml"
+    bind.write_text(BINDING.format(port=lamp.end.port))
+    command = [sys.executable, "-m", "firable.cli", "run", bundle, "--bind", str(bind), "--step"]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True)
+
+    def asked(*words: str) -> None:
+        """All of this is said, in this order, and then something is asked."""
+        assert process.stdout is not None
+        said = ""
+        with heard_in_time(process):
+            while not (said.endswith(": ") and all(word in said for word in words)):
+                character = process.stdout.read(1)
+                assert character, said
+                said += character
+
+    def typed(line: str) -> None:
+        assert process.stdin is not None
+        process.stdin.write(f"{line}\n")
+        process.stdin.flush()
+
+    try:
+        lamp.show("sensor", value=True)
+        asked("hand", "[s] stop now")
+        lamp.show("button", value=False)
+        asked("button' is open", "type reset")
+        assert lamp.machine.outputs[-1] is False
+        typed("reset")
+        asked("not reset: plc: 'button' is not closed", "type reset")
+        lamp.show("button", value=True)
+        until(lambda: lamp.machine.outputs.count(False) > 2, "the safe outputs of the next connection")
+        typed("reset")
+        asked("nothing moves until it is resumed", "take the run up")
+        typed("")
+        lamp.show("sensor", value=False)
+        typed("r")
+        asked("back", "[s] stop now")
+        assert len(lamp.machine.orders) == 1
+        typed("s")
+        said, _ = process.communicate(timeout=PATIENCE_SECONDS)
+        assert process.returncode == 0, said
+    finally:
+        process.kill()
+        process.communicate()

@@ -5,11 +5,11 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 from support.link_rigs import free_port
+from support.waiting import PATIENCE_SECONDS, until
 
 from firable.cli.main import main
 
@@ -89,14 +89,11 @@ def test_two_hosts_run_a_cell_and_end_in_order(bundle: str, tmp_path: Path, caps
         for name, more in hosts.items()
     }
     try:
-        end = time.monotonic() + 60
-        while not (traces["system"].exists() and traces["system"].read_text().count('"round"') > 20):
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        until(lambda: traces["system"].exists() and traces["system"].read_text().count('"round"') > 20, "rounds")
     finally:
         for process in processes.values():
             process.send_signal(signal.SIGINT if process is processes["robot"] else signal.SIGTERM)
-    said = {name: process.communicate(timeout=60) for name, process in processes.items()}
+    said = {name: process.communicate(timeout=PATIENCE_SECONDS) for name, process in processes.items()}
     assert [process.returncode for process in processes.values()] == [0, 0], said
     assert "is connected" in said["system"][1]
     report = json.loads(said["robot"][0])["reports"][0]
@@ -157,7 +154,7 @@ def test_an_operator_stops_the_machines_of_one_host_although_its_coordinator_nev
         assert "G2 is ready here, and is decided by the coordinator" in capsys.readouterr().out
         assert main(["operate", told.group(), "emergency-stop", "--token-file", token]) == 0
         assert main(["operate", told.group(), "stop", "--token-file", token]) == 0
-        out, _ = process.communicate(timeout=60)
+        out, _ = process.communicate(timeout=PATIENCE_SECONDS)
     finally:
         process.kill()
         process.wait()

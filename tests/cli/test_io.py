@@ -13,6 +13,8 @@ from typing import Any
 
 import jsonschema
 import pytest
+from support.served_cells import unhurried
+from support.waiting import PATIENCE_SECONDS, heard_in_time
 
 from firable.cli.main import main
 from firable.executor.drivers.far_side.ends import binding_text
@@ -47,9 +49,10 @@ class Cell:
     def line_with(self, text: str) -> str:
         """Read on to the line that holds a text."""
         assert self.process.stdout is not None
-        for line in self.process.stdout:
-            if text in line:
-                return line
+        with heard_in_time(self.process):
+            for line in self.process.stdout:
+                if text in line:
+                    return line
         raise AssertionError(f"the cell has ended and never said '{text}'")
 
 
@@ -57,16 +60,18 @@ class Cell:
 def cell(tmp_path: Path) -> Iterator[Cell]:
     """The one-robot cell over Modbus, of which the completion of a grasp and the sensor of MC may be forced."""
     bind = tmp_path / "cell.bind.yaml"
-    text = binding_text(NET, {"modbus": free_port()}, SENSORS)
+    text = unhurried(binding_text(NET, {"modbus": free_port()}, SENSORS))
     text = text.replace("write: {holding 10: 5}}", "write: {holding 10: 5}, force: true}")
     held = "mc.part_present: {device: modbus, read: coil 20, on_loss: hold, force: true}"
     bind.write_text("\n".join(f"  {held}" if "mc.part_present:" in line else line for line in text.split("\n")))
     serving = firable("sim", "catalogue:one_robot", "--bind", str(bind), "--workpieces", "1", "--speed", "40")
     served = Cell(serving, bind)
-    served.line_with("serving 'one-robot'")
-    yield served
-    serving.terminate()
-    serving.wait()
+    try:
+        served.line_with("serving 'one-robot'")
+        yield served
+    finally:
+        serving.terminate()
+        serving.communicate(timeout=PATIENCE_SECONDS)
 
 
 def test_signals_are_shown_and_forced_only_where_the_binding_allows_it(
@@ -100,7 +105,7 @@ def test_a_program_reads_signals_as_lines_of_json_of_the_published_schema(
         True,
         "good",
     )
-    assert main(["io", str(cell.bind), "--for", "0.6", "--format", "json"]) == 0
+    assert main(["io", str(cell.bind), "--for", "2", "--format", "json"]) == 0
     assert 1 <= len(shown(capsys)) <= 3  # one for each change
     gone = tmp_path / "gone.bind.yaml"
     text = binding_text(NET, {"modbus": free_port()}, SENSORS)
@@ -135,7 +140,7 @@ def test_bundle_runs_on_the_machines_of_a_binding_until_it_is_stopped(cell: Cell
     running = firable("run", str(bundle), "--bind", str(cell.bind), "--trace", str(trace), "--format", "json")
     cell.line_with("workpiece 1 is carried out")
     running.send_signal(signal.SIGINT)
-    said, _ = running.communicate(timeout=60)
+    said, _ = running.communicate(timeout=PATIENCE_SECONDS)
     assert running.returncode == 0, said
     report = json.loads(said[said.index("{") :])
     schema = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))

@@ -10,6 +10,8 @@ from collections import Counter
 from pathlib import Path
 
 from support.link_rigs import free_port
+from support.served_cells import unhurried
+from support.waiting import PATIENCE_SECONDS, heard_in_time
 
 from firable.cli.main import main
 from firable.executor.drivers.far_side.ends import binding_text
@@ -43,18 +45,19 @@ class Cell:
     def until(self, last: object) -> None:
         assert self.process.stdout is not None
         assert callable(last)
-        for line in self.process.stdout:
-            if (found := COMMAND.match(line)) is not None:
-                self.commands.append(found[1].strip())
-            if last(line):
-                return
+        with heard_in_time(self.process):
+            for line in self.process.stdout:
+                if (found := COMMAND.match(line)) is not None:
+                    self.commands.append(found[1].strip())
+                if last(line):
+                    return
         raise AssertionError("the cell has ended")
 
 
 def test_run_that_is_killed_while_its_machines_work_asks_them_and_doubles_no_command(tmp_path: Path) -> None:
     bundle, bind, trace = (str(tmp_path / name) for name in ("cell.bundle", "cell.bind.yaml", "trace"))
     assert main(["bundle", "catalogue:one_robot", "-o", bundle]) == 0
-    text = binding_text(NET, {"modbus": str(free_port())}, PLANT.sensors)
+    text = unhurried(binding_text(NET, {"modbus": str(free_port())}, PLANT.sensors))
     # Machines that go on while nobody is there: without a heartbeat, and without outputs that stop them at a start.
     Path(bind).write_text("\n".join(line for line in text.split("\n") if not re.match(r" *(heartbeat|safe):", line)))
     run = ["run", bundle, "--bind", bind, "--trace", trace, "--journal", str(tmp_path / "journal"), "--resume"]
@@ -69,7 +72,7 @@ def test_run_that_is_killed_while_its_machines_work_asks_them_and_doubles_no_com
         running = firable(*run)
         cell.until(lambda line: "workpiece 1 is carried out" in line)
         running.send_signal(signal.SIGINT)
-        said, _ = running.communicate(timeout=60)
+        said, _ = running.communicate(timeout=PATIENCE_SECONDS)
         assert running.returncode == 0, said
     finally:
         for process in (cell.process, running):

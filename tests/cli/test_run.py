@@ -5,16 +5,16 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 from support.cells import decomposition_of, plant_of
+from support.waiting import PATIENCE_SECONDS, heard_in_time, until
 
 from firable.cli.main import main
 from firable.cli.run import _verdicts
 from firable.executor import execute
-from firable.executor.cell.plant import NeverCompletes
+from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.operating.running import Watch
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.semantics.joining import VOTED
@@ -32,6 +32,10 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(path)
 
 
+LATE = ("--watch", "ignore")
+"""Of a run in real time: on a busy machine the simulated cell is late, which the monitor may tell."""
+
+
 def typed(lines: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     """`firable run` with what the operator types; a run that never ends fails by its time limit."""
     return subprocess.run(
@@ -40,7 +44,7 @@ def typed(lines: str, *arguments: str) -> subprocess.CompletedProcess[str]:
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=2 * PATIENCE_SECONDS,
     )
 
 
@@ -63,7 +67,8 @@ def test_steps_are_fired_one_by_one_until_the_operator_stops(
     speed: str, last: str, bundle: str, tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace"
-    done = typed(f"\n\n{last}", bundle, "--workpieces", "1", "--step", "--speed", speed, "--trace", str(trace))
+    options = ("--speed", speed, "--trace", str(trace), *(LATE if speed != "max" else ()))
+    done = typed(f"\n\n{last}", bundle, "--workpieces", "1", "--step", *options)
     assert done.returncode == 3, done.stdout + done.stderr
     assert stepped(done.stdout) == ["G1", "G2", "t1-a"]
     assert notes_of(trace) == ["paused", "stopped by the operator", "stopped"]
@@ -100,7 +105,7 @@ def test_a_key_that_means_nothing_is_asked_for_again(bundle: str) -> None:
 
 def test_enter_pauses_a_run_that_runs_on_in_real_time(bundle: str, tmp_path: Path) -> None:
     trace = tmp_path / "trace"
-    typed("r\n\ns\n", bundle, "--workpieces", "1", "--step", "--speed", "10", "--trace", str(trace))
+    typed("r\n\ns\n", bundle, "--workpieces", "1", "--step", "--speed", "10", *LATE, "--trace", str(trace))
     assert notes_of(trace) == ["paused", "resumed", "paused", "stopped by the operator", "stopped"]
 
 
@@ -114,29 +119,29 @@ INTERRUPT, TERMINATE = signal.SIGINT, signal.SIGTERM
 
 
 @pytest.mark.parametrize(
-    ("options", "sent"),
+    ("steps", "sent"),
     [([], INTERRUPT), (["--step"], INTERRUPT), (["--step", "--speed", "max"], INTERRUPT), ([], TERMINATE)],
 )
 def test_interrupt_and_terminate_end_a_run_in_order(
-    options: list[str], sent: signal.Signals, bundle: str, tmp_path: Path
+    steps: list[str], sent: signal.Signals, bundle: str, tmp_path: Path
 ) -> None:
     trace = tmp_path / "trace"
-    command = [sys.executable, "-m", "firable.cli", "run", bundle, "--speed", "1", "--trace", str(trace), *options]
+    options = ["--speed", "1", *LATE, "--trace", str(trace), *steps]
+    command = [sys.executable, "-m", "firable.cli", "run", bundle, *options]
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
         assert process.stdout is not None
-        if options:
+        if steps:
             shown = ""
-            while not shown.endswith("[s] stop now: "):
-                character = process.stdout.read(1)
-                assert character, shown
-                shown += character
+            with heard_in_time(process):
+                while not shown.endswith("[s] stop now: "):
+                    character = process.stdout.read(1)
+                    assert character, shown
+                    shown += character
         else:
-            while not (trace.exists() and '"fired"' in trace.read_text(encoding="utf-8")):
-                assert process.poll() is None
-                time.sleep(0.05)
+            until(lambda: trace.exists() and '"fired"' in trace.read_text(encoding="utf-8"), "a firing")
         process.send_signal(sent)
-        process.wait(timeout=60)  # and nothing is typed, nor the input ended
+        process.wait(timeout=PATIENCE_SECONDS)  # and nothing is typed, nor the input ended
         said, errors = process.communicate()
     assert process.returncode == 3, said + errors
     assert errors == ""
@@ -199,12 +204,12 @@ def test_a_trace_does_not_go_to_standard_output(
 def killed(bundle: str, folder: Path) -> tuple[str, ...]:
     """The options of a run in real time that was killed after some of its commands."""
     options = ("--workpieces", "2", "--journal", str(folder / "cell.journal"), "--trace", str(folder / "trace"))
-    command = [sys.executable, "-m", "firable.cli", "run", bundle, "--speed", "10", *options]
+    command = [sys.executable, "-m", "firable.cli", "run", bundle, "--speed", "10", *LATE, *options]
+    trace = folder / "trace"
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as running:
         try:
-            while not (folder / "trace").exists() or (folder / "trace").read_text().count("command") < 8:
-                assert running.poll() is None
-                time.sleep(0.02)
+            until(lambda: trace.exists() and trace.read_text().count("command") >= 8, "commands")
+            assert running.poll() is None
         finally:
             running.kill()
     return options

@@ -19,6 +19,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
 from firable.cli.run import run
+from firable.executor.drivers.bench import PATIENCE_S, until
 from firable.executor.operating.control import Endpoint, new_token, serving, tls_context
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import Answer
@@ -267,12 +268,11 @@ def test_an_answer_that_takes_for_ever_does_not_keep_the_process_when_the_run_is
         run = Stepping()
         async with serving(run, Endpoint("127.0.0.1", 0, TOKEN), bytes) as url, ClientSession() as session:
             asked = asyncio.create_task(session.post(f"{url}/step", headers=BEARER).__aenter__())
-            while "step" not in run.log:
-                await asyncio.sleep(0.01)
+            await until(lambda: "step" in run.log, "the request")
         with suppress(ClientError, asyncio.CancelledError):
             await asked
 
-    asyncio.run(asyncio.wait_for(main(), 20))
+    asyncio.run(asyncio.wait_for(main(), PATIENCE_S))
 
 
 def test_when_the_run_is_over_nobody_answers() -> None:

@@ -22,7 +22,7 @@ from firable.nets.net import ArbitrationRule, Controller, Net, Place, Transition
 from firable.semantics.arbitration import Arbitration
 
 
-@examples(200)
+@examples(100)
 @given(owned_nets(), st.lists(st.integers(0, 2**30), max_size=12))
 def test_enabled_set_is_what_each_transition_says(net: Net, words: list[int]) -> None:
     compiled = list(TokenPlayer.of(net).transitions.values())

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 import pytest
+from support.hosts import ended_within
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
@@ -115,7 +116,7 @@ def test_an_error_ends_the_run_and_stops_the_machines_even_where_its_caller_swal
         journal.is_full = True
         act(run)  # as a timer of a driver, or the server of an operator, calls it
         with pytest.raises(InputError, match="full"):
-            await asyncio.wait_for(ending, 5)
+            await ended_within(ending, 5)
         assert machine.is_stopped
 
     run_in_virtual_time(main())
@@ -139,7 +140,7 @@ def test_a_disk_that_fails_during_a_step_ends_the_step_with_the_run_and_commands
         journal.is_full = True
         fired = asyncio.create_task(stepped(run))
         with pytest.raises(InputError, match="full"):
-            await asyncio.wait_for(ending, 5)
+            await ended_within(ending, 5)
         assert await asyncio.wait_for(fired, 1) is None
         assert machine.sent == sent
         assert not run.quiet_waiters
@@ -157,7 +158,7 @@ def test_a_disk_that_fails_while_a_run_is_taken_up_resumes_nothing() -> None:
         await asyncio.sleep(0.5)
         journal.is_full = True
         with pytest.raises(InputError, match="full"):
-            await asyncio.wait_for(ending, 5)
+            await ended_within(ending, 5)
         assert run.taking_up is not None
         assert machine.sent == []
 

@@ -12,9 +12,11 @@ from threading import Semaphore, Thread
 from typing import Any
 
 import pytest
+from support.hosts import ended_within
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.bench import PATIENCE_S, until
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal, Storing
 from firable.executor.journal.outbox import Outbox
@@ -75,7 +77,7 @@ class Slow(MemoryJournal):
         kept = {machine: self.kept(machine) for machine in self.of}
 
         def store() -> None:
-            assert self.answers.acquire(timeout=20)
+            assert self.answers.acquire(timeout=PATIENCE_S)
             if self.fails:
                 raise InputError([Diagnostic("F5034", "the disk is full", "make room")])
             self.durable = kept
@@ -112,7 +114,7 @@ class Rig:
         finally:
             self.journal.answers.release(1000)
             self.host.stop()
-            await asyncio.wait([ending], timeout=10)
+            await asyncio.wait([ending], timeout=PATIENCE_S)
             assert ending.done()
 
     async def slow_from_now_on(self) -> None:
@@ -127,8 +129,17 @@ class Rig:
         storing = self.host.groups.storing
         assert storing is not None
         self.journal.answers.release()
-        await asyncio.wait([storing], timeout=10)
+        await asyncio.wait([storing], timeout=PATIENCE_S)
+        assert storing.done()
         await turns()
+
+    async def answer_all(self) -> None:
+        """Let it answer until nothing waits for it."""
+        for _ in range(1000):
+            if self.host.groups.storing is None:
+                return
+            await self.answer()
+        pytest.fail("each sync is followed by another")
 
     @property
     def lines(self) -> list[dict[str, Any]]:
@@ -208,7 +219,7 @@ def test_an_emergency_stop_reaches_the_machines_while_the_disk_takes_its_time_an
             await rig.answer()
             assert rig.machines.sent == []
             await rig.answer()
-            situation = await asyncio.wait_for(ending, 10)
+            situation = await ended_within(ending, PATIENCE_S)
             assert situation.state is State.STOPPED
             assert situation.is_emergency
 
@@ -244,10 +255,10 @@ def test_a_disk_that_never_answers_ends_a_stop_as_an_error_and_what_it_was_given
             assert storing is not None
             end(rig.host)
             with pytest.raises(InputError, match="its disk does not answer"):
-                await asyncio.wait_for(ending, 10)
+                await ended_within(ending, PATIENCE_S)
             assert rig.machines.is_stopped
             rig.journal.answers.release()  # after all
-            await asyncio.wait([storing], timeout=10)
+            await asyncio.wait([storing], timeout=PATIENCE_S)
             await turns()
             assert rig.machines.sent == rig.fired == []
 
@@ -265,12 +276,8 @@ def test_a_host_among_others_stops_its_machines_when_its_stop_has_waited_and_its
         async with rig.running() as ending:
             await rig.slow_from_now_on()
             rig.host.stop()
-            stopped = [rig.machines.is_stopped]
-            while not stopped[-1] and len(stopped) < 1000:
-                await asyncio.sleep(0.005)
-                stopped.append(rig.machines.is_stopped)
-            assert not stopped[0], "others may wait for a word of it"
-            assert stopped[-1]
+            assert not rig.machines.is_stopped, "others may wait for a word of it"
+            await until(lambda: rig.machines.is_stopped, "the stop")
             assert not ending.done()
 
     asyncio.run(main())
@@ -286,7 +293,7 @@ def test_a_disk_that_fails_on_its_thread_ends_the_run_with_the_machines_stopped_
             rig.journal.fails = True
             await rig.answer()
             with pytest.raises(InputError, match="the disk is full"):
-                await asyncio.wait_for(ending, 10)
+                await ended_within(ending, PATIENCE_S)
             assert rig.machines.is_stopped
             assert rig.machines.sent == rig.fired == []
 
@@ -300,13 +307,9 @@ def test_a_command_whose_time_is_over_before_the_disk_has_answered_is_not_sent()
             rig.journal.is_slow = True
             rig.host.signal("b.key", value=True, entry=None)
             await turns()
-            for _ in range(1000):
-                if "b.working" not in rig.host.marking:
-                    break
-                await asyncio.sleep(0.005)  # until its time is over
+            await until(lambda: "b.working" not in rig.host.marking, "the end of its time")
             assert rig.machines.sent == []
-            while rig.host.groups.storing is not None:
-                await rig.answer()
+            await rig.answer_all()
             assert rig.machines.sent == []
             assert [line["place"] for line in rig.lines if line.get("note") == "withdrawn"] == ["b.working"]
 
@@ -323,9 +326,8 @@ def test_nobody_is_told_that_the_host_is_at_rest_before_the_disk_has_answered() 
             assert not quiet.done()
             assert rig.host.situation().state is State.RUNNING
             await rig.answer()
-            while rig.host.groups.storing is not None:  # its machine has taken the command, which is kept as well
-                await rig.answer()
-            await asyncio.wait_for(quiet, 10)
+            await rig.answer_all()  # its machine has taken the command, which is kept as well
+            await asyncio.wait_for(quiet, PATIENCE_S)
 
     asyncio.run(main())
 
@@ -339,7 +341,7 @@ def test_a_run_ends_when_its_last_sync_is_over_and_not_before() -> None:
             await turns()
             assert not ending.done()
             await rig.answer()
-            assert (await asyncio.wait_for(ending, 10)).state is State.STOPPED
+            assert (await ended_within(ending, PATIENCE_S)).state is State.STOPPED
             assert rig.lines[-1]["end"] == "stopped"
 
     asyncio.run(main())
@@ -360,8 +362,7 @@ def test_a_disk_that_stands_still_lets_the_host_get_so_far_ahead_and_no_more(
             ahead = len(rig.host.recorder.unwritten) + len(rig.host.acts.outbox)
             assert 20 < ahead < 30
             assert rig.host.acts.posted
-            while rig.host.groups.storing is not None:
-                await rig.answer()
+            await rig.answer_all()
             assert not rig.host.acts.posted
             assert rig.host.is_quiet
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
-from support.hosts import ALL_IN_ONE, ONE_EACH, TOGETHER, Cell
+from support.hosts import ALL_IN_ONE, ONE_EACH, TOGETHER, Cell, ended_within
 
 from firable.decompose import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
@@ -389,7 +389,7 @@ def test_a_cell_whose_driver_cannot_keep_work_out_ends_its_cycle_with_the_machin
         host.stop(at_end_of_cycle=True)
         assert not host.situation().message, "of a whole cell the end of the cycle is that it is empty"
         begun = host.recorder.firings["G1"]
-        ended = await asyncio.wait_for(ending, 100)
+        ended = await ended_within(ending, 100)
         assert (ended.state, ended.message) == (State.STOPPED, "stopped at the end of the cycle")
         assert [str(one) for one in ended.blocked] == ["G1 is barred by the operator: no new work comes in"]
         assert host.recorder.marking == decomposition.net.initial_marking
@@ -407,7 +407,7 @@ def test_a_host_that_ends_its_cycle_takes_no_new_work_and_ends_alone(tmp_path: P
         host.stop(at_end_of_cycle=True)
         alone = "conveyor alone is waited for; the cell may not be empty"
         assert alone in host.situation().message
-        situation = await asyncio.wait_for(cell.tasks[("conveyor",)], 100)
+        situation = await ended_within(cell.tasks[("conveyor",)], 100)
         assert situation.state is State.STOPPED
         controller = host.controllers["conveyor"]
         assert controller.marking == controller.subnet.initial_marking
@@ -515,7 +515,7 @@ def test_an_emergency_stop_needs_neither_coordinator_nor_link(tmp_path: Path) ->
         assert isinstance(driver, DryRunDriver)
         robot.emergency_stop("a person in the cell")
         assert driver.is_stopped, "before it returns"
-        ended = await asyncio.wait_for(cell.tasks[ROBOT], 5)
+        ended = await ended_within(cell.tasks[ROBOT], 5)
         assert ended.message == "emergency stop: a person in the cell"
         cell.start(CENTRE)
         await asyncio.sleep(1)

@@ -16,6 +16,7 @@ from support.examples import seeds
 from firable.executor import State, execute
 from firable.executor.cell.plant import Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.bench import until
 from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.journal.journal import MemoryJournal
 from firable.executor.operating.host import Host
@@ -128,9 +129,7 @@ def test_operator_who_is_there_resumes_a_run(tmp_path: Path) -> None:
     async def resumes(host: Any) -> None:
         await host.quiet()
         assert host.situation().state is State.HELD
-        while host.situation().state is State.HELD:
-            await asyncio.sleep(0.1)
-            host.resume()
+        await until(host.resume, "the answers of the machines")
 
     left = half_done(tmp_path)
     looked = run_here(left)[0].situation  # to look changes nothing

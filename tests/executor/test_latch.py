@@ -15,6 +15,7 @@ from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.restart import uncertain
+from firable.executor.operating.service import patience_with
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import Answer
 from firable.nets.interchange import net_digest
@@ -25,10 +26,12 @@ from firable.semantics.trace import Noted, parse_trace
 async def executed(one: Served, operator: Callable[[Host], Awaitable[None]], said: list[str]) -> tuple[Situation, str]:
     """Run the net on a served cell with an operator; the trace must be one of the net, whatever happened between."""
     stream = io.StringIO()
+    driver = bound_driver(one.binding, NET)
     host = Host(
         DECOMPOSITION,
-        bound_driver(one.binding, NET),
+        driver,
         Recorder(NET, net_digest(NET), stream),
+        patience=patience_with(driver),
         operator=operator,
         tell=lambda kind, sentence: said.append(f"{kind}: {sentence}"),
         latched=partial(bound_driver, one.binding, NET, latched=True),

@@ -13,7 +13,7 @@ from support import free_parts as planted
 from support.examples import FIRST_SEED, seeds
 from support.free_parts import freed
 from support.gated_nets import GATE_READ_AGAIN
-from support.hosts import ONE_EACH, TOGETHER, Cell
+from support.hosts import ONE_EACH, TOGETHER, Cell, ended_within
 from support.layered_nets import shared_robot
 from support.local_tie import LocalTie
 from support.net_tie import NetTie
@@ -91,7 +91,7 @@ class NothingIsOpen:
 @pytest.mark.parametrize("name", SMALL)
 def test_no_order_is_open_for_a_controller_that_has_left(name: str, free: bool, faults: str) -> None:
     watch = NothingIsOpen()
-    explore(Explorer(cut(name, free=free)), FAULTS[faults], max_configurations=800, watch=watch)
+    explore(Explorer(cut(name, free=free)), FAULTS[faults], max_configurations=400, watch=watch)
     assert watch.left > 0
 
 
@@ -100,14 +100,14 @@ def test_no_order_is_open_for_a_controller_that_has_left(name: str, free: bool, 
 def test_every_act_of_who_leaves_is_some_actions_of_the_proof(name: str, free: bool) -> None:
     decomposition = cut(name, free=free)
     for budget in (LEAVE, Budget(leaving=1, copies=1), Budget(leaving=1, crashes=1)):
-        explore(Explorer(decomposition), budget, max_configurations=1000, watch=LocalTie(decomposition))
+        explore(Explorer(decomposition), budget, max_configurations=600, watch=LocalTie(decomposition))
 
 
 @pytest.mark.parametrize("name", ["ring", "local_conflict", "gate_read_again"])
 def test_every_act_of_who_leaves_is_firings_of_the_protocol_net(name: str) -> None:
     decomposition = cut(name, free=False)
     tie = NetTie(protocol_net(decomposition))
-    explore(Explorer(decomposition), LEAVE, max_configurations=1500, watch=tie)
+    explore(Explorer(decomposition), LEAVE, max_configurations=1000, watch=tie)
     assert tie.untold == 0
 
 
@@ -235,7 +235,7 @@ def test_hosts_that_are_stopped_in_any_order_end_clean(after: float, free: bool,
         assert all(situation.state is State.STOPPED for situation in ended.values())
         assert cell.replayed().firings == cell.firings()
 
-    for i, order in enumerate([ONE_EACH, ONE_EACH[::-1], *draw.sample(ORDERS, 7)]):
+    for i, order in enumerate([ONE_EACH, ONE_EACH[::-1], *draw.sample(ORDERS, 4)]):
         folder = tmp_path / str(i)
         folder.mkdir()
         run_in_virtual_time(main(order, PAUSES_SECONDS[i % 3], folder))
@@ -246,7 +246,7 @@ def test_a_host_that_is_stopped_alone_does_not_wait_for_the_others_to_end(tmp_pa
         cell = Cell(tmp_path, free=True)
         await asyncio.sleep(5.1)
         cell.hosts["robot",].stop()
-        await asyncio.wait_for(cell.tasks["robot",], 1)
+        await ended_within(cell.tasks["robot",], 1)
         await cell.stop()
 
     run_in_virtual_time(main())
@@ -260,7 +260,7 @@ def test_an_order_that_comes_when_the_votes_are_taken_back_is_carried_out_before
         await asyncio.sleep(after)
         host = cell.hosts["conveyor",]
         host.stop(at_end_of_cycle=True)
-        situation = await asyncio.wait_for(cell.tasks["conveyor",], 60)
+        situation = await ended_within(cell.tasks["conveyor",], 60)
         assert situation.state is State.STOPPED
         controller = host.controllers["conveyor"]
         assert controller.marking == controller.subnet.initial_marking
@@ -282,7 +282,7 @@ def test_a_host_whose_coordinator_is_frozen_ends_all_the_same_and_says_what_may_
         coordinator = cell.hosts[COORDINATOR,]
         coordinator.acts.hear = Mock()  # type: ignore[method-assign]
         cell.hosts["robot",].stop()
-        situation = await asyncio.wait_for(cell.tasks["robot",], 3)
+        situation = await ended_within(cell.tasks["robot",], 3)
         assert "'robot' has taken its votes back, and waits for the coordinator" in situation.message
         for task in cell.tasks.values():
             task.cancel()

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.hosts import Cell
+from support.hosts import Cell, ended_within
 from support.watched_runs import CELLS, run_of, slower
 
 from firable.decompose.splitting.cut import split
-from firable.executor.cell.plant import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.cell.disturbances import Disturbance, NeverCompletes, StuckSensor
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.operating.local_monitor import LocalMonitor
 from firable.executor.operating.monitor import Divergence
@@ -64,7 +64,7 @@ def diverges(cell: str, controllers: list[str], trace: Trace) -> Divergence | No
 
 @pytest.mark.parametrize("cell", CELLS)
 def test_machines_that_keep_to_their_plant_file_diverge_at_no_host(cell: str) -> None:
-    for seed in range(3):
+    for seed in range(2):
         trace = run_of(cell, seed=seed)
         for controller in names(cell):
             assert diverges(cell, [controller], trace) is None, controller
@@ -212,7 +212,7 @@ def test_a_host_tells_that_its_machine_is_too_slow_with_the_place_and_can_end_th
 
         (tmp_path / "stops").mkdir()
         cell = StoppingCell(tmp_path / "stops", seconds=4.0)
-        situation = await asyncio.wait_for(cell.tasks["robot",], 60)
+        situation = await ended_within(cell.tasks["robot",], 60)
         assert "the machines are not as they are modelled" in situation.message
         await cell.stop()
 

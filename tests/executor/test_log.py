@@ -14,7 +14,7 @@ from support.cells import decomposition_of, plant_of
 from firable.cli.log import log_to
 from firable.cli.main import main
 from firable.executor import State, Watch, execute
-from firable.executor.cell.plant import NeverCompletes
+from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.operating.log import Log, logger_to
 from firable.executor.operating.situation import Situation
 from firable.nets.diagnostics import InputError

@@ -8,7 +8,7 @@ import pytest
 from support.watched_runs import CELLS, run_of, slower
 
 from firable.decompose.splitting.cut import split
-from firable.executor.cell.plant import NeverCompletes, StuckSensor
+from firable.executor.cell.disturbances import NeverCompletes, StuckSensor
 from firable.executor.operating.monitor import Divergence, Monitor, watch
 from firable.executor.operating.running import RunReport, Watch, execute
 from firable.executor.operating.situation import State

@@ -85,7 +85,7 @@ def test_without_faults_every_act_is_firings_of_the_protocol_net_and_all_there_i
 def test_with_a_fault_every_act_is_firings_of_the_protocol_net_as_far_as_it_is_explored(
     name: str, budget: Budget
 ) -> None:
-    tie, space = tied(name, budget, 800)
+    tie, space = tied(name, budget, 500)
     assert tie.untold == 0 or budget.crashes
     assert tie.untold < space.steps / 10
 
@@ -112,7 +112,7 @@ def test_every_act_with_free_parts_is_firings_of_the_protocol_net_that_has_them(
     decomposition, protocol = built_free(name)
     assert decomposition.free
     tie = NetTie(protocol)
-    space = explore(Explorer(decomposition), budget, max_configurations=900, watch=tie)
+    space = explore(Explorer(decomposition), budget, max_configurations=500, watch=tie)
     assert tie.kinds["decide"] > 0
     assert tie.kinds["hear"] > 0
     assert tie.untold == 0 or budget.crashes
@@ -125,7 +125,7 @@ def test_on_ways_through_the_cells_with_free_parts_every_act_is_firings_of_the_p
     for name in CELLS:
         decomposition, protocol = built_free(name)
         tie = NetTie(protocol)
-        wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 60, tie)
+        wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 40, tie)
         kinds += tie.kinds
     assert set(kinds) >= KINDS
 
@@ -135,7 +135,7 @@ def test_on_ways_through_the_cells_with_free_parts_every_act_is_firings_of_the_p
 def test_on_ways_through_drawn_nets_with_free_parts_every_act_is_firings_of_the_protocol_net(family: str) -> None:
     for seed in seeds(5):
         decomposition, protocol = built_free(f"{family} {seed}")
-        wander(Explorer(decomposition), Budget(2, 2, 2, 2), seed, 60, NetTie(protocol))
+        wander(Explorer(decomposition), Budget(2, 2, 2, 2), seed, 40, NetTie(protocol))
 
 
 OF_FREE: list[tuple[type[Any], str, Budget]] = [
@@ -181,7 +181,7 @@ def test_on_ways_through_the_cells_every_act_is_firings_of_the_protocol_net() ->
     for name in CELLS:
         decomposition, protocol = built(name)
         tie = NetTie(protocol)
-        wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 60, tie)
+        wander(Explorer(decomposition), Budget(2, 2, 2, 2), FIRST_SEED, 40, tie)
         kinds += tie.kinds
     assert set(kinds) >= KINDS
 
@@ -191,7 +191,7 @@ def test_on_ways_through_the_cells_every_act_is_firings_of_the_protocol_net() ->
 def test_on_ways_through_drawn_nets_every_act_is_firings_of_the_protocol_net(family: str) -> None:
     for seed in seeds(5):
         decomposition, protocol = built(f"{family} {seed}")
-        wander(Explorer(decomposition), Budget(2, 2, 2, 2), seed, 60, NetTie(protocol))
+        wander(Explorer(decomposition), Budget(2, 2, 2, 2), seed, 40, NetTie(protocol))
 
 
 # --- A drift of the code is found

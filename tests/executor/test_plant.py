@@ -4,16 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from firable.executor.cell.plant import (
-    CommandDone,
-    Disturbance,
-    NeverCompletes,
-    Plant,
-    PlantFault,
-    PlantReport,
-    SensorChanged,
-    StuckSensor,
-)
+from firable.executor.cell.disturbances import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.cell.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.plant_file import PlantModel, misfits, parse_plant, read_plant

@@ -81,7 +81,7 @@ def test_joint_traces_of_the_cells_are_traces_of_the_central_net(name: str, kind
     assert sum(fired(decomposition_of(name), seed, kinds, 2000) for seed in seeds(4)) > 40
 
 
-@examples(120)
+@examples(60)
 @given(owned_nets(), st.integers(0, 2**16), st.sampled_from(NETWORKS))
 def test_joint_traces_of_random_nets_are_traces_of_the_central_net(net: Net, seed: int, kinds: tuple[str, ...]) -> None:
     fired(split(net), seed, kinds, 300)
@@ -238,7 +238,7 @@ def test_value_from_before_a_command_is_not_taken_for_its_completion() -> None:
     assert beside_keeping(controller.fire()) == [Firing("back")]
 
 
-@examples(75)
+@examples(38)
 @given(owned_nets(), st.integers(0, 2**16), st.sampled_from(NETWORKS))
 def test_rounds_side_by_side_never_meet_at_a_promise(net: Net, seed: int, kinds: tuple[str, ...]) -> None:
     class Alone(LocalController):
@@ -298,7 +298,7 @@ def test_closed_rounds_are_forgotten() -> None:
     assert max(len(machine.closed) for machine in machines if machine is not None) <= 2
 
 
-@examples(100)
+@examples(50)
 @given(owned_nets(), st.data())
 def test_compiled_transitions_are_enabled_and_fire_as_the_reference_says(net: Net, data: st.DataObject) -> None:
     player, reference = TokenPlayer.of(net), Player(net)

@@ -1,6 +1,5 @@
 """Running a bundle: its right to run, and the trace that is left of the run."""
 
-import asyncio
 import gc
 import subprocess
 import sys
@@ -11,6 +10,7 @@ import pytest
 from support.cells import decomposition_of, firings, plant_of
 from support.evidence_names import document_naming
 
+from firable.executor.drivers.bench import until
 from firable.executor.operating.host import Host
 from firable.executor.operating.running import load, run
 from firable.nets.bundle import Bundle, write_bundle
@@ -112,8 +112,7 @@ def test_refused_run_leaves_an_older_trace_as_it_is(tmp_path: Path) -> None:
 
 def test_trace_is_on_disk_as_far_as_it_goes_while_the_run_waits(tmp_path: Path) -> None:
     async def operator(host: Host) -> None:
-        while firings(host) < 3:
-            await asyncio.sleep(0.5)
+        await until(lambda: firings(host) == 3, "three firings")
         await host.quiet()
         so_far.append(parse_trace((tmp_path / "trace").read_text("utf-8")))
 

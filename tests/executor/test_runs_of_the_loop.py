@@ -13,7 +13,7 @@ from functools import cache
 import pytest
 
 from firable.decompose.splitting.cut import split
-from firable.executor.cell.plant import Disturbance, NeverCompletes
+from firable.executor.cell.disturbances import Disturbance, NeverCompletes
 from firable.executor.operating.running import execute
 from firable.executor.operating.situation import State
 from firable.nets.catalogue import catalogue_net, catalogue_plant

@@ -55,13 +55,13 @@ def shown(done: Campaign) -> str:
 @pytest.mark.seeds
 @pytest.mark.parametrize("name", CELLS)
 def test_runs_of_a_cell_through_faults_are_traces_of_it_and_go_on(name: str) -> None:
-    done = campaign(lambda _: cell(name), map(Run, seeds(250)))
+    done = campaign(lambda _: cell(name), map(Run, seeds(125)))
     assert not done.failed, shown(done)
 
 
 @pytest.mark.seeds
 def test_runs_of_drawn_nets_through_faults_are_traces_of_them_and_go_on() -> None:
-    done = campaign(lambda seed: drawn(seed // 10), map(Run, seeds(1500)))
+    done = campaign(lambda seed: drawn(seed // 10), map(Run, seeds(750)))
     assert not done.failed, shown(done)
     # Everything that can go wrong did, in one run or the other.
     happened = ("kills", "restarts", "partitions", "stops", "steps", "doubled", "lost", "questions", "sent again")
@@ -70,7 +70,7 @@ def test_runs_of_drawn_nets_through_faults_are_traces_of_them_and_go_on() -> Non
 
 @pytest.mark.seeds
 def test_runs_of_drawn_nets_in_layers_through_faults_are_traces_of_them_and_go_on() -> None:
-    done = campaign(lambda seed: drawn(seed // 10, "drawn-layered"), map(Run, seeds(200)))
+    done = campaign(lambda seed: drawn(seed // 10, "drawn-layered"), map(Run, seeds(100)))
     assert not done.failed, shown(done)
 
 
@@ -88,7 +88,7 @@ def drawn_free(number: int, family: str) -> Subject:
 @pytest.mark.seeds
 @pytest.mark.parametrize("name", ["one_robot", "two_robots_shared", "one_robot_timed"])
 def test_runs_of_a_cell_with_free_parts_are_traces_of_it_and_go_on(name: str) -> None:
-    done = campaign(lambda _: free_in(name), map(Run, seeds(60)))
+    done = campaign(lambda _: free_in(name), map(Run, seeds(30)))
     assert free_in(name).decomposition.free
     assert not done.failed, shown(done)
 
@@ -96,7 +96,7 @@ def test_runs_of_a_cell_with_free_parts_are_traces_of_it_and_go_on(name: str) ->
 @pytest.mark.seeds
 @pytest.mark.parametrize("family", DRAWN)
 def test_runs_of_drawn_nets_with_free_parts_are_traces_of_them_and_go_on(family: str) -> None:
-    done = campaign(lambda seed: drawn_free(seed // 10, family), map(Run, seeds(120)))
+    done = campaign(lambda seed: drawn_free(seed // 10, family), map(Run, seeds(60)))
     assert any(drawn_free(number, family).decomposition.free for number in range(12))
     assert not done.failed, shown(done)
 
@@ -132,7 +132,7 @@ def test_part_that_is_free_and_may_not_be_is_found(net: Net) -> None:
 @pytest.mark.seeds
 def test_runs_with_time_limits_through_faults_are_traces_of_the_net_and_keep_the_limits() -> None:
     timed = (Subject(split(TWO_TIMES)), cell("one_robot_timed"))
-    done = campaign(lambda seed: (*timed, drawn(seed // 20, "drawn-timed"))[seed % 3], map(Run, seeds(600)))
+    done = campaign(lambda seed: (*timed, drawn(seed // 20, "drawn-timed"))[seed % 3], map(Run, seeds(300)))
     assert not done.failed, shown(done)
     assert done.counts["timers set"] > 50
     assert {"go_timeout", "spin_timeout", "again", "robot.to_cv1_timeout"} <= {t.removeprefix("a.") for t in done.fired}

@@ -29,7 +29,7 @@ def wide() -> Decomposition:
     return split(Net("wide", places, moves, controllers=(Controller("a"),)))
 
 
-@examples(100)
+@examples(50)
 @given(st.lists(WORDS, min_size=1, max_size=6))
 def test_pieces_that_changed_are_with_those_before_the_whole_word(words: list[int]) -> None:
     journal = MemoryJournal()
@@ -45,7 +45,7 @@ def test_only_pieces_that_changed_are_written() -> None:
     assert [keep.key for keep in changed_pieces(word, changed)] == ["word/7", "word/11"]
 
 
-@examples(100)
+@examples(50)
 @given(WORDS, st.integers(-1, 4 * PIECE_BITS))
 def test_bits_behind_one_are_all_bits_in_a_circle(mask: int, last: int) -> None:
     assert list(bits(mask)) == [at for at in range(mask.bit_length()) if mask >> at & 1]

@@ -15,8 +15,9 @@ from support.rehearsals import BAD, ORDERLY, rehearsed
 from support.timed_nets import HANDOVER, timed_nets
 
 from firable.decompose.splitting.cut import split
-from firable.executor.cell.plant import NeverCompletes
+from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.bench import until
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.operating.running import RunReport, execute
 from firable.executor.operating.situation import State, blocked
@@ -219,7 +220,7 @@ def test_a_timer_that_was_set_before_a_crash_is_not_set_after_it() -> None:
 # --- Bad networks, crashes
 
 
-@examples(60)
+@examples(30)
 @given(timed_nets(), st.integers(0, 2**16), st.sampled_from([ORDERLY, BAD]))
 def test_joint_traces_of_nets_with_time_limits_are_traces_of_the_central_net(
     net: Net, seed: int, kinds: tuple[str, ...]
@@ -253,10 +254,9 @@ def test_a_host_that_is_cut_off_takes_the_timeout_of_its_machine_alone(tmp_path:
         cell = Cell(tmp_path, name="one_robot_timed")
         host = cell.hosts[ROBOT]
         assert isinstance(host.driver, DryRunDriver)
-        while "robot.back" not in host.marking:
-            await asyncio.sleep(0.1)
-            if "robot.put_mc" in host.marking:
-                host.driver.seconds = 1000.0  # so that the next motion, that back, never ends
+        await until(lambda: "robot.put_mc" in host.marking, "the motion before that back")
+        host.driver.seconds = 1000.0  # so that the next one never ends
+        await until(lambda: "robot.back" in host.marking, "the motion back")
         cell.exchange.cut(cell.links[ROBOT])
         await asyncio.sleep(4.7)
         assert "robot.back" in host.marking

@@ -26,6 +26,13 @@ TOGETHER = (("system", COORDINATOR), ("robot", "mc"), ("conveyor",))
 ALL_IN_ONE = ((COORDINATOR, "system", "robot", "mc", "conveyor"),)
 
 
+async def ended_within(host: asyncio.Task[Situation], seconds: float) -> Situation:
+    """How a host ends that ends in time. To give up waiting as `wait_for` does would stop it, and pass for its end."""
+    await asyncio.wait([host], timeout=seconds)
+    assert host.done(), f"it has not ended within {seconds:g} s"
+    return host.result()
+
+
 class Cell:
     """The hosts of the one-robot cell; `of` says which machines each runs."""
 

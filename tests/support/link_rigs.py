@@ -18,7 +18,7 @@ from firable.executor.protocol.messages import Message
 from firable.nets.diagnostics import Diagnostic
 
 CONTROLLERS = ("system", "robot", "mc", "conveyor")
-PATIENCE_SECONDS = 30.0
+PATIENCE_SECONDS = 60.0
 
 
 @dataclass

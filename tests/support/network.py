@@ -13,7 +13,7 @@ PREFIX = "10.213.7"
 
 
 def _run(*command: str) -> str:
-    return subprocess.run(command, check=True, capture_output=True, timeout=20).stdout.decode()
+    return subprocess.run(command, check=True, capture_output=True, timeout=60).stdout.decode()
 
 
 class Network:
@@ -40,7 +40,7 @@ class Network:
     def remove(self) -> None:
         """Remove all that was made."""
         for name in (self.hub, *self.names):
-            subprocess.run(["ip", "netns", "del", name], check=False, capture_output=True, timeout=20)
+            subprocess.run(["ip", "netns", "del", name], check=False, capture_output=True, timeout=60)
 
     def within(self, host: int) -> list[str]:
         """What a command begins with that runs on host `host`."""

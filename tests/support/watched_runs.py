@@ -3,7 +3,7 @@
 import io
 
 from firable.decompose.splitting.cut import split
-from firable.executor.cell.plant import Disturbance
+from firable.executor.cell.disturbances import Disturbance
 from firable.executor.operating.running import execute
 from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.machines.plant_file import Move, PlantModel

@@ -197,13 +197,16 @@ def test_a_contact_of_the_emergency_stop_that_would_stop_nothing_is_refused(
     assert found in refusal(edited("signals:", stop), fit=found == ("F5101", "14: controllers"))
 
 
-def test_a_host_looks_at_the_contacts_of_its_controllers_and_writes_nothing_to_a_device_of_others() -> None:
+def test_a_host_with_all_controllers_drives_what_is_behind_a_contact_and_one_of_several_does_not_have_it() -> None:
     (part,) = split(NET).subnets
     far = "  far:\n    driver: modbus-tcp\n    host: 10.0.0.2\n    safe: {coil 9: false}\nemergency_stop:"
     door = STOP.replace("device: plc", "device: far").replace("emergency_stop:", far)
     driver = bound_driver(parse_binding(edited("signals:", door)), NET, part)
     assert set(driver.readings()) == {"M.there", "emergency stop door"}
-    assert (driver.devices["plc"].document.safe, driver.devices["far"].document.safe) == ({"coil 1": "false"}, {})
+    assert (driver.devices["plc"].document.safe, driver.devices["far"].document.safe) == (
+        {"coil 1": "false"},
+        {"coil 9": "false"},
+    )
     others = NET.controllers[0].name
     binding = parse_binding(edited("signals:", door.replace("discrete 3", "discrete 3, controllers: [N]")))
     assert set(binding.serving({"M.there"}, [others]).document.devices) == {"plc"}

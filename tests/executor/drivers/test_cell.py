@@ -6,18 +6,19 @@ from collections.abc import Callable
 
 from support.served_cells import DECOMPOSITION, NET, Served, served
 
-from firable.executor.cell.plant import Drops, NeverCompletes
+from firable.executor.cell.disturbances import Drops, NeverCompletes
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.service import patience_with
 from firable.executor.operating.situation import Situation, State
 from firable.nets.interchange import net_digest
 from firable.semantics.replaying import replay
 from firable.semantics.trace import parse_trace
 
 
-async def executed(one: Served, done: Callable[[], object], *, overdue_seconds: float = 20.0) -> Situation:
+async def executed(one: Served, done: Callable[[], object], *, overdue_seconds: float = 60.0) -> Situation:
     """Run the net on a served cell until something is so; the trace must be one of the net."""
 
     async def operator(host: Host) -> None:
@@ -27,7 +28,8 @@ async def executed(one: Served, done: Callable[[], object], *, overdue_seconds: 
     stream = io.StringIO()
     recorder = Recorder(NET, net_digest(NET), stream)
     driver = bound_driver(one.binding, NET)
-    host = Host(DECOMPOSITION, driver, recorder, operator=operator, overdue_seconds=overdue_seconds)
+    patience = patience_with(driver)
+    host = Host(DECOMPOSITION, driver, recorder, operator=operator, overdue_seconds=overdue_seconds, patience=patience)
     situation = await host.main()
     assert replay(NET, parse_trace(stream.getvalue())).complete
     return situation
@@ -80,21 +82,9 @@ def test_machine_that_hangs_is_a_fault_and_the_others_are_stopped() -> None:
 def test_workpiece_that_is_dropped_is_missed_where_it_should_be() -> None:
     async def main() -> None:
         async with served(1, Drops("R", "MOVE", 2)) as one:
-            situation = await executed(one, lambda: one.cell.fault, overdue_seconds=20.0)
+            situation = await executed(one, lambda: one.cell.fault)
             assert "has lost the workpiece" in one.cell.fault or "holds nothing" in one.cell.fault
             assert situation.state in {State.STOPPED, State.FAULT}
             assert one.plant.inside == ()
-
-    asyncio.run(main())
-
-
-def test_host_of_some_machines_takes_from_the_binding_what_is_its_own() -> None:
-    async def main() -> None:
-        async with served(0) as one:
-            (mc,) = [subnet for subnet in DECOMPOSITION.subnets if subnet.name == "mc"]
-            driver = bound_driver(one.binding, NET, mc)
-            assert set(driver.devices) == {"modbus", "serial"}
-            assert set(driver.readings()) == {"mc.part_present", "emergency stop button"}
-            assert not driver.devices["modbus"].document.safe  # which is another's to drive
 
     asyncio.run(main())

@@ -8,12 +8,12 @@ import pytest
 from support.third_party_driver import MEMORIES, MemoryConnection, MemoryEnd
 
 from firable.executor.drivers import kinds
-from firable.executor.drivers.bench import Heard
+from firable.executor.drivers.bench import PATIENCE_S, Heard, until
 from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.device import Point, Value, Writes
 
-BINDING = """{firable_bind: 1, cell: c, devices: {D: {driver: theirs, memory: stopping, timeout_s: 0.5, retry_s: 0.02,
+BINDING = """{firable_bind: 1, cell: c, devices: {D: {driver: theirs, memory: stopping, timeout_s: 5, retry_s: 0.02,
 safe: {output: false}}}}"""
 
 
@@ -28,30 +28,32 @@ def test_safe_outputs_are_driven_and_nothing_after_them(when: str, monkeypatch: 
         await end.start(lambda point, _: written.append(point))
         driver = BoundDriver(parse_binding(BINDING), (), frozenset())
         task = asyncio.create_task(driver.run(heard, heard))
-        await asyncio.wait_for(driver.devices["D"].is_ready.wait(), 5)
-        await asyncio.sleep(0.02)
+        device = driver.devices["D"]
+        await until(lambda: written == ["output"], "the safe outputs of the start")
         written.clear()
         end.faults.delay_s = 0.05
         if when == "link lost":
             await end.cut()
-            await asyncio.sleep(0.05)
+            await until(lambda: not device.is_ready.is_set(), "the loss")
         elif when == "write in flight":
-            driver.devices["D"].force("start", value=True)
-            await asyncio.sleep(0.02)
+            end.faults.delay_s = 60.0
+            device.force("start", value=True)
+            await until(lambda: device.kept.writing is not None, "the write")
+            end.faults.delay_s = 0.0  # of the next one
         driver.stop()
         task.cancel()
         await asyncio.sleep(0.03)
         await end.mend()
         if when == "cancelled twice":
             task.cancel()
-        await asyncio.wait((task,), timeout=5)
+        await asyncio.wait((task,), timeout=PATIENCE_S)
 
     asyncio.run(main())
     assert written == ["output"]
 
 
 TWO = """{firable_bind: 1, cell: c, devices: {D: {driver: theirs, memory: gone, timeout_s: 0.1, retry_s: 0.02,
-safe: {output: false}}, E: {driver: theirs, memory: there, timeout_s: 0.5, safe: {output: false}}}}"""
+safe: {output: false}}, E: {driver: theirs, memory: there, timeout_s: 5, safe: {output: false}}}}"""
 
 
 class Deaf(Heard):
@@ -79,18 +81,16 @@ def test_a_note_that_nobody_can_be_told_keeps_no_device_from_its_safe_outputs(
         await there.start(lambda point, _: written.append(point))
         driver = BoundDriver(parse_binding(TWO), (), frozenset())
         task = asyncio.create_task(driver.run(heard, heard))
-        for device in driver.devices.values():
-            await asyncio.wait_for(device.is_ready.wait(), 5)
-        await asyncio.sleep(0.02)
+        await until(lambda: written and driver.devices["D"].is_ready.is_set(), "the safe outputs of the start")
         await gone.cut()
-        await asyncio.sleep(0.05)
+        await until(lambda: not driver.devices["D"].is_ready.is_set(), "the loss")
         written.clear()
         heard.is_gone = True
         if who == "operator":
             with pytest.raises(BrokenPipeError):
                 driver.stop()
         task.cancel()
-        await asyncio.wait((task,), timeout=5)
+        await asyncio.wait((task,), timeout=PATIENCE_S)
         assert driver.unconfirmed == ("D",)
         assert isinstance(task.exception(), BrokenPipeError)
 
@@ -138,11 +138,9 @@ def test_a_mistake_of_a_library_stops_its_device_as_any_other_and_is_a_fault(
         ends = [MemoryEnd("gone"), MemoryEnd("there")]
         await ends[0].start(lambda point, _: written.append(f"D {point}"))
         await ends[1].start(lambda point, _: written.append(f"E {point}"))
-        driver = BoundDriver(parse_binding(TWO.replace("0.1", "0.5")), (), frozenset())
+        driver = BoundDriver(parse_binding(TWO.replace("timeout_s: 0.1", "timeout_s: 5")), (), frozenset())
         task = asyncio.create_task(driver.run(heard, heard))
-        for device in driver.devices.values():
-            await asyncio.wait_for(device.is_ready.wait(), 5)
-        await asyncio.sleep(0.02)
+        await until(lambda: len(written) == 2, "the safe outputs of the start")
         written.clear()
         if at == "what is shown":  # and shown again at each connection
             monkeypatch.setattr(driver.devices["D"].image, "take", lambda *_: int("x"))
@@ -158,7 +156,7 @@ def test_a_mistake_of_a_library_stops_its_device_as_any_other_and_is_a_fault(
             driver.devices["D"].force("start", value=True)
         else:
             ends[0].show("output", 1)
-        await asyncio.wait((task,), timeout=5)
+        await asyncio.wait((task,), timeout=PATIENCE_S)
         assert isinstance(task.exception(), (AttributeError, ValueError))
         assert all(device.kept.is_safe for device in driver.devices.values())
 

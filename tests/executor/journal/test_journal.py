@@ -69,7 +69,7 @@ WRITES = st.lists(
 )
 
 
-@examples(40)
+@examples(20)
 @given(st.lists(WRITES, max_size=6))
 @pytest.mark.parametrize("kind", ["memory", "sqlite"])
 def test_what_is_synced_is_kept_as_a_dictionary_would(

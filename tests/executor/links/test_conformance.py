@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from support.link_rigs import Heard, Rig, in_process, over_a_serial_line, over_zenoh, running
+from support.link_rigs import PATIENCE_SECONDS, Heard, Rig, in_process, over_a_serial_line, over_zenoh, running
 
 from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Greeting, Link
@@ -61,7 +61,7 @@ class TestLink:
         async def main() -> None:
             async with make() as rig:
                 here, there = rig.link(CENTRE), rig.link(ROBOT)
-                async with asyncio.timeout(30), running(here) as centre, running(there) as robot:
+                async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre, running(there) as robot:
                     await robot.until_told(("connected", COORDINATOR))
                     await deliver(here, robot, COORDINATOR, "robot", TO_CONTROLLER)
                     await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR)
@@ -76,7 +76,7 @@ class TestLink:
         async def main() -> None:
             async with make() as rig:
                 here, there = rig.link(CENTRE), rig.link(replace(ROBOT, names=("system", "robot")))
-                async with asyncio.timeout(30), running(here) as centre, running(there) as both:
+                async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre, running(there) as both:
                     await centre.until_told(("connected", "robot"), ("connected", "system"))
                     await deliver(here, both, COORDINATOR, "robot", TO_CONTROLLER)
                     await deliver(here, both, COORDINATOR, "system", [VoteRequest("system", 9, ("G1",), 0, 0)])
@@ -107,7 +107,7 @@ class TestLink:
         async def main() -> None:
             async with make() as rig:
                 here, there = rig.link(CENTRE), rig.link(ROBOT)
-                async with asyncio.timeout(30), running(here) as centre, running(there) as robot:
+                async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre, running(there) as robot:
                     await robot.until_told(("connected", COORDINATOR))
                     await centre.until_told(("connected", "robot"))
                     rig.cut()
@@ -126,7 +126,7 @@ class TestLink:
         async def main() -> None:
             async with make() as rig:
                 here = rig.link(CENTRE)
-                async with asyncio.timeout(30), running(here) as centre:
+                async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre:
                     for _ in range(2):
                         there = rig.link(ROBOT)
                         async with running(there) as robot:
@@ -141,7 +141,7 @@ class TestLink:
         async def main() -> None:
             async with make() as rig:
                 there = rig.link(ROBOT)
-                async with asyncio.timeout(30), running(there) as robot:
+                async with asyncio.timeout(PATIENCE_SECONDS), running(there) as robot:
                     for _ in range(2):
                         here = rig.link(CENTRE)
                         async with running(here) as centre:

@@ -24,13 +24,13 @@ def test_every_message_of_the_protocol_can_be_sent() -> None:
     assert all(getattr(messages, name) is kind for name, kind in KINDS.items())
 
 
-@examples(200)
+@examples(100)
 @given(MESSAGES)
 def test_a_message_is_read_as_it_was_written(message: Message) -> None:
     assert decode(encode(message)) == message
 
 
-@examples(200)
+@examples(100)
 @given(MESSAGES, st.data())
 def test_no_edited_byte_is_read_as_the_same_message(message: Message, data: st.DataObject) -> None:
     text = bytearray(encode(message))
@@ -40,7 +40,7 @@ def test_no_edited_byte_is_read_as_the_same_message(message: Message, data: st.D
         assert decode(bytes(text)) != message
 
 
-@examples(200)
+@examples(100)
 @given(st.binary(max_size=60))
 def test_noise_is_refused(noise: bytes) -> None:
     with pytest.raises(EncodingError):

@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 import pytest
 
+from firable.executor.drivers.bench import PATIENCE_S, until
 from firable.executor.links.lending import LendingLoop
 
 
 def on_a_thread(work: Callable[[], object]) -> threading.Thread:
-    thread = threading.Thread(target=work)
+    thread = threading.Thread(target=work, daemon=True)  # which a test that fails leaves behind
     thread.start()
     return thread
 
@@ -33,7 +34,7 @@ def test_a_loop_that_sleeps_is_lent_and_does_what_it_was_given_meanwhile() -> No
                 time.sleep(0.0001)
 
         thread = on_a_thread(lending)
-        async with asyncio.timeout(20):  # without its being woken it would sleep that long
+        async with asyncio.timeout(PATIENCE_S):  # without its being woken it would sleep that long
             here.append(await done)
         thread.join()
 
@@ -89,7 +90,7 @@ def test_callbacks_and_what_others_do_exclude_each_other() -> None:
                 await asyncio.to_thread(thread.join)
 
     with asyncio.Runner(loop_factory=LendingLoop) as runner:
-        runner.run(asyncio.wait_for(main(), 20))
+        runner.run(asyncio.wait_for(main(), PATIENCE_S))
     assert set(together) == {1}
 
 
@@ -111,8 +112,7 @@ def test_what_fails_on_a_loan_is_raised_there_and_the_loop_is_given_back() -> No
                 raised.append(error)
 
         thread = on_a_thread(lending)
-        while thread.is_alive():
-            await asyncio.sleep(0.001)
+        await until(lambda: not thread.is_alive(), "the loan")
         assert not loop.is_lent
 
     with asyncio.Runner(loop_factory=LendingLoop) as runner:

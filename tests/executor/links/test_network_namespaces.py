@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from support.network import PREFIX, Network, network
+from support.waiting import PATIENCE_SECONDS, until
 
 from firable.cli.main import main
 from firable.nets.catalogue import catalogue_net
@@ -22,7 +23,6 @@ from firable.semantics.trace import read_trace
 CONTROLLERS = ("system", "robot", "mc", "conveyor")
 """On the hosts 1, 2, 3 and 4; the coordinator is with `system`."""
 ROBOT = 2
-PATIENCE_SECONDS = 40.0
 
 RELAY = """
 import asyncio
@@ -102,11 +102,7 @@ class Cell:
 
     def until(self, condition: Callable[[], bool]) -> None:
         """Wait for something, with patience."""
-        end = time.monotonic() + PATIENCE_SECONDS
-        while not condition():
-            said = {name: self.said(name).read_text() for name in CONTROLLERS}
-            assert time.monotonic() < end, said
-            time.sleep(0.05)
+        until(condition, lambda: {name: self.said(name).read_text() for name in CONTROLLERS}, every_seconds=0.05)
 
     def goes_on(self, transitions: int = 18) -> None:
         """So many transitions of several controllers are fired from now on: nine carry a workpiece through."""

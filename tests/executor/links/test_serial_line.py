@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
 from support.hosts import Cell
-from support.link_rigs import CONTROLLERS, Heard, SerialRig, over_a_serial_line, running
+from support.link_rigs import CONTROLLERS, PATIENCE_SECONDS, Heard, SerialRig, over_a_serial_line, running
 
 from firable.executor.links.framing import PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
 from firable.executor.links.link import COORDINATOR, Greeting
@@ -28,7 +28,7 @@ FRAMES = st.builds(
 )
 
 
-@examples(200)
+@examples(100)
 @given(st.lists(FRAMES, max_size=4), st.integers(1, 50))
 def test_frames_are_read_as_they_were_written_however_the_bytes_come(frames: list[Frame], at_once: int) -> None:
     line = b"".join(map(pack_frame, frames))
@@ -38,7 +38,7 @@ def test_frames_are_read_as_they_were_written_however_the_bytes_come(frames: lis
     assert not reader.damaged
 
 
-@examples(200)
+@examples(100)
 @given(FRAMES, FRAMES, st.data())
 def test_a_damaged_frame_is_dropped_and_the_next_one_read(first: Frame, second: Frame, data: st.DataObject) -> None:
     line = bytearray(pack_frame(first))
@@ -83,7 +83,7 @@ def test_on_a_noisy_line_messages_are_lost_and_none_is_damaged(noise: dict[str, 
             for name in CONTROLLERS:
                 stations.append(rig.link(Greeting("d", (name,))))
             async with (
-                asyncio.timeout(60),
+                asyncio.timeout(PATIENCE_SECONDS),
                 running(here) as centre,
                 running(stations[0]) as a,
                 running(stations[1]) as b,
@@ -129,7 +129,7 @@ def test_a_dead_station_does_not_keep_the_others_waiting() -> None:
     async def main() -> None:
         async with over_a_serial_line() as rig:
             here, there = rig.link(Greeting("d", (COORDINATOR,))), rig.link(Greeting("d", ("robot",)))
-            async with asyncio.timeout(60), running(here), running(there) as robot:
+            async with asyncio.timeout(PATIENCE_SECONDS), running(here), running(there) as robot:
                 await robot.until_told(("connected", COORDINATOR))
                 there.reader = counting = CountingReader()  # a link that runs begins with a reader of its own
                 while len(counting.polls) < 40:
@@ -160,7 +160,7 @@ def test_a_port_that_is_none_is_refused() -> None:
     async def main() -> None:
         link = SerialLink(Greeting("d", ("robot",)), "/dev/no-such-line", addresses_on_a_line(("",), CONTROLLERS), 2)
         with pytest.raises(InputError, match="F5021"):
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(PATIENCE_SECONDS):
                 await link.run(Heard())
 
     asyncio.run(main())
@@ -174,7 +174,7 @@ def test_a_line_that_is_taken_away_ends_the_link() -> None:
         await asyncio.sleep(0.1)
         rig.close()
         with pytest.raises(InputError, match="F5021"):
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(PATIENCE_SECONDS):
                 await task
 
     asyncio.run(main())
@@ -191,7 +191,7 @@ def test_a_message_that_no_frame_holds_ends_the_link() -> None:
                     here.send(COORDINATOR, "robot", Decision("robot", 1, "G" * PAYLOAD_BYTES_MAX, 0, 0))
                     await asyncio.sleep(0.01)
                 with pytest.raises(InputError, match="longer than a frame"):
-                    async with asyncio.timeout(20):
+                    async with asyncio.timeout(PATIENCE_SECONDS):
                         await centre
 
     asyncio.run(main())
@@ -200,7 +200,7 @@ def test_a_message_that_no_frame_holds_ends_the_link() -> None:
 @pytest.mark.parametrize("noise", [0.0, 0.0003])
 def test_hosts_run_a_cell_over_a_line_with_noise(noise: float, tmp_path: Path) -> None:
     async def main() -> None:
-        async with over_a_serial_line() as rig, asyncio.timeout(60):
+        async with over_a_serial_line() as rig, asyncio.timeout(PATIENCE_SECONDS):
             cell = Cell(tmp_path, link=rig.link, seconds=0.005)
             while cell.firings() < 10:
                 await asyncio.sleep(0.05)

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 import zenoh
 from support.certificates import Site
-from support.link_rigs import Heard, free_port, running
+from support.link_rigs import PATIENCE_SECONDS, Heard, free_port, running
 
+from firable.executor.drivers.bench import until
 from firable.executor.links.encoding import encode
 from firable.executor.links.link import COORDINATOR, PROTOCOL_VERSION, Greeting
 from firable.executor.links.zenoh_link import Certificates, ZenohLink, open_to_the_network
@@ -65,7 +66,7 @@ def test_of_two_hosts_with_one_name_the_first_is_heard_until_it_ends() -> None:
         async with running(here) as centre, AsyncExitStack() as until_it_ends:
             one = await until_it_ends.enter_async_context(running(first))
             await centre.until_told(("connected", "robot"))
-            async with asyncio.timeout(30), running(second) as two:
+            async with asyncio.timeout(PATIENCE_SECONDS), running(second) as two:
                 await centre.until_told(("refused", "robot"))
                 assert [problem.code for problem in centre.problems] == ["F5020"]
                 assert "two hosts" in centre.problems[0].message
@@ -92,7 +93,7 @@ def test_what_a_stranger_publishes_is_not_delivered() -> None:
             ZenohLink(CENTRE, listen=[f"tcp/127.0.0.1:{port}"]),
             ZenohLink(ROBOT, join=[f"tcp/127.0.0.1:{port}"]),
         )
-        async with asyncio.timeout(30), running(here) as centre, running(there) as robot:
+        async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre, running(there) as robot:
             await centre.until_told(("connected", "robot"))
             await robot.until_told(("connected", COORDINATOR))
             assert there.session is not None
@@ -120,7 +121,7 @@ def test_an_address_that_is_taken_is_refused() -> None:
             taken.listen()
             link = ZenohLink(CENTRE, listen=[f"tcp/127.0.0.1:{taken.getsockname()[1]}"])
             with pytest.raises(InputError, match="F5021"):
-                async with asyncio.timeout(30):
+                async with asyncio.timeout(PATIENCE_SECONDS):
                     await link.run(Heard())
 
     asyncio.run(main())
@@ -157,8 +158,8 @@ def test_the_session_of_a_link_is_closed_with_it() -> None:
     async def main() -> zenoh.Session:
         link = ZenohLink(CENTRE, listen=[f"tcp/127.0.0.1:{free_port()}"])
         async with running(link):
-            while link.session is None:
-                await asyncio.sleep(0.01)
+            await until(lambda: link.session is not None, "the session")
+            assert link.session is not None
             return link.session
 
     assert asyncio.run(main()).is_closed()

@@ -1,0 +1,185 @@
+"""Emergency stops at the terminal of `--step`, at which others act as well: what is asked, and what an answer moves."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from collections.abc import Callable
+
+import pytest
+from support.cells import decomposition_of
+
+from firable.cli import stepping
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.driver import Answer, Latched
+from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.operating.host import Host
+from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.restart import uncertain
+from firable.executor.operating.situation import Situation, State
+from firable.nets.interchange import net_digest
+from firable.nets.net import Place
+from firable.semantics.replaying import replay
+from firable.semantics.trace import parse_trace
+
+DECOMPOSITION = decomposition_of("one_robot")
+NET = DECOMPOSITION.net
+
+
+class Silent(DryRunDriver):
+    """Machines that cannot say what became of a command."""
+
+    async def ask(self, place: Place, entry: int) -> Answer:
+        del place, entry
+        return Answer.UNKNOWN
+
+
+class Terminal:
+    """A terminal at which what is typed, and what happens elsewhere, was laid down; it remembers what was asked."""
+
+    def __init__(self, host: Host, acts: tuple[Act, ...]) -> None:
+        self.host, self.acts = host, [*acts]
+        self.ahead: list[str] = []
+        """What is typed before it is asked for."""
+        self.asked_for: list[tuple[str, int]] = []
+        """The first word of each question, and how many transitions had fired by then."""
+
+    async def asked(self, prompt: str, is_moot: Callable[[], bool]) -> str | None:
+        if is_moot():
+            raise stepping._MootError
+        self.asked_for.append((prompt.strip().split()[0], sum(self.host.recorder.firings.values())))
+        if self.ahead:
+            return self.ahead.pop(0)
+        while True:
+            await asyncio.sleep(4)
+            if is_moot():
+                raise stepping._MootError
+            if not self.acts:
+                return None
+            act = self.acts.pop(0)
+            if isinstance(act, str):
+                return act
+            act(self)
+
+    def unasked(self) -> bool:
+        if self.ahead:
+            self.ahead.pop(0)
+            return True
+        return False
+
+
+Act = str | Callable[[Terminal], object]
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *acts: Act) -> tuple[Situation, list[tuple[str, int]]]:
+    """A run at whose terminal that is typed, and elsewhere done: how it ended, and what was asked."""
+    stream = io.StringIO()
+
+    def driver() -> Latched:
+        return Silent(DECOMPOSITION.subnets, 10.0)
+
+    recorder = Recorder(NET, net_digest(NET), stream)
+    operator = stepping.stepping(1.0, to_stderr=False)
+    host = Host(DECOMPOSITION, driver(), recorder, operator=operator, latched=driver)
+    terminal = Terminal(host, acts)
+    monkeypatch.setattr(stepping, "_TypedMeanwhile", lambda **_: terminal)
+    situation = run_in_virtual_time(host.main())
+    assert replay(NET, parse_trace(stream.getvalue())).complete
+    return situation, terminal.asked_for
+
+
+def stopped(at: Terminal) -> None:
+    at.host.emergency_stop("a person")
+
+
+def stopped_while_somebody_types(at: Terminal) -> None:
+    asyncio.get_running_loop().call_later(25, at.ahead.extend, ("reset", "reset"))
+    asyncio.get_running_loop().call_later(25, at.host.emergency_stop, "a person")
+
+
+def reset(at: Terminal) -> None:
+    assert at.host.reset() == ()
+
+
+def reset_while_somebody_types(at: Terminal) -> None:
+    reset(at)
+    at.ahead.extend(("conveyor.cv1_run=not-received", "r"))
+
+
+def said(at: Terminal) -> None:
+    (place,) = uncertain(at.host)
+    assert at.host.say(place, Answer.NOT_RECEIVED)
+
+
+def resumed(at: Terminal) -> None:
+    assert at.host.resume()
+
+
+def resumed_until_somebody_types(at: Terminal) -> None:
+    resumed(at)
+    asyncio.get_running_loop().call_later(45, at.ahead.append, "")
+
+
+def test_an_emergency_stop_withdraws_the_question_and_the_way_back_is_typed_in_three_words(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    words = ("", "r", "reset", "conveyor.cv1_run", "conveyor.cv1_run=not-received", "", "e", "r", "", "s")
+    situation, asked = run(monkeypatch, stopped, *words)
+    assert asked == [
+        ("[Enter]", 1),
+        *[("type", 1)] * 3,  # neither Enter nor r resets
+        *[("what", 1)] * 2,
+        *[("[r]", 1)] * 3,  # nor do Enter and e take anything up
+        ("[Enter]", 2),
+        ("[Enter]", 3),
+    ]
+    assert (situation.state, situation.is_emergency) == (State.STOPPED, False)
+
+
+def test_enter_for_the_next_step_takes_up_no_run_that_was_stopped_and_reset_elsewhere_meanwhile(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    situation, asked = run(monkeypatch, stopped, reset, said, "", "", "s")
+    assert asked == [("[Enter]", 1), ("type", 1), ("what", 1), *[("[r]", 1)] * 3]
+    assert (situation.state, situation.message) == (State.STOPPED, "stopped by the operator")
+
+
+def test_a_run_that_is_taken_up_elsewhere_is_paused_at_the_terminal_and_stepped_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    situation, asked = run(monkeypatch, stopped, reset, said, resumed, "", "s")
+    assert [question for question, _ in asked] == ["[Enter]", "type", "what", "[r]", "[Enter]", "[Enter]"]
+    assert asked[-1][1] == asked[-2][1] + 1
+    assert not situation.is_emergency
+
+
+def test_a_run_that_is_resumed_elsewhere_runs_on_until_something_is_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, asked = run(monkeypatch, "", resumed_until_somebody_types, "", "s")
+    assert [question for question, _ in asked] == ["[Enter]"] * 4
+    first, second, third, last = (fired for _, fired in asked)
+    assert (first, second, last) == (1, 2, third + 1)
+    assert third > second + 3
+
+
+def test_what_was_typed_ahead_resets_nothing_and_a_run_that_runs_on_is_latched_as_well(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    situation, asked = run(monkeypatch, stopped_while_somebody_types, "r", "s")
+    assert [question for question, _ in asked] == ["[Enter]", "type"]
+    assert situation.is_emergency
+
+
+def test_what_was_typed_ahead_of_a_reset_elsewhere_takes_nothing_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    situation, asked = run(monkeypatch, stopped, reset_while_somebody_types, said, "s")
+    assert asked == [("[Enter]", 1), ("type", 1), ("what", 1), ("[r]", 1)]
+    assert (situation.state, situation.message) == (State.STOPPED, "stopped by the operator")
+
+
+@pytest.mark.parametrize("last", [("s",), ()], ids=["s", "end of input"])
+def test_who_resets_nothing_ends_the_run_as_an_emergency_stop(
+    last: tuple[Act, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    situation, asked = run(monkeypatch, stopped, *last)
+    assert asked == [("[Enter]", 1), ("type", 1)]
+    assert (situation.state, situation.message) == (State.STOPPED, "emergency stop: a person")
+    assert situation.is_emergency
