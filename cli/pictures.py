@@ -80,7 +80,7 @@ def net_picture(
     from firable.nets.drawing import draw_free, draw_net
 
     drawable(net)
-    _known(net, collapse)
+    refuse_unknown(net, collapse)
     draw: partial[str] = partial(draw_net, net, folded=collapse, given=given, width_max=width or WIDTH_MAX)
     if layout is not None and layout != "lanes":
         draw = partial(draw_free, net, layout=_layouter(layout))
@@ -105,7 +105,7 @@ def net_picture(
     return draw(marking=shown)
 
 
-def _known(net: Net, collapse: tuple[str, ...]) -> None:
+def refuse_unknown(net: Net, collapse: tuple[str, ...]) -> None:
     """Refuse to collapse what the net does not have."""
     names = {"all", *net.place_index, *(controller.name for controller in net.controllers)}
     if unknown := [name for name in collapse if name not in names]:

@@ -4,12 +4,16 @@
 to the name that stands there, and wants every place of that name, in the form that is written there: inside its
 controller a place has its short name, elsewhere the full one. The names are read from the tree of the text alone, so
 that an editor can find its way in a net that is not well formed yet.
+
+A time limit gives a place three names that follow from its own (`nets/time_limits`). They are used like any other, and
+follow it when it is renamed, also where the fault place is declared. Who renames that one means another name for the
+place to which the limit leads, so `within` then says it (`to`); else the limit would lead to a new place.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -17,6 +21,8 @@ from typing import Final
 
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.source import Source
+from firable.nets.time_limits import fault_place_name, fault_transition_name, timer_name
+from firable.nets.yaml_tree import Mapping as TreeMapping
 from firable.nets.yaml_tree import Node, Scalar, entries_of, items_of, parse_tree, scalars_of, value_of
 
 _WORD: Final = re.compile(r"[^\s()\[\],\"]+")
@@ -50,6 +56,24 @@ class Occurrence:
     defines: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A name that follows from that of a place with a time limit: how it does, and where the limit stands."""
+
+    kind: Kind
+    place: str
+    named: Callable[[str], str]
+    within: Node
+
+
+_GIVEN: Final = (
+    ("timer", Kind.SIGNAL, timer_name),
+    ("to", Kind.PLACE, fault_place_name),
+    ("transition", Kind.TRANSITION, fault_transition_name),
+)
+"""What a time limit gives, by the key of `within` that names it otherwise."""
+
+
 class Names:
     """The names of a net file; raises `InputError` where the text is not YAML.
 
@@ -66,15 +90,29 @@ class Names:
 
     @cached_property
     def occurrences(self) -> tuple[Occurrence, ...]:
-        """All of them, in the order of the text; a name that is declared nowhere has none."""
+        """All of them, in the order of the text; a name that is declared nowhere has none, unless a limit gives it."""
         declared = list(self._declared())
-        kinds = {one.name: one.kind for one in declared}
+        kinds = {name: one.kind for name, one in self.given.items()} | {one.name: one.kind for one in declared}
         found = {(one.line, one.column): one for one in declared}
         for scalar, prefix, at, length in self._used():
             word = scalar.text[at : at + length]
             if (place := self._inside(scalar, at, length)) and (kind := kinds.get(prefix + word)):
                 found.setdefault(place, Occurrence(kind, prefix + word, *place, length, prefix))
         return tuple(sorted(found.values(), key=lambda one: (one.line, one.column)))
+
+    @cached_property
+    def given(self) -> Mapping[str, Given]:
+        """The names that follow from time limits, declared or not, by their full names."""
+        scopes = [("", self.tree), *((f"{name}.", body) for name, _, body in entries_of(self.tree, "controllers"))]
+        found = {}
+        for prefix, scope in scopes:
+            for local, _, body in entries_of(scope, "places"):
+                if (within := value_of(body, "within")) is None:
+                    continue
+                for key, kind, named in _GIVEN:
+                    if value_of(within, key) is None:
+                        found[named(prefix + local)] = Given(kind, prefix + local, named, within)
+        return found
 
     def at(self, line: int, column: int) -> Occurrence | None:
         """The name at a line and column (from 1), the column after its last character included."""
@@ -86,32 +124,60 @@ class Names:
         return tuple(other for other in self.occurrences if (other.kind, other.name) == (one.kind, one.name))
 
     def definition(self, one: Occurrence) -> Occurrence:
-        """Where a name is declared."""
-        return next(other for other in self.of(one) if other.defines)
+        """Where a name is declared; of one that a time limit gives and nothing declares, its place."""
+        found = next((other for other in self.of(one) if other.defines), None)
+        if found is not None:
+            return found
+        return next(other for other in self.occurrences if other.defines and other.name == self.given[one.name].place)
 
     def renamed(self, one: Occurrence, new: str) -> str:
-        """The text with a name changed wherever it stands; of a controller also in the full names of its parts.
+        """The text with a name changed wherever it stands; of a controller also in the full names of its parts, of a
+        place with a time limit also in the names that the limit gives.
 
         `new` is the short name; the full one will do. Raises `InputError` F2012 where it is no name, F2001 where
-        something has it already.
+        something has it already, F1020 for a name that a time limit gives and nothing declares.
         """
+        if not any(other.defines for other in self.of(one)):
+            hint = "it follows from a time limit: name it there, beside `within`"
+            raise InputError([Diagnostic("F1020", f"the name '{one.name}' stands nowhere in the file by itself", hint)])
         prefix, _, old = one.name.rpartition(".") if one.kind in {Kind.PLACE, Kind.SIGNAL} else ("", "", one.name)
         new = new.removeprefix(f"{prefix}.") if prefix else new
         if not _LOCAL.fullmatch(new):
             message = f"{new!r} is not a name"
             raise InputError([Diagnostic("F2012", message, "use letters, digits, '_' and '-'")])
         full = f"{prefix}.{new}" if prefix else new
-        taken = {other.name for other in self.occurrences if other.name != one.name}
-        if full in taken:
-            raise InputError([Diagnostic("F2001", f"there is a '{full}' already", "choose another name")])
-        edits = [(other.line, other.column + other.length - len(old), len(old)) for other in self.of(one)]
+        changed = {one.name: full}
+        if one.kind is Kind.PLACE:
+            changed |= {name: limit.named(full) for name, limit in self.given.items() if limit.place == one.name}
+        taken = ({other.name for other in self.occurrences} | self.given.keys()) - changed.keys()
+        if twice := sorted(taken.intersection(changed.values())):
+            raise InputError([Diagnostic("F2001", f"there is a '{twice[0]}' already", "choose another name")])
+        kinds = {one.name: one.kind} | {name: self.given[name].kind for name in changed if name != one.name}
+        parts = [
+            (other.line, other.column, other.length, changed[other.name].removeprefix(other.prefix))
+            for other in self.occurrences
+            if kinds.get(other.name) is other.kind
+        ]
         if one.kind is Kind.CONTROLLER:
-            edits += [
-                (other.line, other.column, len(old))
+            parts += [
+                (other.line, other.column, len(old), new)
                 for other in self.occurrences
                 if not other.prefix and other.name.startswith(f"{old}.") and other.kind is not Kind.CONTROLLER
             ]
-        return self._with_parts((line, column, length, new) for line, column, length in edits)
+        if one.kind is Kind.PLACE and one.name in self.given:
+            parts += self._leading_to(self.given[one.name].within, new)
+        return self._with_parts(parts)
+
+    def _leading_to(self, within: Node, place: str) -> Iterator[tuple[int, int, int, str]]:
+        """What makes a time limit name its fault place: in `{...}` as on lines of its own, or for a time alone."""
+        if isinstance(within, Scalar):
+            yield within.line, within.column, 0, "{time: "
+            yield within.line, within.column + within.length, 0, f", to: {place}}}"
+        elif isinstance(within, TreeMapping):
+            key, _ = next(iter(within.entries.values()))
+            is_flow = self.source.lines[within.line - 1][within.column - 1] == "{"
+            newline = "\r\n" if "\r\n" in self.source.text else "\n"
+            yield key.line, key.column, 0, f"to: {place}" + (", " if is_flow else newline + " " * (key.column - 1))
 
     def replaced(self, names: Mapping[str, str]) -> str:
         """The text in which each full name that is a key of `names` is used under another; declarations stay."""

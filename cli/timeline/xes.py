@@ -7,6 +7,10 @@ are the firings that a controller takes part in (`complete`) and the commands of
 `ate_abort` for one that was broken off).
 
 A global transition is an event of a case of each controller that takes part in it.
+
+The file keeps the rules of the published schema: a version that is a decimal number, names of classifiers without
+blanks, attributes before traces and traces before nothing. It is in the namespace in which tools write such files; the
+schema itself names none.
 """
 
 from __future__ import annotations
@@ -39,7 +43,7 @@ def timestamp(course: Course, at_seconds: float) -> str:
 
 def _lines(course: Course) -> Iterator[str]:
     yield '<?xml version="1.0" encoding="UTF-8"?>'
-    yield '<log xes.version="1849-2016" xes.features="" xmlns="http://www.xes-standard.org/">'
+    yield '<log xes.version="1849.2016" xes.features="" xmlns="http://www.xes-standard.org/">'
     for name, prefix in _EXTENSIONS:
         yield f'  <extension name="{name}" prefix="{prefix}" uri="http://www.xes-standard.org/{prefix}.xesext"/>'
     yield '  <global scope="trace">'
@@ -51,7 +55,7 @@ def _lines(course: Course) -> Iterator[str]:
     yield f'    <date key="time:timestamp" value="{_EPOCH.isoformat(timespec="microseconds")}"/>'
     yield "  </global>"
     yield '  <classifier name="Activity" keys="concept:name"/>'
-    yield '  <classifier name="Activity and lifecycle" keys="concept:name lifecycle:transition"/>'
+    yield '  <classifier name="ActivityAndLifecycle" keys="concept:name lifecycle:transition"/>'
     yield f"  {_string('concept:name', course.net.name)}"
     yield f"  {_string('lifecycle:model', 'standard')}"
     for owner in dict.fromkeys(place.owner or "" for place in course.net.places):

@@ -25,11 +25,25 @@ if TYPE_CHECKING:
     help="The plant file of the cell, or catalogue:NAME, for the top view.  [default: NAME.plant.yaml beside NET]",
 )
 @click.option(
+    "--collapse",
+    metavar="NAME",
+    multiple=True,
+    help="Draw a task as one place at first: the task that a place is in, those of a controller, or `all`; repeatable.",
+)
+@click.option(
     "--port", type=click.IntRange(0, 65535), default=0, show_default=True, help="Where to serve on this host; 0: free."
 )
 @click.option("--read-only", is_flag=True, help="Let nobody edit the net on the page.")
 @click.option("--no-browser", is_flag=True, help="Tell the address, and open no browser.")
-def view(net: str, trace: str | None, plant: str | None, port: int, read_only: bool, no_browser: bool) -> int:
+def view(
+    net: str,
+    trace: str | None,
+    plant: str | None,
+    collapse: tuple[str, ...],
+    port: int,
+    read_only: bool,
+    no_browser: bool,
+) -> int:
     """Show NET in a browser on this host, until Ctrl-C.
 
     Click a transition that may fire, and switch the gates; a transition that may not says what it waits for. The page
@@ -38,14 +52,17 @@ def view(net: str, trace: str | None, plant: str | None, port: int, read_only: b
     Edit on the page changes NET where it is a net file, and keeps its comments and its order; each edit is written to
     the file at once, if the file is a net with it, and can be undone. With --read-only nothing is edited.
 
+    The picture is that of `firable draw`, by the layout file beside NET where there is one.
+
     Top view shows the cell from above where a plant file says what it is made of.
 
     Only this host is served, and only who has the token, which stands in the address that is opened.
     """
     import asyncio
 
-    from firable.cli.pictures import drawable
+    from firable.cli.pictures import drawable, kept_layout, refuse_unknown
     from firable.cli.text import show_diagnostic
+    from firable.cli.view.drawing import Look
     from firable.cli.view.editing import editing_of
     from firable.cli.view.playing import Playing
     from firable.cli.view.runs import Run
@@ -55,6 +72,8 @@ def view(net: str, trace: str | None, plant: str | None, port: int, read_only: b
 
     loaded = load_net(net)
     drawable(loaded.net)
+    refuse_unknown(loaded.net, collapse)
+    look = Look(kept_layout(loaded.net, net), collapse)
     for note in loaded.notes:
         show_diagnostic(note)
     runs = []
@@ -62,7 +81,7 @@ def view(net: str, trace: str | None, plant: str | None, port: int, read_only: b
         run = Run(trace, "the run of that file", read_trace(trace), is_given=True)
         run.to_json(loaded.net)  # what is no run of the net is refused before anything is served
         runs.append(run)
-    playing = Playing(loaded, net, runs, _plant(loaded, net, plant))
+    playing = Playing(loaded, net, runs, _plant(loaded, net, plant), look)
     if plant is not None and playing.misfit:
         raise InputError(misfits(read_machines(plant), loaded.net))
     editing = editing_of(playing, net, read_only=read_only)

@@ -2,12 +2,13 @@
 
 A bar begins when the command is sent and ends with the completion signal; where the place has none, the command is an
 instant. If the token leaves before (a time limit, a jump of the operator), the bar ends unfinished. Of each machine the
-last bars are kept, so a page that is opened later shows them too.
+last bars are kept, so a page that is opened later shows them too; one that follows is told the bars that have changed.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 from typing import Any, Final
 
 from firable.nets.net import Net
@@ -17,14 +18,41 @@ from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChan
 BARS_MAX: Final = 60
 
 
+@dataclass(slots=True)
+class Bar:
+    """A command of a machine: from when to when, and how it ended."""
+
+    number: int
+    machine: str
+    command: str
+    began: float
+    ended: float | None = None
+    how: str = "working"
+    change: int = 0
+    """The change of the lanes with which it came to be as it is."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As the page reads it."""
+        return {
+            "number": self.number,
+            "machine": self.machine,
+            "command": self.command,
+            "from": self.began,
+            "to": self.ended,
+            "end": self.how,
+        }
+
+
 class Lanes:
     """The lanes of a net's machines, kept up to date with the events of a run."""
 
     def __init__(self, net: Net) -> None:
         self.net = net
         self.machines = list(dict.fromkeys(place.command.machine for place in net.places if place.command is not None))
-        self.bars: dict[str, deque[dict[str, Any]]] = {name: deque(maxlen=BARS_MAX) for name in self.machines}
-        self.under_way: dict[str, dict[str, Any]] = {}
+        self.bars: dict[str, deque[Bar]] = {name: deque(maxlen=BARS_MAX) for name in self.machines}
+        self.numbered = 0
+        self.changes = 0
+        self.under_way: dict[str, Bar] = {}
         """The bars that have not ended, by their places."""
         self.waiting_for: dict[str, set[str]] = {}
         """The places whose command a signal completes."""
@@ -39,9 +67,11 @@ class Lanes:
                 place = self.net.place(name)
                 if place.command is None:
                     return
-                bar = {"place": name, "command": str(place.command), "from": at, "to": None, "end": "working"}
-                self.bars[place.command.machine].append(bar)
+                self.numbered += 1
+                bar = Bar(self.numbered, place.command.machine, str(place.command), at)
+                self.bars[bar.machine].append(bar)
                 self.under_way[name] = bar
+                self._changed(bar)
                 if place.completion is None:
                     self._end(name, at, "instant")
             case SignalChanged(at, signal, True):
@@ -60,8 +90,14 @@ class Lanes:
 
     def _end(self, place: str, at: float, how: str) -> None:
         if (bar := self.under_way.pop(place, None)) is not None:
-            bar["to"], bar["end"] = at, how
+            bar.ended, bar.how = at, how
+            self._changed(bar)
 
-    def told(self) -> list[dict[str, Any]]:
-        """All lanes."""
-        return [{"machine": name, "bars": list(self.bars[name])} for name in self.machines]
+    def _changed(self, bar: Bar) -> None:
+        self.changes += 1
+        bar.change = self.changes
+
+    def since(self, change: int) -> list[dict[str, Any]]:
+        """The bars that have changed after a change, by their numbers."""
+        found = (bar for bars in self.bars.values() for bar in bars if bar.change > change)
+        return [bar.to_json() for bar in sorted(found, key=lambda bar: bar.number)]

@@ -25,6 +25,7 @@ from typing import Any, Final
 from aiohttp import web
 
 from firable.cli.view import moment
+from firable.cli.view.drawing import PLAIN, Look, Pictures
 from firable.cli.view.lanes import Lanes
 from firable.cli.view.moment import Moment
 from firable.cli.view.scene import Stage
@@ -34,7 +35,6 @@ from firable.cli.view.votes import votes
 from firable.executor import Host
 from firable.executor.operating.latch import may_stay
 from firable.executor.protocol.token_player import TokenPlayer, Word
-from firable.nets.drawing import draw_net
 from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.nets.net import Net
 from firable.semantics.joining import APPLIED, STANDS, VOTED
@@ -49,15 +49,14 @@ HAPPENED_MAX: Final = 300
 class LivePage:
     """The page of a host, or of a whole run."""
 
-    def __init__(self, host: Host, plant: PlantModel | None = None) -> None:
+    def __init__(self, host: Host, plant: PlantModel | None = None, look: Look = PLAIN) -> None:
         self.host = host
         self.owners = None if host.is_whole else frozenset(host.controllers)
         self.net = host.net if self.owners is None else own_part(host.net, self.owners)
         self.player = TokenPlayer.of(self.net)
         self.lanes = Lanes(self.net)
         self.followers: set[_Follower] = set()
-        self.drawing = asyncio.Lock()
-        self.drawn: str | None = None
+        self.pictures = Pictures(self.net, look)
         self.word: Word = -1
         self.states: dict[str, dict[str, Any]] = {}
         self.stage, self.why_no_view = self._stage(plant)
@@ -73,26 +72,20 @@ class LivePage:
         """The files of the page, what it shows at first, and the stream that it follows."""
         yield from file_routes()
         yield web.get("/api/page", answering(self.page))
+        yield web.post("/api/picture", answering(self.pictures.picture))
         yield web.get("/api/events", self.stream)
 
     async def page(self, _: dict[str, Any]) -> dict[str, Any]:
-        """What is shown at first."""
+        """What is shown at first, but for the picture: that is asked for by itself."""
         here = "" if self.owners is None else ", ".join(self.host.controllers)
         return {
             "mode": "live",
             "here": here,
             "coordinators": [name or "the coordinator" for name in self.host.coordinators],
             "net": moment.structure(self.net),
-            "picture": await self.picture(),
+            "machines": self.lanes.machines,
             "top": top_of(self.stage, self.why_no_view),
         }
-
-    async def picture(self) -> str:
-        """The drawing, made once and beside the event loop: of a large net it takes a second, and the cell runs on."""
-        async with self.drawing:
-            if self.drawn is None:
-                self.drawn = await asyncio.to_thread(draw_net, self.net, marking=0)
-            return self.drawn
 
     def _stage(self, plant: PlantModel | None) -> tuple[Stage | None, str]:
         if self.owners is not None:
@@ -152,7 +145,6 @@ class LivePage:
             situation = host.outcome.result()
         now = self.now()
         self._judge(now)
-        lanes = self.lanes.told()
         return {
             "at": host.now_seconds(),
             "speed": host.speed,
@@ -162,7 +154,7 @@ class LivePage:
             "signals": sorted(now.signals),
             "transitions": follower.news("transition", self.states),
             "waits": [str(one) for one in situation.blocked],
-            "lanes": list(follower.news("lane", {lane["machine"]: lane for lane in lanes}).values()),
+            "bars": follower.bars(self.lanes),
             "votes": list(follower.news("votes", {row["name"]: row for row in votes(host)}).values()),
             "top": self._top(follower),
             "unreached": sorted(host.peers.names - host.peers.connected_to),
@@ -210,7 +202,8 @@ class _Follower:
     """A browser that follows a run: what it was told, and what happened since."""
 
     def __init__(self) -> None:
-        self.told: dict[tuple[str, str], Any] = {}
+        self.told: dict[str, dict[str, Any]] = {}
+        self.lanes_told = 0
         self.events: deque[dict[str, Any]] = deque(maxlen=HAPPENED_MAX)
         self.fired: deque[str] = deque(maxlen=HAPPENED_MAX)
         self.is_new = asyncio.Event()
@@ -234,13 +227,16 @@ class _Follower:
         self.is_new.set()
 
     def news(self, kind: str, of: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        """Those that are others than this follower was told."""
-        found = {}
-        for name, value in of.items():
-            text = json.dumps(value)
-            if self.told.get((kind, name)) != text:
-                self.told[kind, name] = text
-                found[name] = value
+        """Those that are others than this follower was told; who made them changes them no more."""
+        told = self.told.setdefault(kind, {})
+        found = {name: value for name, value in of.items() if told.get(name) != value}
+        told.update(found)
+        return found
+
+    def bars(self, lanes: Lanes) -> list[dict[str, Any]]:
+        """The bars that have changed since this follower was told of them."""
+        found = lanes.since(self.lanes_told)
+        self.lanes_told = lanes.changes
         return found
 
     def happened(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What the page asks when a net is played with: its structure and picture, a moment, a firing, a check, a run.
+"""What the page asks when a net is played with: its structure, its picture, a moment, a firing, a check, a run.
 
 The server holds the net and the runs that were found, and nothing of who plays: `moment.py` says why. A check is done
 beside the event loop, one at a time, so that somebody plays on while it lasts.
@@ -13,12 +13,12 @@ from typing import Any
 from aiohttp import web
 
 from firable.cli.view import moment
+from firable.cli.view.drawing import PLAIN, Look, Pictures
 from firable.cli.view.runs import Run, checked, verdict_json
 from firable.cli.view.scene import Stage
 from firable.cli.view.site import BODY_BYTES_MAX, PUBLIC, answering, file_routes, refusal
 from firable.cli.view.top_view import top_of
 from firable.executor.operating.control import Endpoint, admission
-from firable.nets.drawing import draw_net
 from firable.nets.loading import Loaded
 from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.semantics.player import Player
@@ -27,9 +27,12 @@ from firable.semantics.player import Player
 class Playing:
     """A net that the page plays with, and the runs of it that are known."""
 
-    def __init__(self, loaded: Loaded, file: str, runs: Iterable[Run] = (), plant: PlantModel | str = "") -> None:
+    def __init__(
+        self, loaded: Loaded, file: str, runs: Iterable[Run] = (), plant: PlantModel | str = "", look: Look = PLAIN
+    ) -> None:
         self.loaded = loaded
         self.file = file
+        self.pictures = Pictures(loaded.net, look)
         self.runs = list(runs)
         self.editable = False
         self.plant = plant
@@ -40,6 +43,7 @@ class Playing:
     def take(self, loaded: Loaded) -> None:
         """Another net, after an edit; nothing that was found of the one before is known of it."""
         self.loaded = loaded
+        self.pictures = Pictures(loaded.net, self.pictures.look)
         self.player = Player(loaded.net)
         self.verdicts = None
         self.runs = [run for run in self.runs if run.is_given]
@@ -66,25 +70,29 @@ class Playing:
         """All that is served."""
         yield from file_routes()
         yield web.get("/api/page", answering(self.page))
+        yield web.post("/api/picture", answering(self.picture))
         yield web.post("/api/moment", answering(self.moment))
         yield web.post("/api/fire", answering(self.fire))
         yield web.post("/api/check", answering(self.check))
         yield web.post("/api/run", answering(self.run))
 
     async def page(self, _: dict[str, Any]) -> dict[str, Any]:
-        """What is shown at first."""
+        """What is shown at first, but for the picture: that is asked for by itself."""
         net, stage = self.loaded.net, self.stage
         return {
             "mode": "play",
             "file": self.file,
             "editable": self.editable,
             "net": moment.structure(net),
-            "picture": await asyncio.to_thread(draw_net, net, marking=0),
             "moment": moment.told(self.player, moment.begin(net)),
             "runs": [run.summary() for run in self.runs],
             "verdicts": self.verdicts,
             "top": top_of(stage, self.misfit),
         }
+
+    async def picture(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """The picture, with the tasks folded that the page names."""
+        return await self.pictures.picture(asked)
 
     async def moment(self, asked: dict[str, Any]) -> dict[str, Any]:
         """What may fire at a moment, and how the cell looks once a signal that `became` names has become 1."""

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
+from firable.cli.story import outcome_told
 from firable.cli.view.scene import Stage
 from firable.nets.net import Net
 from firable.nets.verdict import Status, Verdict, Weight
@@ -130,13 +131,14 @@ def runs_of(net: Net, verdicts: tuple[Verdict, ...], discipline: Discipline) -> 
 
 
 def checked(net: Net) -> tuple[tuple[Verdict, ...], tuple[Run, ...]]:
-    """What `check` says of a net within `SECONDS_MAX`, and the runs that show what is violated."""
+    """What `check` says of a net within `SECONDS_MAX`, with what cures it, and the runs that show what is violated."""
     from firable.analysis.check import check
+    from firable.analysis.cures.finding import explained
     from firable.analysis.spaces.reachability import Budget
     from firable.nets.verdict import held_to
 
     discipline = Discipline.INTERLEAVING
-    verdicts = held_to(net.expected, check(net, discipline, Budget(seconds=SECONDS_MAX)).verdicts)
+    verdicts = held_to(net.expected, explained(check(net, discipline, Budget(seconds=SECONDS_MAX))))
     return verdicts, runs_of(net, verdicts, discipline)
 
 
@@ -148,4 +150,5 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         "weight": verdict.weight.value,
         "says": verdict.statement,
         "hint": verdict.hint,
+        "cures": [{"changes": list(cure.changes), "checked": outcome_told(cure)} for cure in verdict.cures],
     }

@@ -1,6 +1,7 @@
 """What a run did, in the formats of other tools: each is read back by its published rules, and tells the same run."""
 
 import json
+import re
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from support.xes_rules import problems
 
 from firable.cli.main import main
 from firable.nets.catalogue import catalogue_net
@@ -116,23 +118,51 @@ def test_perfetto_read_back_tells_each_command_and_nests_what_is_on_a_thread(fol
 
 def test_xes_read_back_tells_each_command_once_and_its_cases_are_cycles(folder: Path, run: Course) -> None:
     log = ET.parse(folder / "run.xes").getroot()
-    assert log.tag == f"{XES}log"
-    order = ["extension", "global", "classifier", "string", "trace"]
-    ranks = [order.index(child.tag.removeprefix(XES)) for child in log]
-    assert ranks == sorted(ranks)
+    assert list(problems(log)) == []
     started = Counter[str]()
     for case in log.iter(f"{XES}trace"):
         assert [flag.attrib["value"] for flag in case.findall(f"{XES}boolean")] == ["true"]
         times = []
         for event in case.findall(f"{XES}event"):
             said = {part.attrib["key"]: part.attrib["value"] for part in event}
-            assert {"concept:name", "lifecycle:transition", "time:timestamp"} <= said.keys()
             times.append(datetime.fromisoformat(said["time:timestamp"]))
             started[said["concept:name"]] += said["lifecycle:transition"] == "start"
         assert times == sorted(times)
     cases = Counter(_name(case).rpartition(" ")[0] for case in log.iter(f"{XES}trace"))
     assert (cases["robot"], cases["mc"]) == (10, 5)  # of five workpieces, each loaded and unloaded, and machined once
     assert +started == Counter(stay.place.name for stay in run.stays if stay.sent_seconds is not None)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("1849.2016", "1849-2016", "log has xes.version='1849-2016'"),
+        ('xes.version="1849.2016"', "", "log lacks xes.version"),
+        ('"ActivityAndLifecycle"', '"Activity and lifecycle"', "classifier has name='Activity and lifecycle'"),
+        ('keys="concept:name lifecycle', 'keys="org:resource lifecycle', "uses what is not global"),
+        ('scope="trace"', 'scope="case"', "global has scope='case'"),
+        ('"Organizational" prefix="org"', '"Organizational" prefix="people"', "org:resource is of no extension"),
+        ("<trace>", '<string key="late" value=""/><trace>', ""),
+        ("  <trace>", '  <trace><event/></trace><string key="late" value=""/><trace>', "string stands too late in log"),
+        ("<event>", "<event><event/>", "event stands in event"),
+        ("<event>", '<event when="now">', "event has an attribute when"),
+        ("<event>", "<event>now", "event has text"),
+        ("<date key", "<string key", "time:timestamp is no date"),
+        ('+00:00"/>', '+00"/>', "date has value="),
+        ('value="start"', 'value="begin"', "begin is no transition of the standard lifecycle"),
+        ('value="true"', 'value="yes"', "boolean has value='yes'"),
+        ('<string key="concept:name" value="G', '<string key="name" value="G', "lacks the global attribute concept"),
+        ("      <date", '      <string key="concept:name" value=""/><date', "event has concept:name twice"),
+        ('key="command"', 'key="a command"', "string has key='a command'"),
+        ("http://www.xes-standard.org/\"", 'http://example.org/"', "the root is"),
+    ],
+)  # fmt: skip
+def test_a_log_that_breaks_a_rule_of_xes_is_found(folder: Path, old: str, new: str, problem: str) -> None:
+    text = (folder / "run.xes").read_text("utf-8")
+    assert old in text
+    found = list(problems(ET.fromstring(text.replace(old, new, 1))))
+    assert bool(found) == bool(problem)
+    assert not problem or any(re.search(problem, one) for one in found), found
 
 
 def _name(case: ET.Element) -> str:

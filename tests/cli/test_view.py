@@ -37,6 +37,7 @@ def late() -> Iterator[str]:
 
 def tokens(page: Page) -> set[str]:
     """The places that show a token."""
+    page.locator(".live").first.wait_for(state="attached")
     ids = page.locator(".live.there").evaluate_all("all => all.map(one => one.parentElement.id)")
     return {str(name).removeprefix("place:") for name in ids}
 
@@ -109,6 +110,11 @@ def test_a_counterexample_is_played_with_a_slider(chromium: Browser, late: str) 
         asking = page.get_by_role("button", name="Check this net")
         playing = page.get_by_role("button", name="▶ Play deadlock-free")
         asking.or_(playing).first.click()  # the server knows the verdicts once somebody has asked
+        cures = page.locator(".verdicts > li").filter(has_text="deadlock-free").locator(".cures")
+        cures.get_by_text("2 cures of deadlock-free").click()
+        cure = cures.get_by_role("listitem").first
+        expect(cure).to_contain_text("give G2 the gate unless: system.processing")
+        expect(cure).to_contain_text("checked: 40 markings; cures doomed-markings")
         playing.click()
         slider = page.get_by_role("slider", name="Steps of deadlock-free")
         expect(slider).to_be_focused()

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 from support.browser import PATIENCE_MS, browser, command, done, needs_browser, page_at
 from support.link_rigs import free_port
+from support.waiting import PATIENCE_SECONDS
 
 from firable.cli.main import main
 from firable.cli.view.lanes import Lanes
@@ -20,6 +23,9 @@ from firable.nets.catalogue import catalogue_net
 from firable.semantics.trace import CommandSent, Fired, SignalChanged, read_trace
 
 expect.set_options(timeout=PATIENCE_MS)
+
+LATE = ("--workpieces", "100", "--watch", "ignore")
+"""A run that goes on; on a busy machine the simulated cell is late, which the monitor may tell."""
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +46,10 @@ def no_window(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FIRABLE_NO_BROWSER", "1")
 
 
+def fulfilled(body: str, route: Route) -> None:
+    route.fulfill(body=body)
+
+
 def state(page: Page, word: str) -> None:
     expect(page.locator(".state")).to_have_text(word)
 
@@ -47,9 +57,7 @@ def state(page: Page, word: str) -> None:
 @needs_browser
 def test_a_run_is_followed_paused_stepped_resumed_and_stopped(chromium: Browser, bundle: Path, tmp_path: Path) -> None:
     trace = tmp_path / "run.jsonl"
-    # At ten times real time a busy machine is late, which the monitor may tell.
-    options = ("--speed", "10", "--workpieces", "100", "--watch", "ignore")
-    run = ("run", bundle, "--open", *options, "--trace", trace)
+    run = ("run", bundle, "--open", "--speed", "10", *LATE, "--trace", trace)
     with command(*run) as (address, process), page_at(chromium, address) as page:
         expect(page.locator(".events .fired").filter(has_text="G1 fired").first).to_be_visible()
         expect(page.locator(".lanes .machine")).to_have_text(["R", "MC", "CV1", "CV2"])
@@ -73,7 +81,7 @@ def test_a_run_is_followed_paused_stepped_resumed_and_stopped(chromium: Browser,
         expect(page.locator(".banner")).to_contain_text("The run has ended")
         expect(page.locator(".banner")).to_contain_text("stopped by the operator")
         expect(page.locator(".tools button:enabled")).to_have_count(0)
-        out, _ = process.communicate(timeout=60)
+        out, _ = process.communicate(timeout=PATIENCE_SECONDS)
         assert process.returncode == 3, out
     done("replay", trace, "--net", bundle)
 
@@ -82,7 +90,7 @@ def test_a_run_is_followed_paused_stepped_resumed_and_stopped(chromium: Browser,
 def test_an_emergency_stop_sends_no_command_any_more(chromium: Browser, bundle: Path, tmp_path: Path) -> None:
     trace = tmp_path / "run.jsonl"
     with (
-        command("run", bundle, "--open", "--workpieces", "100", "--trace", trace) as (address, process),
+        command("run", bundle, "--open", *LATE, "--trace", trace) as (address, process),
         page_at(chromium, address) as page,
     ):
         expect(page.locator(".events .fired").first).to_be_attached()
@@ -95,7 +103,7 @@ def test_an_emergency_stop_sends_no_command_any_more(chromium: Browser, bundle: 
         expect(page.get_by_role("button", name="Reset")).to_have_count(0)
         expect(page.get_by_role("button", name="Resume")).to_be_enabled()
         page.get_by_role("button", name="Stop", exact=True).click()
-        assert process.wait(timeout=60) == 3
+        assert process.wait(timeout=PATIENCE_SECONDS) == 3
     events = read_trace(trace).events
     stopped = next(e.at_seconds for e in events if getattr(e, "note", "") == "emergency stop")
     assert not [e for e in events if isinstance(e, CommandSent) and e.at_seconds > stopped]
@@ -104,7 +112,7 @@ def test_an_emergency_stop_sends_no_command_any_more(chromium: Browser, bundle: 
 @needs_browser
 def test_a_lost_connection_is_told_and_what_is_shown_is_marked_as_old(chromium: Browser, bundle: Path) -> None:
     with (
-        command("run", bundle, "--open", "--workpieces", "100") as (address, process),
+        command("run", bundle, "--open", *LATE) as (address, process),
         page_at(chromium, address) as page,
     ):
         state(page, "waiting")
@@ -115,6 +123,93 @@ def test_a_lost_connection_is_told_and_what_is_shown_is_marked_as_old(chromium: 
         process.send_signal(signal.SIGCONT)
         expect(page.locator("body")).not_to_contain_class("old")
         expect(page.get_by_role("button", name="Emergency stop")).to_be_enabled()
+
+
+@needs_browser
+def test_on_a_telephone_the_emergency_stop_and_a_lost_connection_stay_in_view(chromium: Browser, bundle: Path) -> None:
+    with (
+        command("run", bundle, "--open", "--workpieces", "100") as (address, process),
+        page_at(chromium, address, viewport={"width": 390, "height": 844}) as page,
+    ):
+        state(page, "waiting")
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        page.locator(".events").scroll_into_view_if_needed()
+        page.evaluate("scrollTo(0, document.body.scrollHeight)")
+        expect(page.get_by_role("heading", name="What happened")).to_be_in_viewport()
+        expect(page.get_by_role("button", name="Emergency stop")).to_be_in_viewport(ratio=1)
+        assert page.locator(".events").evaluate("one => one.getBoundingClientRect().bottom") < page.locator(
+            ".tools"
+        ).evaluate("one => one.getBoundingClientRect().top"), "the buttons cover nothing"
+        process.send_signal(signal.SIGSTOP)
+        expect(page.get_by_role("alert")).to_contain_text("The connection is lost since")
+        expect(page.get_by_role("alert")).to_be_in_viewport(ratio=1)
+        process.send_signal(signal.SIGCONT)
+
+
+@needs_browser
+def test_who_listens_to_the_page_hears_tokens_machines_and_what_is_missing(chromium: Browser, bundle: Path) -> None:
+    with (
+        command("run", bundle, "--open", "--workpieces", "100", "--watch", "ignore") as (address, _),
+        page_at(chromium, address) as page,
+    ):
+        state(page, "waiting")
+        page.get_by_role("button", name="Pause").click()
+        state(page, "paused")
+        picture = page.get_by_role("group", name="the net one-robot")
+        expect(picture.get_by_role("button")).to_have_count(0)  # nothing here is fired by hand
+        expect(page.locator(".live.there").first).to_be_attached()
+        told = picture.get_by_role("img").evaluate_all("all => all.map(one => one.ariaLabel)")
+        held = page.locator(".live.there").evaluate_all("all => all.map(one => one.parentElement.ariaLabel)")
+        assert held
+        assert {one for one in told if one.endswith(", with a token")} == set(held)
+        assert all(
+            " waits for " in one or one.endswith("may fire") for one in told if one.startswith(("G", "t1", "t2"))
+        )
+        page.locator(".picture").focus()
+        page.keyboard.press("Tab")  # past all of the picture
+        expect(page.get_by_role("group", name="Lanes of the machines; scrolls")).to_be_focused()
+        page.keyboard.press("Tab")
+        expect(page.locator("summary").first).to_be_focused()
+        machines = page.get_by_role("list", name="What each machine does")
+        expect(machines.get_by_role("listitem").filter(has_text="CV2")).to_have_text("CV2 rests")
+
+
+@needs_browser
+def test_of_many_machines_those_in_view_have_bars_and_of_many_firings_no_token_flies(chromium: Browser) -> None:
+    net: dict[str, object] = {"name": "many", "description": "", "controllers": [], "places": [], "signals": []}
+    net["transitions"] = [{"name": "t", "says": ""}]
+    machines = [f"M{k}" for k in range(100)]
+    start = {"mode": "live", "here": "", "coordinators": [], "net": net, "machines": machines, "top": {"why_not": "no"}}
+    bars = [
+        {"number": k, "machine": name, "command": f"{name} GO", "from": 5.0, "to": 8.0, "end": "done"}
+        for k, name in enumerate(machines)
+    ]
+    now: dict[str, object] = {
+        "at": 10.0,
+        "speed": 1.0,
+        "state": "running",
+        "message": "",
+        "marking": [],
+        "signals": [],
+        "transitions": {},
+    }
+    now |= {"waits": [], "bars": bars, "votes": [], "top": None, "unreached": [], "paused": False, "ended": True}
+    now |= {"events": [], "fired": ["t"] * 20}
+    svg = '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="99"><path id="input:t:p" d="M0 0h9"/></svg>'
+    answers = {"page": start, "picture": {"picture": svg, "members": {}, "foldable": []}, "events": now}
+    with command("view", "catalogue:one_robot", "--no-browser") as (address, _), page_at(chromium, address) as page:
+        for path, answer in answers.items():
+            page.route(f"**/api/{path}", partial(fulfilled, json.dumps(answer) + "\n"))
+        page.reload()
+        shown = page.locator(".lanes g > title")
+        expect(shown.filter(has_text="M0 GO: 3.0 s")).to_have_count(1)
+        assert page.locator(".lanes .bar").count() < 40
+        expect(page.locator(".picture")).to_contain_class("brisk")
+        expect(page.locator(".flying")).to_have_count(0)
+        page.locator(".lanes").evaluate("one => one.scrollTop = one.scrollHeight")
+        expect(shown.filter(has_text="M99 GO: 3.0 s")).to_have_count(1)
+        expect(shown.filter(has_text="M0 GO: 3.0 s")).to_have_count(0)
+        expect(page.get_by_role("listitem").filter(has_text="M50")).to_have_text("M50 rests")
 
 
 @needs_browser
@@ -152,13 +247,25 @@ def test_a_bar_goes_from_the_command_to_its_completion() -> None:
         CommandSent(6.0, "mc.fix"),
     ):
         lanes.seen(event)
-    told = {lane["machine"]: [(bar["from"], bar["to"], bar["end"]) for bar in lane["bars"]] for lane in lanes.told()}
-    assert told == {
-        "R": [(1.0, 3.0, "done"), (3.0, 4.0, "left")],
-        "CV1": [(5.0, 5.0, "instant")],
-        "MC": [(6.0, None, "working")],
-        "CV2": [],
-    }
+    told = [(bar["machine"], bar["from"], bar["to"], bar["end"]) for bar in lanes.since(0)]
+    assert told == [
+        ("R", 1.0, 3.0, "done"),
+        ("R", 3.0, 4.0, "left"),
+        ("CV1", 5.0, 5.0, "instant"),
+        ("MC", 6.0, None, "working"),
+    ]
+    assert lanes.machines == ["R", "MC", "CV1", "CV2"]
+
+
+def test_who_follows_is_told_the_bars_that_have_changed_and_no_others() -> None:
+    lanes = Lanes(catalogue_net("one_robot"))
+    lanes.seen(CommandSent(1.0, "robot.to_cv1"))
+    lanes.seen(CommandSent(2.0, "mc.fix"))
+    seen = lanes.changes
+    assert lanes.since(seen) == []
+    lanes.seen(SignalChanged(3.0, "robot.at_cv1", True))
+    assert [(bar["number"], bar["end"]) for bar in lanes.since(seen)] == [(1, "done")]
+    assert lanes.since(lanes.changes) == []
 
 
 def test_virtual_time_is_refused_with_a_page(bundle: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -167,7 +274,7 @@ def test_virtual_time_is_refused_with_a_page(bundle: Path, capsys: pytest.Captur
 
 
 def test_who_has_no_token_follows_nothing_and_stops_nothing(bundle: Path) -> None:
-    with command("run", bundle, "--open", "--workpieces", "100") as (address, process):
+    with command("run", bundle, "--open", *LATE) as (address, process):
         base = address.partition("#")[0]
         for path, method in (("api/page", "GET"), ("api/events", "GET"), ("emergency-stop", "POST"), ("stop", "POST")):
             asked = ["-c", f"import urllib.request as u; u.urlopen(u.Request({base + path!r}, method={method!r}))"]

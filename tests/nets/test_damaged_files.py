@@ -107,18 +107,18 @@ def read_or_refused(read: Callable[[str], Net], text: str) -> None:
 
 
 @given(st.one_of(damaged(SHORT), damaged(TEXT), shuffled_lines(TEXT)))
-@examples(400)
+@examples(200)
 def test_a_damaged_net_file_is_read_or_refused(text: str) -> None:
     read_or_refused(parse_net, text)
 
 
 @given(st.one_of(damaged(PNML), shuffled_lines(PNML)))
-@examples(200)
+@examples(100)
 def test_damaged_pnml_is_read_or_refused(text: str) -> None:
     read_or_refused(lambda data: parse_pnml(data).net, text)
 
 
 @given(st.text(max_size=200))
-@examples(200)
+@examples(100)
 def test_noise_is_refused(text: str) -> None:
     read_or_refused(parse_net, f"firable: 1\ncell: c\n{text}")

@@ -46,7 +46,7 @@ def test_the_same_net_gives_the_same_picture() -> None:
     assert draw_net(net) == draw_net(net)
 
 
-@examples(100)
+@examples(50)
 @given(whole_nets())
 def test_no_arc_passes_through_a_place_or_a_bar_that_it_does_not_join(net: Net) -> None:
     ET.fromstring(draw_net(net))
@@ -63,7 +63,7 @@ def test_no_arc_passes_through_a_place_or_a_bar_that_it_does_not_join(net: Net) 
                 assert not any(start - 2 < edge.x < end + 2 for start, end in other_bar.segments)
 
 
-@examples(100)
+@examples(50)
 @given(whole_nets())
 def test_places_and_bars_never_overlap_and_stay_in_their_lanes(net: Net) -> None:
     where = layout(net)
@@ -162,7 +162,7 @@ def test_a_time_limit_stands_below_the_command_and_its_timer_beside_the_completi
     assert stubs["to_cv1_overdue"] == stubs["at_cv1"]
 
 
-@examples(50)
+@examples(25)
 @given(whole_nets())
 def test_what_is_of_the_net_is_found_by_an_id_of_its_own(net: Net) -> None:
     ids = [found for element in ET.fromstring(draw_net(net)).iter() if (found := element.get("id")) is not None]

@@ -201,7 +201,7 @@ def commented(data: st.DataObject, text: str) -> str:
     return "\n".join(lines)
 
 
-@examples(20)
+@examples(10)
 @given(data=st.data())
 def test_edits_of_the_text_are_those_of_the_net_and_keep_its_comments(data: st.DataObject) -> None:
     text = commented(data, TEXTS[data.draw(st.sampled_from(["one_robot", "two_cells", "conceptual_two_robots"]))])

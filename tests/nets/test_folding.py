@@ -65,7 +65,7 @@ def test_a_folded_task_is_a_double_circle_and_holds_the_token_of_any_place_in_it
     assert classes(svg, "place:robot.free") == ["place"]
 
 
-@examples(60)
+@examples(30)
 @given(whole_nets())
 def test_every_net_can_be_folded_and_wrapped_and_shows_all_the_rest_once(net: Net) -> None:
     folded = fold(net, ["all"])

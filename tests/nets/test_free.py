@@ -20,7 +20,7 @@ def ids(svg: str) -> list[str]:
     return [found for one in ET.fromstring(svg).iter() if (found := one.get("id")) and not found.startswith("lane:")]
 
 
-@examples(60)
+@examples(30)
 @given(whole_nets())
 def test_what_is_of_the_net_has_the_ids_of_the_picture_with_lanes(net: Net) -> None:
     free = ids(draw_free(net))

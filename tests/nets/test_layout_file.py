@@ -35,7 +35,7 @@ transitions:
 """
 
 
-@examples(30)
+@examples(15)
 @given(whole_nets())
 def test_a_net_drawn_by_its_own_layout_file_looks_the_same(net: Net) -> None:
     kept = parse_layout(format_layout(arranged(net)))
@@ -77,7 +77,7 @@ def test_what_is_new_is_put_in_and_the_rest_stays_in_its_order() -> None:
         assert any(set(track) <= set(one) for one in after)
 
 
-@examples(30)
+@examples(15)
 @given(whole_nets(), whole_nets())
 def test_the_layout_of_another_net_spoils_no_picture(net: Net, other: Net) -> None:
     where = layout(net, arranged(other))
@@ -89,7 +89,7 @@ def test_the_layout_of_another_net_spoils_no_picture(net: Net, other: Net) -> No
     assert len(set(spots)) == len(spots)
 
 
-@examples(60)
+@examples(30)
 @given(whole_nets())
 def test_a_file_that_puts_all_places_of_a_lane_into_one_track_is_followed_as_far_as_lines_allow(net: Net) -> None:
     owners = {place.owner for place in net.places}

@@ -51,7 +51,7 @@ def inside(x: float, y: float, box: Box, centre: tuple[float, float]) -> bool:
     return abs(x - centre[0]) < box.width / 2 - 0.5 and abs(y - centre[1]) < box.height / 2 - 0.5
 
 
-@examples(50)
+@examples(25)
 @given(graphs())
 def test_boxes_and_words_never_overlap_and_lie_in_the_picture(graph: Graph) -> None:
     boxes, links = graph
@@ -64,7 +64,7 @@ def test_boxes_and_words_never_overlap_and_lie_in_the_picture(graph: Graph) -> N
         assert height / 2 - 0.01 <= y <= placed.height - height / 2 + 0.01
 
 
-@examples(50)
+@examples(25)
 @given(graphs())
 def test_a_line_joins_its_boxes_and_passes_through_no_other(graph: Graph) -> None:
     boxes, links = graph

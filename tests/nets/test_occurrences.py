@@ -1,5 +1,6 @@
 """Names in a net file: every place of each, and a rename that changes all of them and nothing else."""
 
+import json
 from dataclasses import replace
 
 import pytest
@@ -51,12 +52,12 @@ def test_arcs_and_gates_are_all_found(name: str) -> None:
         assert len(found) >= touching + place.marked
 
 
-@examples(60)
+@examples(30)
 @given(data=st.data())
 def test_a_rename_changes_every_place_of_a_name_and_nothing_else(data: st.DataObject) -> None:
     text = data.draw(st.sampled_from(list(TEXTS.values())))
     names = names_in(text)
-    one = data.draw(st.sampled_from(names.occurrences))
+    one = data.draw(st.sampled_from([one for one in names.occurrences if one.name not in names.given]))
     new_text = names.renamed(one, "brand_new")
     prefix = one.name.rpartition(".")[0] if one.kind in OWNED else ""
     new = f"{prefix}.brand_new" if prefix else "brand_new"
@@ -80,6 +81,95 @@ def test_a_controller_is_renamed_in_the_full_names_of_its_parts() -> None:
     ]
     assert "arm.free" in net.place_index
     assert not any(place.name.startswith("robot.") for place in net.places)
+
+
+TIMED = """\
+firable: 1
+cell: demo
+controllers:
+  robot:
+    start: free
+    inputs: reset
+    places:
+      free:
+      to_cv1:       {send: {machine: R, command: MOVE}, until: at_cv1, within: 5s}   # a limit
+      to_cv1_fault: {send: {machine: R, command: STOP}}
+      grasp:        {send: {machine: R, command: GRASP}, until: touch, within: 1min}
+transitions:
+  go:    {from: robot.free, to: robot.to_cv1}
+  take:  {from: robot.to_cv1, to: robot.grasp}
+  back:  {from: robot.grasp, to: robot.free, unless: robot.to_cv1_overdue}
+  again: {from: robot.to_cv1_fault, to: robot.to_cv1, if: robot.reset}
+  lost:  {from: robot.grasp_fault, to: robot.free, if: robot.reset}
+properties:
+  late: {ctl: AG (robot.to_cv1_fault -> not firable(robot.to_cv1_timeout))}
+"""
+
+
+def place_of(names: Names, name: str) -> Occurrence:
+    return next(one for one in names.occurrences if one.defines and (one.kind, one.name) == (Kind.PLACE, name))
+
+
+def test_what_a_time_limit_gives_follows_the_name_of_its_place() -> None:
+    before = net_to_json(parse_net(TIMED))
+    for old in ("to_cv1", "grasp"):
+        names = names_in(TIMED)
+        text = names.renamed(place_of(names, f"robot.{old}"), "move")
+        assert json.loads(json.dumps(before).replace(f"robot.{old}", "robot.move")) == net_to_json(parse_net(text))
+        assert text == TIMED.replace(old, "move")
+        assert names_in(text).renamed(place_of(names_in(text), "robot.move"), old) == TIMED
+
+
+@pytest.mark.parametrize(
+    ("limit", "after"),
+    [
+        ("within: 5s}", "within: {time: 5s, to: stuck}}"),
+        ('within: "5s"}', 'within: {time: "5s", to: stuck}}'),
+        ("within: {time: 5s, timer: slow}}", "within: {to: stuck, time: 5s, timer: slow}}"),
+    ],
+)
+def test_a_fault_place_of_another_name_stays_the_one_that_its_limit_leads_to(limit: str, after: str) -> None:
+    given = TIMED.replace("within: 5s}", limit).replace("unless: robot.to_cv1_overdue", "unless: robot.reset")
+    names = names_in(given)
+    text = names.renamed(place_of(names, "robot.to_cv1_fault"), "stuck")
+    assert after in text
+    before = json.dumps(net_to_json(parse_net(given)))
+    assert json.loads(before.replace("robot.to_cv1_fault", "robot.stuck")) == net_to_json(parse_net(text))
+
+
+def test_a_limit_on_lines_of_its_own_is_told_its_fault_place_on_another() -> None:
+    text = (
+        "firable: 1\r\ncell: c\r\ncontrollers:\r\n  r:\r\n    places:\r\n"
+        "      wait:\r\n        send: {machine: R, command: WAIT}\r\n        until: done\r\n"
+        "        within:  # a limit\r\n          time: 5s\r\n      wait_fault:\r\n"
+    )
+    names = names_in(text)
+    after = names.renamed(place_of(names, "r.wait_fault"), "late")
+    assert after == text.replace("time: 5s", "to: late\r\n          time: 5s").replace("wait_fault", "late")
+    assert [t.outputs for t in parse_net(after).transitions] == [("r.late",)]
+
+
+def test_a_controller_takes_along_what_its_time_limits_give() -> None:
+    names = names_in(TIMED)
+    robot = next(one for one in names.occurrences if (one.kind, one.name) == (Kind.CONTROLLER, "robot"))
+    text = names.renamed(robot, "arm")
+    assert "robot" not in text
+    assert parse_net(text).transition("lost").inputs == ("arm.grasp_fault",)
+
+
+def test_a_name_that_a_time_limit_gives_is_that_of_its_place_and_changes_with_it_alone() -> None:
+    names = names_in(TIMED)
+    timer = next(one for one in names.occurrences if one.name == "robot.to_cv1_overdue")
+    assert timer.kind is Kind.SIGNAL
+    assert names.definition(timer) == place_of(names, "robot.to_cv1")
+    with pytest.raises(InputError, match="F1020"):
+        names.renamed(timer, "slow")
+    for one, new in (("robot.free", "grasp_fault"), ("robot.grasp", "to_cv1_fault"), ("robot.free", "grasp_overdue")):
+        with pytest.raises(InputError, match="F2001"):
+            names.renamed(place_of(names, one), new)
+    text = TIMED.replace("      free:\n", "      free:\n      home_fault:\n")
+    with pytest.raises(InputError, match=r"F2001.*'robot\.home_fault'"):
+        names_in(text).renamed(place_of(names_in(text), "robot.grasp"), "home")
 
 
 def test_a_name_that_is_taken_or_none_is_refused() -> None:

@@ -307,7 +307,7 @@ def test_a_net_of_the_field_survives_pnml(name: str) -> None:
 
 
 @given(whole_nets())
-@examples(75)
+@examples(38)
 def test_any_net_survives_pnml_up_to_its_names(net: Net) -> None:
     text, notes = write_pnml(net)
     back = parse_pnml(text).net

@@ -42,7 +42,7 @@ def test_a_reference_net_survives_printing(name: str) -> None:
 
 
 @given(whole_nets())
-@examples(150)
+@examples(75)
 def test_any_net_survives_printing(net: Net) -> None:
     back = parse_net(format_net(net))
     assert back == in_file_order(net)
@@ -51,7 +51,7 @@ def test_any_net_survives_printing(net: Net) -> None:
 
 
 @given(whole_nets())
-@examples(50)
+@examples(25)
 def test_file_order_only_reorders(net: Net) -> None:
     ordered = in_file_order(net)
     assert set(ordered.places) == set(net.places)

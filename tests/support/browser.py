@@ -12,10 +12,11 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, sync_playwright
+from support.waiting import heard_in_time
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed here")
-PATIENCE_MS = 20_000.0
+PATIENCE_MS = 60_000.0
 """So long a browser may take for what it does in milliseconds: the machine of the tests may be busy."""
 
 
@@ -66,10 +67,11 @@ def command(*arguments: str | Path, cwd: Path | None = None) -> Iterator[tuple[s
     try:
         assert process.stderr is not None
         said = ""
-        while (told := re.search(r"see it at (http\S+)", said)) is None:
-            line = process.stderr.readline()
-            assert line, said
-            said += line
+        with heard_in_time(process):
+            while (told := re.search(r"see it at (http\S+)", said)) is None:
+                line = process.stderr.readline()
+                assert line, said
+                said += line
         yield told.group(1), process
     finally:
         process.kill()

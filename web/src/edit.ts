@@ -2,9 +2,9 @@
 // the page shows what came of it: the net, or why there is none, at the line where it is.
 
 import { announce, h } from "./dom";
+import { Drawing } from "./drawing";
 import { Details, type Chosen, type Doing } from "./edit_details";
 import { banner, frame, panel, watchFile, type Frame } from "./frame";
-import { Picture } from "./picture";
 import { ask, Refused, type Edited, type EditState, type PlayPage, type Problem } from "./server";
 import { TextPane } from "./text_pane";
 
@@ -17,7 +17,7 @@ const TOOLS: [Tool, string, string][] = [
 ];
 
 export class Edit {
-  private readonly picture: Picture;
+  private readonly drawing: Drawing;
   private readonly frame: Frame;
   private readonly pane: TextPane;
   private readonly details: Details;
@@ -29,12 +29,13 @@ export class Edit {
   private queue: Promise<void> = Promise.resolve();
 
   constructor(private page: PlayPage, private state: EditState, done: () => void) {
-    this.picture = new Picture(page.net, page.picture, {
+    this.drawing = new Drawing(page.net, {
       place: (name) => this.pick({ kind: "place", name }),
       transition: (name) => this.pick({ kind: "transition", name }),
       signal: (name) => this.pick({ kind: "signal", name }),
     });
-    this.frame = frame(page.net.name || "the net", page.file, "Editing", this.picture);
+    this.frame = frame(page.net.name || "the net", page.file, "Editing", this.drawing);
+    void this.drawing.draw(page.net, []);
     this.frame.status.textContent = "Editing: each edit is written to the file";
     const leave = (): void => {
       if (this.pane.dirty && !confirm("What is typed in the text is not written. Leave it?")) return;
@@ -114,7 +115,7 @@ export class Edit {
     const before = this.state;
     this.page = page;
     this.state = edit;
-    this.picture.draw(page.net, page.picture);
+    void this.drawing.draw(page.net, []);
     this.pane.take(edit.text);
     const last = edit.redo !== null && edit.redo === before.undo ? `Undone: ${edit.redo}` : `Done: ${edit.undo ?? "loaded again"}`;
     this.frame.status.textContent = `${last}.`;
@@ -130,9 +131,9 @@ export class Edit {
     this.undoButton.title = state.undo === null ? "Undo (Ctrl+Z)" : `Undo (Ctrl+Z): ${state.undo}`;
     this.redoButton.title = state.redo === null ? "Redo (Ctrl+Shift+Z)" : `Redo (Ctrl+Shift+Z): ${state.redo}`;
     const transitions = Object.fromEntries(page.net.transitions.map(({ name }) => [name, { may: "not" as const }]));
-    this.picture.show({ marking: state.marked, signals: [], transitions });
+    this.drawing.picture.show({ marking: state.marked, signals: [], transitions });
     this.details.show(page.net, state);
-    this.picture.choose(this.details.chosen?.kind ?? "", this.details.chosen?.name ?? "");
+    this.drawing.picture.choose(this.details.chosen?.kind ?? "", this.details.chosen?.name ?? "");
   }
 
   private choose(chosen: Chosen | null): void {
@@ -155,7 +156,7 @@ export class Edit {
   private pick(chosen: Chosen): void {
     const { first, tool } = this;
     if (tool === "choose") return this.choose(chosen);
-    this.picture.choose(chosen.kind, chosen.name);
+    this.drawing.picture.choose(chosen.kind, chosen.name);
     const isPair = first !== null && (first.kind === "transition") !== (chosen.kind === "transition");
     if (!isPair) {
       this.first = chosen;

@@ -2,7 +2,8 @@
 // when a cell runs.
 
 import { h } from "./dom";
-import { Picture } from "./picture";
+import type { Drawing } from "./drawing";
+import type { Picture } from "./picture";
 import { ask } from "./server";
 import type { TopView } from "./top_view";
 
@@ -43,7 +44,8 @@ function tabs(picture: Picture, top: TopView): HTMLElement {
   return row;
 }
 
-export function frame(title: string, says: string, kind: string, picture: Picture, top?: TopView): Frame {
+export function frame(title: string, says: string, kind: string, drawing: Drawing, top?: TopView): Frame {
+  const { picture } = drawing;
   shown.abort();
   shown = new AbortController();
   const gone = shown.signal;
@@ -55,10 +57,11 @@ export function frame(title: string, says: string, kind: string, picture: Pictur
   const hint = h("p", { class: "hint" });
   const zoom = h(
     "div",
-    { class: "zoom", role: "group", "aria-label": "Size of the picture" },
+    { class: "zoom", role: "group", "aria-label": "How the picture is shown" },
     h("button", { type: "button", "aria-label": "Smaller", click: () => picture.zoom(1 / 1.25) }, "−"),
     h("button", { type: "button", click: () => picture.fit() }, "Fit"),
     h("button", { type: "button", "aria-label": "Larger", click: () => picture.zoom(1.25) }, "+"),
+    drawing.foldButton,
   );
   document.title = `${title} – firable`;
   document.getElementById("page")!.replaceChildren(
@@ -81,7 +84,6 @@ export function frame(title: string, says: string, kind: string, picture: Pictur
   picture.element.id = "net";
   picture.element.setAttribute("role", top ? "tabpanel" : "region");
   picture.element.setAttribute("aria-label", "Picture of the net; scrolls");
-  requestAnimationFrame(() => picture.fit());
   let width = innerWidth;
   addEventListener("resize", () => {
     if (innerWidth !== width) picture.fit();

@@ -1,86 +1,119 @@
 // A lane for each machine, with a bar for each command, over the last minute of the cell's time; it ends at now.
+//
+// A bar is drawn once, and again when its command ends. What moves is the strip that all of them stand on, by one
+// transform that the compositor carries out; a bar of which the command is under way goes on beyond now, out of sight.
+// Of many machines only the lanes that are in view have bars.
 
 import { h, svg } from "./dom";
 
 export interface Bar {
-  place: string;
+  number: number;
+  machine: string;
   command: string;
   from: number;
   to: number | null;
   end: "working" | "done" | "left" | "instant";
 }
 
-export interface Lane {
-  machine: string;
-  bars: Bar[];
+const SHOWN_SECONDS = 60;
+/** So much time goes by before all is drawn anew, with numbers that are small again. */
+const DRAWN_SECONDS = 90;
+const HEIGHT = 26;
+const LETTER_WIDTH = 6.4;
+
+interface Lane {
+  top: number;
+  words: HTMLElement;
+  last: number;
 }
 
-const SHOWN_SECONDS = 60;
-const HEIGHT = 26;
-const NAME_WIDTH = 74;
-const AXIS = 18;
-
 export class Lanes {
-  readonly element = h("div", { class: "lanes" });
+  readonly element: HTMLElement;
+  private readonly strip = svg("svg", { class: "strip", "aria-hidden": "true" });
+  private readonly window: HTMLElement;
   private readonly lanes = new Map<string, Lane>();
-  private readonly drawing = svg("svg", { role: "img", "aria-label": "What each machine did in the last minute" });
-  private readonly said = h("ul", { class: "unseen" });
-  private key = "";
+  private readonly bars = new Map<number, { bar: Bar; group: SVGGElement }>();
+  private origin = 0;
+  private now = 0;
+  private scale = 0;
+  private view: [number, number] = [0, 0];
 
-  constructor() {
-    this.element.append(this.drawing, this.said);
-  }
-
-  take(lanes: Lane[]): void {
-    for (const lane of lanes) this.lanes.set(lane.machine, lane);
-  }
-
-  draw(now: number): void {
-    const width = Math.max(300, this.element.clientWidth);
-    const key = `${width}/${(now * (width / SHOWN_SECONDS)).toFixed(0)}/${[...this.lanes.values()].map((lane) => `${lane.bars.length},${lane.bars.at(-1)?.to}`).join()}`;
-    if (key === this.key) return;
-    this.key = key;
-    const span = width - NAME_WIDTH - 8;
-    const x = (at: number): number => NAME_WIDTH + span * (1 - (now - at) / SHOWN_SECONDS);
-    const height = this.lanes.size * HEIGHT + AXIS;
-    this.drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    this.drawing.setAttribute("height", String(height));
-    const parts: Node[] = [];
+  constructor(machines: string[]) {
+    const names = h("ul", { class: "lane-names", "aria-label": "What each machine does" });
+    for (const [i, machine] of machines.entries()) {
+      const words = h("span", { class: "unseen" }, "rests");
+      this.lanes.set(machine, { top: i * HEIGHT, words, last: -1 });
+      names.append(h("li", {}, h("b", { class: "machine", title: machine }, machine), " ", words));
+    }
+    this.window = h("div", { class: "lane-window", "aria-hidden": "true" });
+    const axis = h("div", { class: "axis", "aria-hidden": "true" });
     for (let ago = 0; ago <= SHOWN_SECONDS; ago += 10) {
-      const at = x(now - ago);
-      parts.push(svg("line", { x1: at, x2: at, y1: 0, y2: height - AXIS, class: "tick" }));
-      const label = svg("text", { x: at, y: height - 4, "text-anchor": ago === 0 ? "end" : "middle", class: "when" });
-      label.textContent = ago === 0 ? "now" : `−${ago} s`;
-      parts.push(label);
+      const right = `right: ${(100 * ago) / SHOWN_SECONDS}%`;
+      this.window.append(h("i", { class: "tick", style: right }));
+      axis.append(h("span", { style: ago === SHOWN_SECONDS ? "left: 0" : right }, ago === 0 ? "now" : `−${ago} s`));
     }
-    const told: string[] = [];
-    let y = 0;
-    for (const { machine, bars } of this.lanes.values()) {
-      const name = svg("text", { x: 4, y: y + 17, class: "machine" });
-      name.textContent = machine;
-      parts.push(name);
-      for (const bar of bars) {
-        const from = Math.max(NAME_WIDTH, x(bar.from));
-        const to = x(bar.to ?? now);
-        if (to < NAME_WIDTH) continue;
-        const shape = svg("rect", { x: from, y: y + 3, width: Math.max(3, to - from), height: HEIGHT - 7, rx: 4, class: `bar ${bar.end}` });
-        const title = svg("title");
-        title.textContent = `${bar.command}: ${bar.end === "working" ? "working" : `${((bar.to ?? now) - bar.from).toFixed(1)} s`}`;
-        shape.append(title);
-        parts.push(shape);
-        const words = bar.command.slice(machine.length + 1);
-        if (to - from > words.length * 6.4 + 8) {
-          const label = svg("text", { x: from + 5, y: y + 17, class: "command" });
-          label.textContent = words;
-          parts.push(label);
-        }
-      }
-      const last = bars.at(-1);
-      told.push(last?.end === "working" ? `${machine} is at ${last.command}` : `${machine} rests`);
-      y += HEIGHT;
+    this.window.append(this.strip);
+    this.element = h("div", { class: "lanes", tabindex: "0", role: "group", "aria-label": "Lanes of the machines; scrolls" }, names, this.window, axis);
+    this.element.style.setProperty("--names", `${Math.min(16, Math.max(...machines.map((name) => name.length)) + 1)}ch`);
+    this.element.addEventListener("scroll", () => this.look());
+    new ResizeObserver(() => this.look()).observe(this.window);
+    new ResizeObserver(() => this.look()).observe(this.element);
+  }
+
+  /** Another part of the lanes is in view, or they are wider or narrower. */
+  private look(): void {
+    const { scrollTop, clientHeight } = this.element;
+    this.view = [scrollTop - HEIGHT, scrollTop + clientHeight];
+    this.scale = this.window.clientWidth / SHOWN_SECONDS;
+    this.drawAll();
+  }
+
+  /** Bars that are new or other than they were. */
+  take(bars: Bar[]): void {
+    for (const bar of bars) {
+      const lane = this.lanes.get(bar.machine);
+      if (lane === undefined) continue;
+      this.bars.get(bar.number)?.group.remove();
+      const group = svg("g");
+      this.bars.set(bar.number, { bar, group });
+      this.draw(bar, group, lane);
+      if (bar.number < lane.last) continue;
+      lane.last = bar.number;
+      lane.words.textContent = bar.end === "working" ? `is at ${bar.command}` : "rests";
     }
-    this.drawing.replaceChildren(...parts);
-    const told_ = told.join("\n");
-    if (this.said.textContent !== told.join("")) this.said.replaceChildren(...told_.split("\n").map((one) => h("li", {}, one)));
+  }
+
+  /** Time goes on. */
+  at(now: number): void {
+    this.now = now;
+    if (now < this.origin || now - this.origin > DRAWN_SECONDS) this.drawAll();
+    if (this.scale > 0) this.strip.style.transform = `translateX(${((this.origin - now) * this.scale).toFixed(1)}px)`;
+  }
+
+  private drawAll(): void {
+    this.origin = this.now;
+    this.strip.replaceChildren();
+    for (const [number, { bar, group }] of this.bars) {
+      if (bar.to !== null && bar.to < this.now - SHOWN_SECONDS) this.bars.delete(number);
+      else this.draw(bar, group, this.lanes.get(bar.machine)!);
+    }
+    this.at(this.now);
+  }
+
+  private draw(bar: Bar, group: SVGGElement, { top }: Lane): void {
+    if (this.scale === 0 || top < this.view[0] || top > this.view[1]) return;
+    const from = Math.max(bar.from, this.origin - SHOWN_SECONDS);
+    const x = (from - this.origin) * this.scale;
+    const width = Math.max(3, (bar.to === null ? 2 * DRAWN_SECONDS + SHOWN_SECONDS : bar.to - from) * this.scale);
+    const title = svg("title");
+    title.textContent = `${bar.command}: ${bar.to === null ? "working" : `${(bar.to - bar.from).toFixed(1)} s`}`;
+    group.replaceChildren(title, svg("rect", { x, y: top + 3, width, height: HEIGHT - 7, rx: 4, class: `bar ${bar.end}` }));
+    const words = bar.command.slice(bar.machine.length + 1);
+    if (width > words.length * LETTER_WIDTH + 8) {
+      const label = svg("text", { x: x + 5, y: top + 17, class: "command" });
+      label.textContent = words;
+      group.append(label);
+    }
+    this.strip.append(group);
   }
 }

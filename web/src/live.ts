@@ -3,9 +3,10 @@
 // one thing that must never be here.
 
 import { announce, counted, h, paced } from "./dom";
+import { Drawing } from "./drawing";
 import { banner, frame, panel, type Frame } from "./frame";
-import { Lanes, type Lane } from "./lanes";
-import { Picture } from "./picture";
+import { Lanes, type Bar } from "./lanes";
+import type { Picture } from "./picture";
 import { ask, follow, Refused, type Net, type Wait } from "./server";
 import { TopView, type Top, type TopStart } from "./top_view";
 
@@ -14,7 +15,7 @@ export interface LiveStart {
   here: string;
   coordinators: string[];
   net: Net;
-  picture: string;
+  machines: string[];
   top: TopStart;
 }
 
@@ -34,7 +35,7 @@ interface Now {
   signals: string[];
   transitions: Record<string, Wait>;
   waits: string[];
-  lanes: Lane[];
+  bars: Bar[];
   votes: Votes[];
   unreached: string[];
   top: Top | null;
@@ -48,8 +49,8 @@ const SILENT_MS = 2500;
 const RETRY_MS = 1000;
 const EVENTS_SHOWN = 200;
 const COLUMNS_MAX = 12;
-/** When more fires between two frames, no eye follows the tokens on their way. */
-const FLYING_MAX = 6;
+/** When more fires in a second, no eye follows the tokens on their way. */
+const FLYING_MAX = 12;
 const BAD = new Set(["fault", "deadlock", "latched"]);
 const SIGNS: Record<string, [string, string]> = {
   ready: ["●", "ready"], yes: ["✓", "votes yes"], promised: ["◐", "has promised"], no: ["○", "not ready"], ordered: ["…", "has its order"],
@@ -60,7 +61,7 @@ export class Live {
   private readonly picture: Picture;
   private readonly top: TopView;
   private readonly frame: Frame;
-  private readonly lanes = new Lanes();
+  private readonly lanes: Lanes;
   private readonly waits = h("ul", { class: "list" });
   private readonly votes = h("table", { class: "votes" });
   private readonly rows = new Map<string, Votes>();
@@ -69,9 +70,10 @@ export class Live {
   private readonly drawVotes = paced(() => this.showVotes());
   private readonly untold: Now["events"] = [];
   private readonly drawEvents = paced(() => this.showEvents());
+  private readonly drawWaits = paced(() => this.showWaits());
   private readonly drawLanes = paced(() => this.showLanes());
   private readonly signals = h("ul", { class: "signals" });
-  private readonly events = h("ol", { class: "log events", "aria-label": "What happened" });
+  private readonly events = h("ol", { class: "log events", "aria-label": "What happened, the newest first", tabindex: "0" });
   private readonly buttons: HTMLButtonElement[] = [];
   private readonly pauseButton: HTMLButtonElement;
   private readonly stepButton: HTMLButtonElement;
@@ -79,13 +81,20 @@ export class Live {
   private heard = performance.now();
   private now: Now | null = null;
   private lost = false;
+  /** So much has fired in about the last second. */
+  private pace = 0;
+  private shownAt = 0;
   private said = "";
 
   constructor(start: LiveStart) {
-    this.picture = new Picture(start.net, start.picture, { pointed: (name) => this.picture.mark(name) });
+    const drawing = new Drawing(start.net, { pointed: (name) => this.picture.mark(name) });
+    this.picture = drawing.picture;
     this.top = new TopView(start.top);
+    this.lanes = new Lanes(start.machines);
     const says = start.here ? `on this host: ${start.here}` : start.net.description;
-    this.frame = frame(start.net.name || "the cell", says, "Operating", this.picture, this.top);
+    this.frame = frame(start.net.name || "the cell", says, "Operating", drawing, this.top);
+    void drawing.draw(start.net, null);
+    document.body.classList.add("live");
     const button = (words: string, path: string, title: string, kind = ""): HTMLButtonElement => {
       const made = h("button", { type: "button", class: kind, title, click: () => void this.command(made.dataset.path ?? path, words) }, words);
       this.frame.tools.append(made);
@@ -101,7 +110,7 @@ export class Live {
     this.resetButton.hidden = true;
     button("Emergency stop", "emergency-stop", "Drive the safe outputs at once. This is no safety function: the wired one is", "emergency");
     const lanes = h("section", { class: "machines", "aria-label": "Machines" }, this.lanes.element);
-    if (start.net.places.some((place) => place.machine !== null)) this.frame.below.append(lanes);
+    if (start.machines.length > 0) this.frame.below.append(lanes);
     this.frame.side.append(
       panel("Waits for", this.waits),
       panel("Votes", this.votes),
@@ -156,7 +165,7 @@ export class Live {
     if (this.now === null || this.lost) return;
     // Between two frames time goes on; it is shown only as long as the connection lives.
     const since = this.now.ended ? 0 : Math.min(performance.now() - this.heard, 700) / 1000;
-    this.lanes.draw(this.now.at + since * this.now.speed);
+    this.lanes.at(this.now.at + since * this.now.speed);
   }
 
   private show(now: Now): void {
@@ -166,12 +175,14 @@ export class Live {
       this.frame.banner.replaceChildren();
       announce("The connection is back.");
     }
-    const flying = now.fired.filter((name, i) => now.fired.indexOf(name) === i);
+    this.pace = this.pace * Math.exp((this.shownAt - this.heard) / 1000) + now.fired.length;
+    this.shownAt = this.heard;
     this.now = now;
+    this.picture.element.classList.toggle("brisk", this.pace > FLYING_MAX);
     this.picture.show(now);
-    if (flying.length <= FLYING_MAX) this.picture.fly(flying);
+    if (this.pace <= FLYING_MAX) this.picture.fly(new Set(now.fired));
     if (now.top) this.top.show(now.top, 0.2, now.speed);
-    this.lanes.take(now.lanes);
+    this.lanes.take(now.bars);
     this.drawLanes();
     this.showState(now);
     for (const row of now.votes) {
@@ -179,7 +190,7 @@ export class Live {
       this.changedRows.add(row.name);
     }
     if (now.votes.length > 0) this.drawVotes();
-    this.showWaits(now);
+    this.drawWaits();
     if (now.events.length > 0) {
       this.untold.push(...now.events);
       this.untold.splice(0, Math.max(0, this.untold.length - EVENTS_SHOWN));
@@ -222,14 +233,23 @@ export class Live {
     if (latched) this.pauseButton.disabled = this.stepButton.disabled = true;
   }
 
-  private showWaits(now: Now): void {
+  private showWaits(): void {
+    const now = this.now;
+    if (now === null) return;
     const away = now.unreached.map((name) => `${name === "" ? "the coordinator" : name} is not connected`);
     const lines = [...away, ...now.waits];
     const key = lines.join("\n");
     if (this.waits.dataset.key === key) return;
     this.waits.dataset.key = key;
     const none = now.state === "running" ? "Nothing: the cell is at work." : "Nothing.";
-    this.waits.replaceChildren(...(lines.length > 0 ? lines.map((line, i) => h("li", { class: i < away.length ? "wait lost" : "wait" }, line)) : [h("li", { class: "none" }, none)]));
+    const shown: [string, string][] = lines.length > 0 ? lines.map((line, i) => [i < away.length ? "wait lost" : "wait", line]) : [["none", none]];
+    while (this.waits.children.length > shown.length) this.waits.lastElementChild!.remove();
+    while (this.waits.children.length < shown.length) this.waits.append(h("li", {}));
+    for (const [i, [kind, line]] of shown.entries()) {
+      const row = this.waits.children[i]!;
+      if (row.className !== kind) row.className = kind;
+      if (row.textContent !== line) row.textContent = line;
+    }
   }
 
   /** The rows that have changed; of many controllers a row names those that take part, instead of a column for each. */
@@ -265,12 +285,11 @@ export class Live {
     this.changedRows.clear();
   }
 
+  /** The newest stand first, so nothing has to be measured and scrolled. */
   private showEvents(): void {
-    const told = this.untold.splice(0);
-    const atEnd = this.events.scrollTop + this.events.clientHeight >= this.events.scrollHeight - 8;
-    this.events.append(...told.map((event) => h("li", { class: event.kind }, h("span", { class: "soft" }, `${event.at.toFixed(1)} `), event.what)));
-    while (this.events.children.length > EVENTS_SHOWN) this.events.firstElementChild!.remove();
-    if (atEnd) this.events.scrollTop = this.events.scrollHeight;
+    const told = this.untold.splice(0).reverse();
+    this.events.prepend(...told.map((event) => h("li", { class: event.kind }, h("span", { class: "soft" }, `${event.at.toFixed(1)} `), event.what)));
+    while (this.events.children.length > EVENTS_SHOWN) this.events.lastElementChild!.remove();
   }
 
   private async command(path: string, words: string): Promise<void> {

@@ -1,10 +1,13 @@
 // The picture of the net: the SVG that `firable draw` makes, in which tokens come and go. Its parts are found by the ids
 // that the drawing gives them. It stands in a shadow tree, because its style sheet speaks of `text` and `.name` as if it
 // were alone. What is drawn here is only what changes: tokens, who may fire, open gates, and tokens on their way.
+//
+// It may be there before it is drawn, and be drawn anew with tasks folded: what is to be shown is kept, and shown then.
 
-import { calm, svg } from "./dom";
+import { h, svg } from "./dom";
+import { Flights, type Arc } from "./flights";
 import pictureStyle from "./picture.css?inline";
-import type { Net, Wait } from "./server";
+import type { Drawn, Net, Wait } from "./server";
 
 export interface Shown {
   marking: Iterable<string>;
@@ -12,124 +15,152 @@ export interface Shown {
   transitions: Record<string, Wait>;
 }
 
-interface Flight {
-  circle: SVGCircleElement;
-  path: SVGPathElement;
-  length: number;
-  backwards: boolean;
-  begin: number;
+export interface Pressed {
+  place?: (name: string) => void;
+  transition?: (name: string) => void;
+  signal?: (name: string) => void;
+  pointed?: (name: string | null) => void;
+  /** A task that is drawn as one place. */
+  task?: (name: string) => void;
 }
 
-const FLIGHT_MS = 420;
-const FLIGHTS_MAX = 48;
-const TURN_MS = 210;
+interface Gate {
+  signal: string;
+  wanted: boolean;
+  group: SVGGElement;
+}
+
+interface Spot {
+  group: SVGGElement;
+  token: SVGCircleElement;
+  label: string;
+}
+
 /** So much of the top is left out: the title of the drawing stands in the head of the page. */
 const TITLE_HEIGHT = 56;
-
-// The names of the net in the ids are written as Python's `quote` writes them.
-const quoted = (name: string): string =>
-  encodeURIComponent(name).replace(/[!'()*]/g, (c) => `%${c.charCodeAt(0).toString(16).toUpperCase()}`).replace(/%2F/g, "/");
+const KINDS_OF_ARC = new Map([["input", false], ["output", true]]);
 
 export class Picture {
-  readonly element: HTMLElement;
-  private drawing!: SVGSVGElement;
-  private readonly tokens = new Map<string, SVGCircleElement>();
-  private readonly bars = new Map<string, SVGGElement>();
-  private readonly places = new Map<string, SVGGElement>();
-  private readonly gates: { signal: string; wanted: boolean; group: SVGGElement }[] = [];
-  private readonly flights: Flight[] = [];
+  readonly element = h("div", { class: "picture" });
+  /** What is said over the picture while there is none, or another one is to come. */
+  private readonly note = h("div", { class: "drawing-note", role: "status" });
+  private readonly root = this.element.attachShadow({ mode: "open" });
+  private readonly style = document.createElement("style");
+  private drawing: SVGSVGElement | null = null;
+  private readonly spots = new Map<string, Spot>();
+  private readonly bars = new Map<string, SVGGElement[]>();
+  private readonly arcs = new Map<string, Arc[]>();
+  private readonly gates = new Map<string, Gate[]>();
+  private readonly flights = new Flights();
+  /** The place that stands for a place inside a folded task. */
+  private readonly within = new Map<string, string>();
   private width = 0;
   private height = 0;
   private scale = 1;
-  private told: Record<string, Wait> = {};
-  private readonly marked = new Set<string>();
+  private held = new Set<string>();
+  private on = new Set<string>();
+  private marking: Iterable<string> = [];
+  private signals: Iterable<string> = [];
+  private readonly waits = new Map<string, Wait>();
+  private readonly marked = new Set<Element>();
+  private chosen: [string, string] | null = null;
 
   constructor(
     private net: Net,
-    text: string,
-    private readonly on: {
-      place?: (name: string) => void;
-      transition?: (name: string) => void;
-      signal?: (name: string) => void;
-      pointed?: (name: string | null) => void;
-    },
+    private readonly pressing: Pressed,
   ) {
-    this.element = document.createElement("div");
-    this.element.className = "picture";
-    const style = document.createElement("style");
-    style.textContent = pictureStyle;
-    this.element.attachShadow({ mode: "open" }).append(style);
-    this.draw(net, text);
+    this.style.textContent = pictureStyle;
+    this.root.append(document.createElement("slot"), this.style);
+    this.element.append(this.note);
     this.pan();
-    if (this.on.place) this.rove();
+    if (pressing.place) this.rove();
   }
 
-  /** Show another drawing, of the same size and at the same place as the one before. */
-  draw(net: Net, text: string): void {
+  say(...words: (Node | string)[]): void {
+    this.note.replaceChildren(...words);
+  }
+
+  /** Show a drawing; one that takes the place of another is as large, and stands where that one stood. */
+  draw(net: Net, drawn: Drawn): void {
     this.net = net;
-    for (const map of [this.tokens, this.bars, this.places]) map.clear();
-    this.gates.length = this.flights.length = 0;
-    this.told = {};
+    const isFirst = this.drawing === null;
+    const hadFocus = this.root.activeElement !== null;
+    for (const map of [this.spots, this.bars, this.arcs, this.gates, this.within]) map.clear();
+    this.flights.end();
     this.drawing?.remove();
-    const parsed = new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
-    this.drawing = document.adoptNode(parsed) as unknown as SVGSVGElement;
-    this.width = Number(this.drawing.getAttribute("width"));
-    this.height = Number(this.drawing.getAttribute("height")) - TITLE_HEIGHT;
-    this.drawing.setAttribute("role", "group");
-    this.drawing.setAttribute("aria-label", `the net ${net.name}`);
-    this.element.shadowRoot!.prepend(this.drawing);
-    this.prepare();
-    this.zoomTo(this.scale);
+    const parsed = new DOMParser().parseFromString(drawn.picture, "image/svg+xml").documentElement;
+    const drawing = (this.drawing = document.adoptNode(parsed) as unknown as SVGSVGElement);
+    this.width = Number(drawing.getAttribute("width"));
+    this.height = Number(drawing.getAttribute("height")) - TITLE_HEIGHT;
+    drawing.setAttribute("role", "group");
+    drawing.setAttribute("aria-label", `the net ${net.name}`);
+    this.style.before(drawing);
+    this.prepare(drawing, drawn.members);
+    if (isFirst) this.fit();
+    else this.zoomTo(this.scale);
+    this.showAll();
+    if (this.chosen) this.choose(...this.chosen);
+    if (hadFocus) this.element.focus();
   }
 
-  private found<T extends Element>(...names: [string, ...string[]]): T | null {
-    const [kind, ...rest] = names;
-    return this.element.shadowRoot!.getElementById([kind, ...rest.map(quoted)].join(":")) as T | null;
+  private prepare(drawing: SVGSVGElement, members: Record<string, string[]>): void {
+    for (const [task, places] of Object.entries(members)) for (const place of places) this.within.set(place, task);
+    const says = new Map([...this.net.places, ...this.net.transitions].map((one) => [one.name, one.says]));
+    for (const part of drawing.querySelectorAll<SVGElement>("[id]")) {
+      const [kind, ...names] = part.id.split(":").map(decodeURIComponent);
+      const name = names[0]!;
+      if (kind === "place" && part instanceof SVGGElement) this.place(name, part, says.get(name) ?? "", members[name]);
+      else if (kind === "transition" && part instanceof SVGGElement) this.transition(name, part, says.get(name) ?? "");
+      else if (kind === "gate" && part instanceof SVGGElement) this.gate({ signal: names[1]!, wanted: names.length < 3, group: part }, name);
+      else if (KINDS_OF_ARC.has(kind!) && part instanceof SVGPathElement) this.of(this.arcs, name).push({ path: part, backwards: KINDS_OF_ARC.get(kind!)! });
+    }
   }
 
-  private prepare(): void {
-    for (const place of this.net.places) {
-      const group = this.found<SVGGElement>("place", place.name);
-      const circle = group?.querySelector("circle.place");
-      if (!group || !circle) continue;
-      group.querySelector("circle.token")?.remove();
-      const at = { cx: circle.getAttribute("cx")!, cy: circle.getAttribute("cy")!, r: 5.5 };
-      const token = svg("circle", { class: "token live", ...at });
-      circle.after(token);
-      group.setAttribute("role", "img");
-      this.tokens.set(place.name, token);
-      this.places.set(place.name, group);
-      if (this.on.place) this.pressed(group, () => this.on.place?.(place.name));
-      if (this.on.place) group.setAttribute("aria-label", [place.name, place.says].filter(Boolean).join(", "));
+  private of<T>(map: Map<string, T[]>, name: string): T[] {
+    const found = map.get(name) ?? [];
+    map.set(name, found);
+    return found;
+  }
+
+  private place(name: string, group: SVGGElement, says: string, members: string[] | undefined): void {
+    group.querySelector("circle.token")?.remove();
+    const circle = [...group.querySelectorAll("circle")].at(-1)!;
+    const token = svg("circle", { class: "token live", cx: circle.getAttribute("cx")!, cy: circle.getAttribute("cy")!, r: 5.5 });
+    circle.after(token);
+    const task = members && `the task of ${members.join(", ")}`;
+    this.spots.set(name, { group, token, label: [task ?? name, task ? "" : says].filter(Boolean).join(", ") });
+    group.setAttribute("role", "img");
+    if (task && this.pressing.task) {
+      group.classList.add("task");
+      group.setAttribute("tabindex", "0");
+      this.pressed(group, () => this.pressing.task?.(name));
     }
-    for (const { name, says } of this.net.transitions) {
-      const group = this.found<SVGGElement>("transition", name);
-      if (group === null) continue;
-      for (const bar of group.querySelectorAll<SVGRectElement>("rect.bar")) {
-        const [x, y, width, height] = ["x", "y", "width", "height"].map((key) => Number(bar.getAttribute(key)));
-        bar.before(svg("rect", { class: "hit", x: x! - 5, y: y! - 7, width: width! + 10, height: height! + 14, rx: 7 }));
-      }
-      group.classList.add("transition");
-      group.setAttribute("data-says", says);
-      this.pressed(group, () => this.on.transition?.(name));
-      for (const kind of ["pointerenter", "focus"]) group.addEventListener(kind, () => this.on.pointed?.(name));
-      for (const kind of ["pointerleave", "blur"]) group.addEventListener(kind, () => this.on.pointed?.(null));
-      this.bars.set(name, group);
+    if (this.pressing.place) this.pressed(group, () => this.pressing.place?.(name));
+  }
+
+  private transition(name: string, group: SVGGElement, says: string): void {
+    for (const bar of group.querySelectorAll<SVGRectElement>("rect.bar")) {
+      const [x, y, width, height] = ["x", "y", "width", "height"].map((key) => Number(bar.getAttribute(key)));
+      bar.before(svg("rect", { class: "hit", x: x! - 5, y: y! - 7, width: width! + 10, height: height! + 14, rx: 7 }));
     }
-    for (const signal of this.net.signals) {
-      for (const transition of signal.gates) {
-        for (const wanted of [true, false]) {
-          const group = this.found<SVGGElement>("gate", transition, signal.name, ...(wanted ? [] : ["0"]));
-          if (group === null) continue;
-          group.classList.add("external");
-          if (this.on.signal) {
-            group.classList.add("switch");
-            group.addEventListener("click", () => this.on.signal?.(signal.name));
-          }
-          this.gates.push({ signal: signal.name, wanted, group });
-        }
-      }
-    }
+    group.classList.add("transition");
+    group.setAttribute("data-says", says);
+    group.setAttribute("role", "img");
+    group.setAttribute("tabindex", "-1"); // what listens for the focus would be reached by Tab
+    if (this.pressing.transition) this.pressed(group, () => this.pressing.transition?.(name));
+    for (const kind of ["pointerenter", "focus"]) group.addEventListener(kind, () => this.pressing.pointed?.(name));
+    for (const kind of ["pointerleave", "blur"]) group.addEventListener(kind, () => this.pressing.pointed?.(null));
+    const all = this.of(this.bars, name);
+    if (all.length > 0) group.setAttribute("aria-hidden", "true"); // it stands in the panel of other controllers, too
+    all.push(group);
+  }
+
+  private gate(gate: Gate, transition: string): void {
+    gate.group.classList.add("external");
+    this.of(this.gates, transition).push(gate);
+    if (!this.pressing.signal) return;
+    gate.group.classList.add("switch");
+    gate.group.addEventListener("click", () => this.pressing.signal?.(gate.signal));
   }
 
   private pressed(group: SVGGElement, act: () => void): void {
@@ -144,10 +175,10 @@ export class Picture {
 
   /** Go through places and transitions by the arrow keys; one of them is reached by Tab. */
   private rove(): void {
-    this.element.shadowRoot!.addEventListener("keydown", (event) => {
+    this.root.addEventListener("keydown", (event) => {
       const to = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[(event as KeyboardEvent).key];
       if (to === undefined) return;
-      const all = [...this.element.shadowRoot!.querySelectorAll<SVGGElement>("[role=button]")];
+      const all = [...this.root.querySelectorAll<SVGGElement>("[role=button]:not([aria-hidden])")];
       const at = all.indexOf(event.target as SVGGElement);
       const next = all[(at + to + all.length) % all.length];
       if (at < 0 || next === undefined) return;
@@ -159,91 +190,90 @@ export class Picture {
 
   /** Show which place or transition is chosen. */
   choose(kind: string, name: string): void {
-    const chosen = kind === "place" ? this.places.get(name) : this.bars.get(name);
-    const all = [...this.places.values(), ...this.bars.values()];
+    this.chosen = [kind, name];
+    const chosen = kind === "place" ? [this.spots.get(name)?.group] : (this.bars.get(name) ?? []);
+    const all = [...[...this.spots.values()].map((one) => one.group), ...[...this.bars.values()].flat()];
     for (const one of all) {
-      one.classList.toggle("chosen", one === chosen);
-      one.setAttribute("tabindex", one === (chosen ?? all[0]) ? "0" : "-1");
-      if (one === chosen) one.setAttribute("aria-pressed", "true");
+      one.classList.toggle("chosen", chosen.includes(one));
+      one.setAttribute("tabindex", one === (chosen[0] ?? all[0]) ? "0" : "-1");
+      if (chosen.includes(one)) one.setAttribute("aria-pressed", "true");
       else one.removeAttribute("aria-pressed");
     }
   }
 
-  /** Show tokens, gates, and what may fire. */
+  /** Show tokens, gates, and what may fire; of transitions that are not told what was told before holds on. */
   show(shown: Shown): void {
-    const marking = new Set(shown.marking);
-    for (const [name, token] of this.tokens) token.classList.toggle("there", marking.has(name));
-    const signals = new Set(shown.signals);
-    for (const gate of this.gates) gate.group.classList.toggle("open", signals.has(gate.signal) === gate.wanted);
+    this.marking = shown.marking;
+    this.signals = shown.signals;
     for (const [name, wait] of Object.entries(shown.transitions)) {
-      const before = this.told[name];
-      if (before !== undefined && before.may === wait.may && before.why === wait.why) continue;
-      const group = this.bars.get(name);
-      if (group === undefined) continue;
-      for (const may of ["fire", "wait", "not"] as const) group.classList.toggle(`may-${may}`, wait.may === may);
-      const playable = this.on.transition !== undefined;
-      group.setAttribute("tabindex", playable && wait.may === "fire" ? "0" : "-1");
-      const says = group.getAttribute("data-says");
-      const state = wait.may === "fire" ? "may fire" : (wait.why ?? "");
-      group.setAttribute("aria-label", [name, says, state].filter(Boolean).join(", "));
+      const before = this.waits.get(name);
+      this.waits.set(name, wait);
+      if (before?.may !== wait.may || before?.why !== wait.why) this.showBar(name, wait);
     }
-    this.told = { ...this.told, ...shown.transitions };
+    if (this.drawing === null) return;
+    const held = this.holding(shown.marking);
+    for (const name of held) if (!this.held.has(name)) this.showToken(name, true);
+    for (const name of this.held) if (!held.has(name)) this.showToken(name, false);
+    this.held = held;
+    const on = new Set(shown.signals);
+    const turned = on.size !== this.on.size || [...on].some((one) => !this.on.has(one));
+    this.on = on;
+    if (turned) this.showGates();
+  }
+
+  private showAll(): void {
+    this.held = this.holding(this.marking);
+    for (const name of this.spots.keys()) this.showToken(name, this.held.has(name));
+    this.on = new Set(this.signals);
+    this.showGates();
+    for (const [name, wait] of this.waits) this.showBar(name, wait);
+  }
+
+  private holding(marking: Iterable<string>): Set<string> {
+    const held = new Set<string>();
+    for (const name of marking) held.add(this.within.get(name) ?? name);
+    return held;
+  }
+
+  private showToken(name: string, there: boolean): void {
+    const spot = this.spots.get(name);
+    if (spot === undefined) return;
+    spot.token.classList.toggle("there", there);
+    spot.group.setAttribute("aria-label", there ? `${spot.label}, with a token` : spot.label);
+  }
+
+  private showGates(): void {
+    for (const gates of this.gates.values())
+      for (const gate of gates) gate.group.classList.toggle("open", this.on.has(gate.signal) === gate.wanted);
+  }
+
+  private showBar(name: string, wait: Wait): void {
+    for (const [i, group] of (this.bars.get(name) ?? []).entries()) {
+      for (const may of ["fire", "wait", "not"] as const) group.classList.toggle(`may-${may}`, wait.may === may);
+      if (i > 0) continue;
+      if (this.pressing.transition) group.setAttribute("tabindex", wait.may === "fire" ? "0" : "-1");
+      const state = wait.may === "fire" ? "may fire" : (wait.why ?? "");
+      group.setAttribute("aria-label", [name, group.getAttribute("data-says"), state].filter(Boolean).join(", "));
+    }
   }
 
   /** Mark what a transition waits for; null marks nothing. */
   mark(name: string | null): void {
-    for (const id of this.marked) this.element.shadowRoot!.getElementById(id)?.classList.remove("missing");
+    for (const one of this.marked) one.classList.remove("missing");
     this.marked.clear();
-    const wait = name === null ? undefined : this.told[name];
+    const wait = name === null ? undefined : this.waits.get(name);
     if (name === null || wait === undefined || wait.may === "fire") return;
-    const ids = [...(wait.empty ?? []), ...(wait.full ?? [])].map((place) => `place:${quoted(place)}`);
-    for (const signal of wait.closed ?? [])
-      ids.push(`gate:${quoted(name)}:${quoted(signal)}`, `gate:${quoted(name)}:${quoted(signal)}:0`);
-    for (const id of ids) {
-      this.element.shadowRoot!.getElementById(id)?.classList.add("missing");
-      this.marked.add(id);
+    for (const place of [...(wait.empty ?? []), ...(wait.full ?? [])]) {
+      const spot = this.spots.get(this.within.get(place) ?? place);
+      if (spot) this.marked.add(spot.group);
     }
+    for (const gate of this.gates.get(name) ?? []) if (wait.closed?.includes(gate.signal)) this.marked.add(gate.group);
+    for (const one of this.marked) one.classList.add("missing");
   }
 
   /** Let tokens run along the arcs of what has fired. */
   fly(fired: Iterable<string>): void {
-    if (calm() || document.hidden) return;
-    const now = performance.now();
-    for (const name of fired) {
-      const group = this.bars.get(name);
-      if (group !== undefined && !group.classList.contains("fired-now")) {
-        group.classList.add("fired-now");
-        setTimeout(() => group.classList.remove("fired-now"), FLIGHT_MS + TURN_MS);
-      }
-      for (const [kind, backwards] of [["input", false], ["output", true]] as const) {
-        for (const path of this.element.shadowRoot!.querySelectorAll<SVGPathElement>(
-          `path[id^="${CSS.escape(kind)}:${quoted(name)}:"]`,
-        )) {
-          if (this.flights.length >= FLIGHTS_MAX) return;
-          const circle = svg("circle", { class: "token flying", r: 5, cx: -50, cy: -50 });
-          this.drawing.append(circle);
-          const begin = now + (backwards ? TURN_MS : 0);
-          this.flights.push({ circle, path, length: path.getTotalLength(), backwards, begin });
-        }
-      }
-    }
-    if (this.flights.length > 0) requestAnimationFrame((at) => this.flown(at));
-  }
-
-  private flown(now: number): void {
-    for (let i = this.flights.length - 1; i >= 0; i--) {
-      const flight = this.flights[i]!;
-      const done = (now - flight.begin) / (FLIGHT_MS - TURN_MS);
-      if (done >= 1) {
-        flight.circle.remove();
-        this.flights.splice(i, 1);
-      } else if (done >= 0) {
-        const point = flight.path.getPointAtLength(flight.length * (flight.backwards ? 1 - done : done));
-        flight.circle.setAttribute("cx", String(point.x));
-        flight.circle.setAttribute("cy", String(point.y));
-      }
-    }
-    if (this.flights.length > 0) requestAnimationFrame((at) => this.flown(at));
+    for (const name of fired) this.flights.fly(this.bars.get(name) ?? [], this.arcs.get(name) ?? []);
   }
 
   // How large it is shown
@@ -259,13 +289,14 @@ export class Picture {
   }
 
   private zoomTo(scale: number): void {
-    const { element } = this;
+    const { element, drawing } = this;
+    if (drawing === null) return;
     const x = (element.scrollLeft + element.clientWidth / 2) / (this.width * this.scale);
     const y = (element.scrollTop + element.clientHeight / 2) / (this.height * this.scale);
     this.scale = scale;
-    this.drawing.setAttribute("viewBox", `0 ${TITLE_HEIGHT} ${this.width} ${this.height}`);
-    this.drawing.setAttribute("width", String(this.width * scale));
-    this.drawing.setAttribute("height", String(this.height * scale));
+    drawing.setAttribute("viewBox", `0 ${TITLE_HEIGHT} ${this.width} ${this.height}`);
+    drawing.setAttribute("width", String(this.width * scale));
+    drawing.setAttribute("height", String(this.height * scale));
     element.scrollLeft = x * this.width * scale - element.clientWidth / 2;
     element.scrollTop = y * this.height * scale - element.clientHeight / 2;
   }

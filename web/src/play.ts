@@ -2,7 +2,8 @@
 
 import { announce, counted, h } from "./dom";
 import { banner, frame, panel, watchFile, type Frame } from "./frame";
-import { Picture } from "./picture";
+import { Drawing } from "./drawing";
+import type { Picture } from "./picture";
 import { Playback } from "./playback";
 import { ask, Refused, type At, type EditState, type Fired, type Moment, type PlayPage, type Run, type RunSummary, type Verdict } from "./server";
 import { TopView } from "./top_view";
@@ -44,13 +45,15 @@ export class Play {
     private readonly reload: () => void,
   ) {
     for (const { name, says } of page.net.transitions) this.words.set(name, says);
-    this.picture = new Picture(page.net, page.picture, {
+    const drawing = new Drawing(page.net, {
       transition: (name) => void this.fire(name),
       signal: (name) => void this.toggle(name),
       pointed: (name) => this.picture.mark(name ?? this.explained),
     });
+    this.picture = drawing.picture;
     this.top = new TopView(page.top);
-    this.frame = frame(page.net.name || "the net", page.net.description, "Playing", this.picture, this.top);
+    this.frame = frame(page.net.name || "the net", page.net.description, "Playing", drawing, this.top);
+    void drawing.draw(page.net, null);
     this.steps = [{ what: "the initial marking", moment: "scene" in page.top ? { ...page.moment, top: page.top } : page.moment }];
     const editButton = this.button("Edit", "Edit the net file", () => void this.beginEdit());
     this.frame.tools.append(this.undoButton, this.redoButton, this.resetButton, this.gatesSwitch, editButton);
@@ -314,9 +317,17 @@ export class Play {
         ...rows.sort((a, b) => Number(a.status === "proved") - Number(b.status === "proved")).map((one) =>
           h("li", { class: bad(one) },
             h("div", {}, h("b", {}, h("i", { "aria-hidden": "true" }, sign[one.status]), ` ${one.name}`), h("span", {}, `${one.status}: ${one.says}`), one.hint && one.status !== "proved" ? h("span", { class: "soft" }, one.hint) : null),
-            known.has(one.name) ? played(one.name) : null)),
+            known.has(one.name) ? played(one.name) : null, this.cures(one))),
       ),
     );
+  }
+
+  /** What to write so that a verdict holds; each was checked before it is offered. */
+  private cures(verdict: Verdict): HTMLElement | null {
+    if (verdict.cures.length === 0) return null;
+    const inCode = (words: string): (Node | string)[] => words.split("`").map((part, i) => (i % 2 === 1 ? h("code", {}, part) : part));
+    return h("details", { class: "cures" }, h("summary", {}, `${counted(verdict.cures.length, "cure")} of ${verdict.name}`), h("ul", { class: "list" }, ...verdict.cures.map((cure) =>
+      h("li", {}, ...inCode(cure.changes.join("; and ")), h("span", { class: "soft" }, `checked: ${cure.checked}`)))));
   }
 
   private check(button: HTMLButtonElement): Promise<void> {

@@ -61,6 +61,13 @@ export interface Net {
   signals: Signal[];
 }
 
+/** The picture of a net, its folded tasks with the places inside them, and what can be folded. */
+export interface Drawn {
+  picture: string;
+  members: Record<string, string[]>;
+  foldable: string[];
+}
+
 export interface RunSummary {
   name: string;
   says: string;
@@ -92,6 +99,8 @@ export interface Verdict {
   weight: "required" | "warning" | "information";
   says: string;
   hint: string;
+  /** Changes that make it hold, each with what checking the changed net has shown. */
+  cures: { changes: string[]; checked: string }[];
 }
 
 export interface PlayPage {
@@ -99,7 +108,6 @@ export interface PlayPage {
   file: string;
   editable: boolean;
   net: Net;
-  picture: string;
   moment: Moment;
   runs: RunSummary[];
   verdicts: Verdict[] | null;
