@@ -8,10 +8,11 @@ BIN := $(VENV)/bin
 MADE := $(VENV)/made
 CRATE := analysis/engine
 CARGO_OPTIONS := --locked --manifest-path $(CRATE)/Cargo.toml
-# Some tests wait for links, devices and browsers, so one worker more than there are processors.
-PYTEST_OPTIONS ?= -q -n $(shell echo $$(($$(nproc 2>/dev/null || echo 1) + 1))) --dist loadfile
+# Some tests wait for links, devices and browsers, so one worker more than there are processors. Files go in their order:
+# those with few tests, which have the longest, would else come last, and one worker would end alone.
+PYTEST_OPTIONS ?= -q -n $(shell echo $$(($$(nproc 2>/dev/null || echo 1) + 1))) --dist loadfile --no-loadscope-reorder
 # A campaign: how many times the examples of a test run, from which seed, and in which folder of tests.
-FACTOR ?= 20
+FACTOR ?= 40
 SEED := $(shell date +%s)
 CAMPAIGN ?= tests
 # A rehearsal: how many runs of each cell, from which seed, by how many processes.

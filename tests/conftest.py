@@ -3,9 +3,12 @@
 A shared machine is slow now and then, which is no failure. In CI a failure must be that of the change and come again;
 new examples are drawn on the engineers' own machines, and many in a campaign, which goes by the seed it prints. The
 cache of `firable check` is off, so that no test is answered by an earlier one.
+
+Whoever runs the tests in the background has Ctrl-C ignored, and so would all processes that the tests start.
 """
 
 import os
+import signal
 
 from hypothesis import settings
 from support.examples import FACTOR, FIRST_SEED
@@ -15,6 +18,8 @@ IN_CAMPAIGN = FACTOR > 1
 settings.register_profile("firable", deadline=None, derandomize=bool(os.environ.get("CI")) and not IN_CAMPAIGN)
 settings.load_profile("firable")
 os.environ["FIRABLE_CACHE"] = ""
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_report_header() -> list[str]:

@@ -23,7 +23,7 @@ from firable.nets.queries import parse_query
 from firable.nets.verdict import Status, Verdict, Witness
 
 
-@examples(40)
+@examples(20)
 @given(st.data(), lively_nets())
 def test_a_bound_by_goals_is_that_over_all_markings(data: st.DataObject, net: Net) -> None:
     places = tuple(data.draw(st.lists(st.sampled_from([place.name for place in net.places]), min_size=1, max_size=6)))

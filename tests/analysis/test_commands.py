@@ -84,7 +84,7 @@ def places_of(net: Net) -> dict[str, Command]:
     return {place.name: place.command for place in net.places if place.command is not None}
 
 
-@examples(150)
+@examples(75)
 @given(ring_nets(commands=True), st.sampled_from(Discipline))
 def test_verdicts_on_commands_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     sent, graph = places_of(net), Player(net).reachable(step=discipline is Discipline.STEP)

@@ -23,7 +23,7 @@ from firable.nets.net import Net, Place, Transition
 from firable.semantics.player import Player
 
 
-@examples(150)
+@examples(75)
 @given(st.one_of(ring_nets(signals=True), dense_nets(most_transitions=3)))
 def test_where_contact_is_excluded_no_marking_is_in_contact_and_the_certificate_shows_it(net: Net) -> None:
     found = decide_contact_by_invariants(net, Limits())

@@ -36,7 +36,7 @@ def units_by_definition(equations: list[dict[int, int]], n: int) -> list[frozens
     return [s for s in found if not any(other < s for other in found)]
 
 
-@examples(120)
+@examples(60)
 @given(NETS)
 def test_with_tries_enough_every_place_and_transition_that_is_in_a_unit_is_covered_by_one(net: Net) -> None:
     for equations, n in ((columns(net), len(net.places)), (rows(net), len(net.transitions))):
@@ -47,7 +47,7 @@ def test_with_tries_enough_every_place_and_transition_that_is_in_a_unit_is_cover
         assert found.complete
 
 
-@examples(80)
+@examples(40)
 @given(NETS)
 def test_a_bound_on_tokens_leaves_out_the_units_that_hold_more(net: Net) -> None:
     marked = frozenset(i for i, place in enumerate(net.places) if place.marked)
@@ -57,7 +57,7 @@ def test_a_bound_on_tokens_leaves_out_the_units_that_hold_more(net: Net) -> None
     assert set(found.uncovered) == set(range(len(net.places))) - set().union(*units)
 
 
-@examples(120)
+@examples(60)
 @given(NETS)
 def test_a_draining_set_never_gains_tokens_and_takes_one_from_itself_where_it_gains(net: Net) -> None:
     changes, n = columns(net), len(net.places)
@@ -128,7 +128,7 @@ def test_a_deadline_ends_each_of_them() -> None:
     assert not minimal_semiflows(equations, n, rows_max=100, deadline=over).complete
 
 
-@examples(200)
+@examples(100)
 @given(
     st.lists(st.dictionaries(st.integers(0, 5), st.integers(-4, 4), max_size=4), max_size=6),
 )

@@ -44,7 +44,7 @@ def solved(relation: Relation) -> Iterator[Edge]:
 
 @pytest.mark.parametrize(("encode", "step"), DISCIPLINES)
 @given(net=dense_nets(signals=True))
-@examples(30)
+@examples(15)
 def test_models_of_a_relation_are_the_edges_of_the_player(encode: Encoder, step: bool, net: Net) -> None:
     found = list(solved(encode(net, None)))
     assert len(set(found)) == len(found)

@@ -153,7 +153,7 @@ def is_branching_bisimulation(graph: Moves, classes: list[int], divergence: bool
     )
 
 
-@examples(40)
+@examples(20)
 @given(moves(), st.booleans())
 def test_branching_classes_are_the_coarsest_that_keep_the_definition(graph: Moves, divergence: bool) -> None:
     found = branching_classes(graph, divergence=divergence)
@@ -173,7 +173,7 @@ def test_graphs_that_join_in_different_places_are_not_isomorphic() -> None:
     assert not isomorphic(b, a)
 
 
-@examples(60)
+@examples(30)
 @given(ring_nets(), st.sampled_from(Discipline), st.data())
 def test_a_complement_gives_an_isomorphic_graph_in_either_discipline(
     net: Net, discipline: Discipline, data: st.DataObject
@@ -187,7 +187,7 @@ def test_a_complement_gives_an_isomorphic_graph_in_either_discipline(
     assert branching_bisimilar(a, b, everything, everything)
 
 
-@examples(100)
+@examples(50)
 @given(ring_nets(), st.data())
 def test_a_gate_more_is_isomorphic_only_if_it_forbids_nothing(net: Net, data: st.DataObject) -> None:
     t = data.draw(st.integers(0, len(net.transitions) - 1))

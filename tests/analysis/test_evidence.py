@@ -84,7 +84,7 @@ def questions(draw: st.DrawFn) -> tuple[Net, Formula]:
 
 @pytest.mark.parametrize("discipline", DISCIPLINES)
 @given(question=questions())
-@examples(25)
+@examples(13)
 def test_all_that_induction_finds_is_shown_to_two_solvers(
     discipline: Discipline, question: tuple[Net, Formula]
 ) -> None:
@@ -99,7 +99,7 @@ def test_all_that_induction_finds_is_shown_to_two_solvers(
 
 @pytest.mark.parametrize("discipline", DISCIPLINES)
 @given(question=questions(), kind=st.sampled_from([ClaimKind.NEVER, ClaimKind.ALWAYS_POSSIBLE]))
-@examples(25)
+@examples(13)
 def test_the_markings_of_a_net_show_a_claim_iff_it_is_true(
     discipline: Discipline, question: tuple[Net, Formula], kind: ClaimKind
 ) -> None:
@@ -116,7 +116,7 @@ def test_the_markings_of_a_net_show_a_claim_iff_it_is_true(
 
 
 @given(question=questions(), data=st.data(), discipline=st.sampled_from(DISCIPLINES))
-@examples(80)
+@examples(40)
 def test_no_certificate_shows_a_claim_that_is_false(
     question: tuple[Net, Formula], data: st.DataObject, discipline: Discipline
 ) -> None:

@@ -66,7 +66,7 @@ def asked(draw: st.DrawFn, *, linear: bool = False) -> tuple[Net, Temporal]:
 
 @pytest.mark.parametrize("discipline", DISCIPLINES)
 @given(question=asked())
-@examples(25)
+@examples(13)
 def test_a_formula_of_ctl_has_labels_iff_it_holds(discipline: Discipline, question: tuple[Net, Temporal]) -> None:
     net, formula = question
     claim = Claim(ClaimKind.CTL, formula)
@@ -90,7 +90,7 @@ def test_going_back_there_and_back_misses_no_transition() -> None:
 
 
 @given(question=asked(linear=True))
-@examples(30)
+@examples(15)
 def test_a_formula_of_ltl_is_shown_iff_it_holds_and_its_run_iff_not(question: tuple[Net, Temporal]) -> None:
     net, formula = question
     claim = Claim(ClaimKind.LTL, formula)
@@ -125,7 +125,7 @@ def responses(draw: st.DrawFn) -> tuple[Net, Claim]:
 
 @pytest.mark.parametrize("discipline", DISCIPLINES)
 @given(question=responses())
-@examples(60)
+@examples(30)
 def test_a_response_has_ranks_iff_it_holds_and_a_run_iff_not(
     discipline: Discipline, question: tuple[Net, Claim]
 ) -> None:
@@ -142,7 +142,7 @@ def test_a_response_has_ranks_iff_it_holds_and_a_run_iff_not(
 
 
 @given(net=st.one_of(marked_graphs(), free_choice_nets()))
-@examples(60)
+@examples(30)
 def test_a_theorem_says_only_what_is_true(net: Net) -> None:
     certifier = Certifier(net, Discipline.INTERLEAVING, Limits())
     start = Claim(ClaimKind.ALWAYS_POSSIBLE, is_marking(net, net.initial_marking))
@@ -175,7 +175,7 @@ def nets_with_properties(draw: st.DrawFn) -> tuple[Net, tuple[Query, ...]]:
 
 @pytest.mark.parametrize("discipline", DISCIPLINES)
 @given(question=nets_with_properties())
-@examples(20)
+@examples(10)
 def test_whatever_is_decided_of_a_small_net_is_shown(
     discipline: Discipline, question: tuple[Net, tuple[Query, ...]]
 ) -> None:
@@ -202,7 +202,7 @@ def test_none_starves_is_shown_by_no_transition_being_live_where_there_is_no_arb
 
 
 @given(net=ring_nets(signals=True, commands=True))
-@examples(40)
+@examples(20)
 def test_the_checker_and_the_techniques_mean_the_same_by_a_verdict(net: Net) -> None:
     for name, meant in (
         ("contact-free", contact(net)),
@@ -216,7 +216,7 @@ def test_the_checker_and_the_techniques_mean_the_same_by_a_verdict(net: Net) -> 
 
 
 @given(net=dense_nets(), marking=st.integers(0, 31))
-@examples(40)
+@examples(20)
 def test_a_formula_means_the_same_of_a_net_that_starts_elsewhere(net: Net, marking: int) -> None:
     assert marking_of(net, tidy(is_marking(net, marking))) == marking
     assert without_start(net, is_marking(net, net.initial_marking)) == And(
@@ -273,7 +273,7 @@ def a_claim(chance: random.Random, net: Net) -> Claim:
 
 
 @pytest.mark.seeds
-@pytest.mark.parametrize("seed", seeds(150))
+@pytest.mark.parametrize("seed", seeds(75))
 def test_no_forged_document_shows_a_false_claim(seed: int) -> None:
     chance = random.Random(seed)
     net = lively_net(chance, most_places=6)
@@ -321,7 +321,7 @@ def test_no_forged_example_shows_a_false_claim(kind: str, seed: int) -> None:
 
 
 @pytest.mark.seeds
-@pytest.mark.parametrize("seed", seeds(40))
+@pytest.mark.parametrize("seed", seeds(20))
 def test_no_verdict_is_shown_that_is_not_so(seed: int) -> None:
     """Each verdict turned into its opposite, with all claims that are shown of the net."""
     chance = random.Random(seed)

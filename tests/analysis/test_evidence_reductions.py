@@ -43,7 +43,7 @@ STEPS_MAX = 10
 @pytest.mark.seeds
 def test_no_step_that_is_taken_loses_the_goal_or_adds_a_marking() -> None:
     taken_of = dict.fromkeys(Rule, 0)
-    for seed in seeds(60):
+    for seed in seeds(30):
         draw = random.Random(seed)
         net = drawn_net(draw)
         goal = Deadlock() if len(net.places) < 5 or draw.random() < 0.3 else goal_of(draw, net)

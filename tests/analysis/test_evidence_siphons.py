@@ -50,7 +50,7 @@ def some_siphon_has_no_marked_trap(net: Net) -> bool:
 @pytest.mark.seeds
 def test_ranks_are_satisfiable_iff_some_siphon_contains_no_marked_trap() -> None:
     answers = set()
-    for seed in seeds(40):
+    for seed in seeds(20):
         draw = random.Random(seed)
         net = lively_net(draw, 6) if seed % 2 else sparse_net(draw, 6)
         (obligation,) = of_siphons(net, Theorem(TheoremName.FREE_CHOICE, InductiveInvariant()), Terms())

@@ -91,7 +91,7 @@ def runs(draw: st.DrawFn) -> Lasso:
 
 
 @given(run=runs(), formula=ltl_formulas(list("pqrs"), list("tu"), leaves=8))
-@examples(300)
+@examples(150)
 def test_the_tableau_refuses_a_run_iff_it_does_not_satisfy_the_formula(run: Lasso, formula: Temporal) -> None:
     assert satisfied(run, formula) is run.values(formula)[0]
 
@@ -100,7 +100,7 @@ def test_the_tableau_refuses_a_run_iff_it_does_not_satisfy_the_formula(run: Lass
 def test_nested_operators_are_unfolded_right_with_few_looks_at_the_deadline(text: str) -> None:
     formula = parse_temporal(text)
     answers = set()
-    for seed in seeds(40):
+    for seed in seeds(20):
         draw = random.Random(seed)
         letters = [(draw.choice((0, 15, draw.randrange(16))), draw.choice("tu")) for _ in range(draw.randint(1, 6))]
         run = lasso(letters, draw.randrange(len(letters)))
@@ -151,7 +151,7 @@ def shows(evidence: Evidence) -> bool:
 
 
 @given(question=asked(), data=st.data())
-@examples(75)
+@examples(38)
 def test_the_markings_that_a_formula_asks_for_show_it_iff_it_holds_and_none_can_be_spared(
     question: tuple[Net, Temporal], data: st.DataObject
 ) -> None:

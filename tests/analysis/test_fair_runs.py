@@ -25,7 +25,7 @@ FORMULAS = st.sampled_from(TEXTS).map(parse_formula)
 
 @pytest.mark.parametrize("fairness", Fairness)
 @pytest.mark.parametrize("discipline", Discipline)
-@examples(60)
+@examples(30)
 @given(net=ring_nets(signals=True).filter(lambda net: len(net.transitions) > 1), data=st.data())
 def test_sets_decide_response_as_components_do(
     discipline: Discipline, fairness: Fairness, net: Net, data: st.DataObject

@@ -80,7 +80,7 @@ NEITHER = And((Not(Holds("a")), Not(Holds("b"))))
 @example(question=(CLOSING, And((Holds("b"), Holds("c")))))
 @example(question=(RACING, NEITHER))
 @example(question=(TORN, NEITHER))
-@examples(25)
+@examples(13)
 def test_a_goal_is_found_by_bounded_search_iff_it_is_reachable(
     discipline: Discipline, question: tuple[Net, Formula]
 ) -> None:
@@ -95,7 +95,7 @@ def test_a_goal_is_found_by_bounded_search_iff_it_is_reachable(
 @given(question=questions())
 @example(question=(RACING, NEITHER))
 @example(question=(TORN, NEITHER))
-@examples(25)
+@examples(13)
 def test_what_k_induction_decides_is_so(discipline: Discipline, question: tuple[Net, Formula]) -> None:
     net, goal = question
     found = decide_by_k_induction(net, goal, in_time(), discipline=discipline, depth_max=4)
@@ -104,7 +104,7 @@ def test_what_k_induction_decides_is_so(discipline: Discipline, question: tuple[
 
 
 @given(net=dense_nets(signals=True))
-@examples(25)
+@examples(13)
 def test_firings_in_parallel_reach_what_interleaving_reaches(net: Net) -> None:
     player, terms = Player(net), Terms()
     relation = parallel_relation(net, terms)
@@ -121,7 +121,7 @@ def test_firings_in_parallel_reach_what_interleaving_reaches(net: Net) -> None:
 
 @given(net=dense_nets(), discipline=st.sampled_from(DISCIPLINES))
 @example(net=RACING, discipline=Discipline.STEP)
-@examples(25)
+@examples(13)
 def test_structural_facts_hold_in_every_reachable_marking(net: Net, discipline: Discipline) -> None:
     facts = structural_facts(net, Deadline())
     markings = Player(net).reachable(step=discipline is Discipline.STEP)
@@ -139,7 +139,7 @@ def test_structural_facts_hold_in_every_reachable_marking(net: Net, discipline: 
 @example(question=(RACING, NEITHER))
 @example(question=(TORN, NEITHER))
 @example(question=(CLOSING, And((Holds("b"), Holds("c")))))
-@examples(50)
+@examples(25)
 def test_property_directed_reachability_decides_every_goal(question: tuple[Net, Formula]) -> None:
     net, goal = question
     found = decide_by_pdr(net, goal, in_time())

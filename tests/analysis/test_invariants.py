@@ -84,13 +84,13 @@ def dominated(y: tuple[int, ...], vectors: set[tuple[int, ...]]) -> bool:
     return any(max(v) > 1 and {i for i, x in enumerate(v) if x} < support for v in vectors)
 
 
-@examples(60)
+@examples(30)
 @given(dense_nets(most_transitions=4))
 def test_minimal_invariants_are_those_that_exhaustive_search_finds(net: Net) -> None:
     check_both_kinds(net, 3)
 
 
-@examples(40)
+@examples(20)
 @given(ring_nets())
 def test_minimal_invariants_of_rings_are_those_that_exhaustive_search_finds(net: Net) -> None:
     check_both_kinds(net, 1 if len(net.places) + len(net.transitions) > 12 else 2)
@@ -148,7 +148,7 @@ def test_the_empty_net_has_no_invariants() -> None:
         assert (found.minimal, found.dimension, found.complete) == ((), 0, True)
 
 
-@examples(100)
+@examples(50)
 @given(st.one_of(dense_nets(), ring_nets()))
 def test_a_basis_has_as_many_independent_vectors_as_the_space_has_dimensions(net: Net) -> None:
     matrix = incidence(net)

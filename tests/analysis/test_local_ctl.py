@@ -56,7 +56,7 @@ def locally(net: Net, text: str) -> bool | None:
     return decide_ctl_on_the_fly(net, parse_temporal(text), Limits()).answer.holds
 
 
-@examples(75)
+@examples(38)
 @given(asked(), st.sampled_from([1, 2, 5, 256]))
 def test_a_local_value_is_that_over_sets_however_little_a_search_may_meet(
     question: tuple[Net, Temporal], first: int
@@ -68,7 +68,7 @@ def test_a_local_value_is_that_over_sets_however_little_a_search_may_meet(
     assert found is over_sets(net, formula), format_temporal(formula)
 
 
-@examples(60)
+@examples(30)
 @given(asked())
 def test_a_simpler_formula_holds_in_the_same_markings_and_implies_its_state_formula(
     question: tuple[Net, Temporal],
@@ -81,7 +81,7 @@ def test_a_simpler_formula_holds_in_the_same_markings_and_implies_its_state_form
     assert not ctl.sets.space.count(ctl.sets.both(after, ctl.sets.outside(needed)))
 
 
-@examples(30)
+@examples(15)
 @given(asked())
 def test_constants_of_the_net_leave_a_formula_its_markings(question: tuple[Net, Temporal]) -> None:
     net, formula = question
@@ -95,7 +95,7 @@ def test_constants_of_the_net_leave_a_formula_its_markings(question: tuple[Net, 
     assert ctl.of(formula).tolist() == ctl.of(simplified(formula, known)).tolist()
 
 
-@examples(25)
+@examples(13)
 @given(asked())
 def test_goals_and_local_evaluation_together_say_what_sets_say(question: tuple[Net, Temporal]) -> None:
     net, formula = question

@@ -40,7 +40,7 @@ def test_each_class_is_recognised(net: Net, name: str) -> None:
     assert net_class(net, contact_free=True).outside == ()
 
 
-@examples(200)
+@examples(100)
 @given(dense_nets())
 def test_each_class_is_contained_in_the_wider_ones(net: Net) -> None:
     found = net_class(net)
@@ -80,7 +80,7 @@ def test_gates_are_no_arcs_of_the_graph() -> None:
     assert not net_class(read).strongly_connected
 
 
-@examples(100)
+@examples(50)
 @given(dense_nets())
 def test_the_graph_of_arcs_is_connected_as_networkx_says(net: Net) -> None:
     graph: nx.DiGraph[str] = nx.DiGraph()

@@ -60,7 +60,7 @@ def decided_as_over_sets(net: Net, formula: Temporal, turn: Turn) -> bool:
 
 
 @pytest.mark.parametrize("turn", [FIXED, DRAWN])
-@examples(30)
+@examples(15)
 @given(st.data(), st.one_of(ring_nets(), ring_nets(signals=True), lively_nets(), dense_nets(signals=True)))
 def test_a_formula_is_decided_as_over_sets_in_either_order(turn: Turn, data: st.DataObject, net: Net) -> None:
     formula = data.draw(ltl_formulas(*names(net), leaves=6))
@@ -77,7 +77,7 @@ PATTERNS = (
 
 def test_patterns_that_people_ask_are_decided_as_over_sets_on_nets_whose_transitions_compete() -> None:
     held = []
-    for seed in seeds(60):
+    for seed in seeds(30):
         draw = random.Random(seed)
         net = lively_net(draw, 10)
         places, transitions = names(net)

@@ -49,7 +49,7 @@ def graph_of(net: Net, discipline: Discipline) -> nx.MultiDiGraph[Marking]:
     return graph
 
 
-@examples(150)
+@examples(75)
 @given(SITUATIONS, FORMULAS)
 def test_properties_of_markings_are_decided_by_their_definitions(
     situation: tuple[Net, Discipline], formula: Formula
@@ -102,7 +102,7 @@ def fails(net: Net, truth: nx.MultiDiGraph[Marking], p: Formula, q: Formula, fai
 
 
 @pytest.mark.parametrize("fairness", Fairness)
-@examples(60)
+@examples(30)
 @given(situation=SITUATIONS, p=FORMULAS, q=FORMULAS)
 def test_leads_to_fails_iff_some_set_of_markings_recurs_fairly(
     fairness: Fairness, situation: tuple[Net, Discipline], p: Formula, q: Formula

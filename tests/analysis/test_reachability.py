@@ -24,7 +24,7 @@ from firable.semantics.player import Player, holds_in
 from firable.semantics.trace import Discipline
 
 
-@examples(100)
+@examples(50)
 @given(ring_nets(signals=True), st.sampled_from(Discipline))
 def test_columns_agree_with_single_markings(net: Net, discipline: Discipline) -> None:
     graph, player = explore(net, discipline), Player(net)

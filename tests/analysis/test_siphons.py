@@ -70,7 +70,7 @@ def minimal(sets: list[frozenset[str]]) -> set[frozenset[str]]:
     return {s for s in sets if s and not any(other < s for other in sets if other)}
 
 
-@examples(60)
+@examples(30)
 @given(NETS)
 def test_minimal_siphons_and_traps_are_those_among_all_sets_of_places(net: Net) -> None:
     siphons, traps = minimal_siphons(net), minimal_traps(net)
@@ -80,7 +80,7 @@ def test_minimal_siphons_and_traps_are_those_among_all_sets_of_places(net: Net) 
     assert {frozenset(s) for s in traps.minimal} == minimal([s for s in subsets(net) if is_trap(net, s)])
 
 
-@examples(60)
+@examples(30)
 @given(NETS)
 def test_the_largest_siphon_is_the_union_of_all_within(net: Net) -> None:
     for places in subsets(net)[:16]:
@@ -89,7 +89,7 @@ def test_the_largest_siphon_is_the_union_of_all_within(net: Net) -> None:
         assert set(net.names(largest_siphon(net, net.marking(places)))) == siphon
 
 
-@examples(80)
+@examples(40)
 @given(ring_nets(signals=True))
 def test_where_the_premises_hold_the_property_excludes_deadlock(net: Net) -> None:
     report = check(net)
@@ -122,7 +122,7 @@ def test_the_cell_is_proved_free_of_deadlock_and_the_late_one_shows_the_siphon_t
     assert any(not net.marking(siphon) & deadlock for siphon in late.without_marked_trap)
 
 
-@examples(60)
+@examples(30)
 @given(ring_nets(signals=True))
 @example(READING_EACH_OTHER)
 def test_under_steps_the_property_excludes_deadlock_only_without_reads(net: Net) -> None:
@@ -236,7 +236,7 @@ SIPHON_WITH_AN_EMPTY_TRAP = Net(
 )
 
 
-@examples(60)
+@examples(30)
 @given(NETS)
 @example(SIPHON_WITH_AN_EMPTY_TRAP)
 def test_exclusion_and_ranks_decide_the_property_as_all_sets_of_places_do(net: Net) -> None:
@@ -258,7 +258,7 @@ def test_exclusion_and_ranks_decide_the_property_as_all_sets_of_places_do(net: N
     assert not expected or all(any(trap <= s for trap in traps) for s in siphons)
 
 
-@examples(60)
+@examples(30)
 @given(NETS)
 def test_places_that_cannot_be_marked_are_the_largest_siphon_that_is_empty_and_stay_so(net: Net) -> None:
     never = set(range(len(net.places))) - markable(ordinary(net))

@@ -106,7 +106,7 @@ def test_a_run_that_was_cut_off_and_a_graph_that_was_leave_starvation_unknown(mo
     assert of_graph.cost.markings == 1
 
 
-@examples(150)
+@examples(75)
 @given(ring_nets(), st.sampled_from(Discipline))
 def test_the_witness_of_starvation_is_a_run_of_the_graph_that_recurs_without_the_starved(
     net: Net, discipline: Discipline

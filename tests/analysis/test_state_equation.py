@@ -30,7 +30,7 @@ def nets_with_goals(draw: st.DrawFn) -> tuple[Net, Formula]:
     return net, goal
 
 
-@examples(80)
+@examples(40)
 @given(nets_with_goals())
 def test_what_is_refuted_is_not_reachable_and_the_certificate_is_an_inductive_invariant(
     drawn: tuple[Net, Formula],

@@ -40,7 +40,7 @@ def deadlocks_of(net: Net, *, thorough: bool) -> set[int]:
     return set(found)
 
 
-@examples(120)
+@examples(60)
 @given(NETS, st.booleans())
 def test_exactly_the_deadlocks_of_the_whole_graph_are_found(net: Net, thorough: bool) -> None:
     graph = explore(net)
@@ -56,7 +56,7 @@ def test_exactly_the_deadlocks_of_the_whole_graph_are_found(net: Net, thorough: 
         assert found.witness is None
 
 
-@examples(60)
+@examples(30)
 @given(st.data())
 def test_a_goal_is_reachable_iff_the_whole_graph_reaches_it_and_at_the_same_distance(data: st.DataObject) -> None:
     net = data.draw(NETS)
@@ -70,7 +70,7 @@ def test_a_goal_is_reachable_iff_the_whole_graph_reaches_it_and_at_the_same_dist
             assert len(found.witness.firings) == distance
 
 
-@examples(100)
+@examples(50)
 @given(NETS)
 def test_exactly_the_transitions_that_fire_in_the_whole_graph_are_found_firing(net: Net) -> None:
     fired = explore(net).engine.fired()
@@ -88,7 +88,7 @@ def test_exactly_the_transitions_that_fire_in_the_whole_graph_are_found_firing(n
 @pytest.mark.seeds
 @pytest.mark.parametrize("chunk", range(4))
 def test_no_order_that_matters_is_left_out_of_nets_whose_transitions_compete(chunk: int) -> None:
-    for seed in seeds(400, chunk):
+    for seed in seeds(200, chunk):
         draw = random.Random(seed)
         net = lively_net(draw)
         graph, engine = explore(net), _engine.Stubborn(*rows(net))
@@ -266,7 +266,7 @@ def test_a_callable_that_raises_comes_out() -> None:
         engine.deadlocks(max_markings=1 << 30, max_memory_bytes=1 << 30, max_seconds=None, cancelled=cancelled)
 
 
-@examples(50)
+@examples(25)
 @given(ring_nets())
 def test_the_markings_of_a_reduced_graph_are_reachable_ones(net: Net) -> None:
     reachable = Player(net).reachable()

@@ -97,7 +97,7 @@ def markings_of(graph: ReachabilityGraph, column: Column) -> Markings:
     return frozenset(graph.marking(index) for index in indexes(column))
 
 
-@examples(30)
+@examples(15)
 @given(asked(linear=False), st.sampled_from(Discipline))
 def test_ctl_holds_where_its_definition_says_over_both_spaces(question: tuple[Net, Temporal], how: Discipline) -> None:
     net, formula = question
@@ -107,7 +107,7 @@ def test_ctl_holds_where_its_definition_says_over_both_spaces(question: tuple[Ne
     assert markings_of(graph, Ctl(Sets(graph)).of(formula)) == expected
 
 
-@examples(20)
+@examples(10)
 @given(asked(linear=False))
 def test_the_evidence_of_ctl_is_a_run_of_the_net(question: tuple[Net, Temporal]) -> None:
     net, formula = question
@@ -146,7 +146,7 @@ def some_runs(net: Net, seed: int, n_runs: int = 6) -> list[Run]:
     return runs
 
 
-@examples(60)
+@examples(30)
 @given(asked(linear=True), st.integers(0, 2**16))
 def test_ltl_fails_where_a_run_refutes_it_over_both_spaces(question: tuple[Net, Temporal], seed: int) -> None:
     net, formula = question
@@ -162,7 +162,7 @@ def test_ltl_fails_where_a_run_refutes_it_over_both_spaces(question: tuple[Net, 
             assert not satisfies(net, run, formula)
 
 
-@examples(40)
+@examples(20)
 @given(asked(linear=True))
 def test_a_formula_and_its_negation_are_not_both_refuted_by_one_run_nor_both_kept(
     question: tuple[Net, Temporal],
@@ -173,7 +173,7 @@ def test_a_formula_and_its_negation_are_not_both_refuted_by_one_run_nor_both_kep
     assert kept != [True, True]  # there is a run
 
 
-@examples(25)
+@examples(13)
 @given(st.data(), ring_nets())
 def test_the_decision_diagram_answers_like_the_definitions(data: st.DataObject, net: Net) -> None:
     places, transitions = names(net)
@@ -214,7 +214,7 @@ def test_the_laws_of_ltl_hold(one: str, same: str, net: Net) -> None:
     assert holds(f"({same}) -> ({one})")
 
 
-@examples(30)
+@examples(15)
 @given(ring_nets())
 def test_what_both_logics_say_they_decide_alike(net: Net) -> None:
     places, space = names(net)[0], NaiveSpace(net)

@@ -53,7 +53,7 @@ def built(text: str, marked: str, *more: Transition) -> Net:
     return Net("n", tuple(Place(p, marked=p in marked) for p in names), (*moves, *more), (Signal("s"),))
 
 
-@examples(80)
+@examples(40)
 @given(state_machines())
 def test_state_machines_with_one_token_each_are_decided_in_full(net: Net) -> None:
     found = says(net)
@@ -62,7 +62,7 @@ def test_state_machines_with_one_token_each_are_decided_in_full(net: Net) -> Non
         assert ("deadlock-free" in found) == check(net).verdict("deadlock-free").holds
 
 
-@examples(80)
+@examples(40)
 @given(marked_graphs())
 def test_marked_graphs_are_live_iff_every_circuit_holds_a_token(net: Net) -> None:
     found = says(net)
@@ -71,7 +71,7 @@ def test_marked_graphs_are_live_iff_every_circuit_holds_a_token(net: Net) -> Non
         assert not found["live"] or found["reversible"]
 
 
-@examples(100)
+@examples(50)
 @given(free_choice_nets())
 @example(built("a>bc b>d c>e de>a", "a"))
 @example(built("a>b a>c bc>a", "a"))
@@ -84,7 +84,7 @@ def test_safe_free_choice_nets_are_live_iff_every_siphon_contains_a_marked_trap(
         assert found["live"] is False or "reversible" in found
 
 
-@examples(100)
+@examples(50)
 @given(st.one_of(ring_nets(signals=True), dense_nets(most_transitions=3, signals=True)))
 def test_whatever_a_theorem_says_of_any_net_exploration_confirms(net: Net) -> None:
     confirmed(net)

@@ -90,7 +90,7 @@ class Truth:
             assert len(verdict.witness.firings) == distance(self.graph, self.net.initial_marking, targets)
 
 
-@examples(250)
+@examples(125)
 @given(NETS, DISCIPLINES)
 def test_figures_and_witnesses_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     truth = Truth(net, discipline)
@@ -130,7 +130,7 @@ def test_figures_and_witnesses_are_those_of_the_definitions(net: Net, discipline
     truth.shortest("home-markings", set() if home else sinks)
 
 
-@examples(250)
+@examples(125)
 @given(NETS, DISCIPLINES)
 def test_conflicts_and_races_are_those_of_the_definitions(net: Net, discipline: Discipline) -> None:
     truth = Truth(net, discipline)

@@ -69,7 +69,7 @@ def test_a_technique_decides_goals_as_the_oracle_does(method: Method, net: Net, 
 
 
 @pytest.mark.parametrize(("logic", "method"), [(logic, method) for logic in Logic for method in FORMULAS[logic]])
-@examples(30)
+@examples(15)
 @given(net=SMALL_NETS, data=st.data())
 def test_a_technique_decides_formulas_as_the_oracle_does(
     logic: Logic, method: Method, net: Net, data: st.DataObject

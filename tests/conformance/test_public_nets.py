@@ -19,7 +19,7 @@ from firable.analysis.verdicts.behaviour import Behaviour
 from firable.nets.pnml import read_pnml
 
 FOLDER = os.environ.get("FIRABLE_NETS", "")
-MARKINGS_MAX: Final = 3_000_000
+MARKINGS_MAX: Final = 1_000_000
 
 Row = dict[str, str]
 

@@ -160,7 +160,7 @@ def explored(net: Drawn, *, step: bool) -> _engine.Graph:
 
 def both(test: Callable[[Drawn, bool], None]) -> Callable[[], None]:
     """A generated net under either discipline."""
-    return examples(250)(given(net=nets(), step=st.booleans())(test))
+    return examples(125)(given(net=nets(), step=st.booleans())(test))
 
 
 def digraph(graph: _engine.Graph) -> nx.DiGraph[int]:
@@ -230,7 +230,7 @@ def test_sequences_replay_and_are_shortest(net: Drawn, step: bool) -> None:
         assert len(sequence) == naive.distance[graph.marking(i)]
 
 
-@examples(250)
+@examples(125)
 @given(net=nets(), step=st.booleans(), data=st.data())
 def test_paths_within_a_set_are_those_of_networkx(net: Drawn, step: bool, data: st.DataObject) -> None:
     naive, graph = Naive(net, step=step), explored(net, step=step)
@@ -257,7 +257,7 @@ def test_paths_within_a_set_are_those_of_networkx(net: Drawn, step: bool, data: 
     assert graph.backward(bitmap(graph, targets), sorted(within)) == bitmap(graph, can)
 
 
-@examples(125)
+@examples(63)
 @given(net=nets(), step=st.booleans(), data=st.data())
 def test_one_edge_back_is_that_of_the_definition(net: Drawn, step: bool, data: st.DataObject) -> None:
     naive, graph = Naive(net, step=step), explored(net, step=step)
@@ -271,7 +271,7 @@ def test_one_edge_back_is_that_of_the_definition(net: Drawn, step: bool, data: s
     assert graph.before(sorted(targets), sorted(by)) == bytes(any(f & by for f in edges) for edges in fired_into)
 
 
-@examples(125)
+@examples(63)
 @given(net=nets(), step=st.booleans(), data=st.data())
 def test_endless_runs_are_those_into_cycles_within_the_set(net: Drawn, step: bool, data: st.DataObject) -> None:
     graph = explored(net, step=step)
@@ -286,7 +286,7 @@ def test_endless_runs_are_those_into_cycles_within_the_set(net: Drawn, step: boo
     assert graph.endless(None if within is None else bitmap(graph, within)) == bitmap(graph, endless)
 
 
-@examples(125)
+@examples(63)
 @given(net=nets(), step=st.booleans(), data=st.data())
 def test_components_are_those_of_networkx(net: Drawn, step: bool, data: st.DataObject) -> None:
     graph = explored(net, step=step)

@@ -153,7 +153,7 @@ def test_a_step_is_serialisable_iff_some_order_replays_it(net: Net, marking: int
         )
 
 
-@examples(100)
+@examples(50)
 @given(ring_nets(signals=True), st.data())
 def test_a_set_is_a_step_iff_the_player_lists_it(net: Net, data: st.DataObject) -> None:
     player = Player(net)

@@ -12,7 +12,7 @@ from firable.semantics.judgement import Judgement, judge
 from firable.semantics.player import Player
 
 
-@examples(100)
+@examples(50)
 @given(dense_nets(signals=True), st.booleans(), st.booleans())
 def test_a_net_waits_iff_another_valuation_would_let_it_run(net: Net, r: bool, s: bool) -> None:
     player, marking = Player(net), net.initial_marking

@@ -44,7 +44,7 @@ def test_a_token_that_nothing_takes_waits_in_no_circle() -> None:
 @pytest.mark.seeds
 def test_each_sentence_of_a_circle_is_true_of_the_marking() -> None:
     told = 0
-    for seed in seeds(400):
+    for seed in seeds(200):
         net = lively_net(random.Random(seed), 8)
         space = explore(net)
         witness = space.witness(space.deadlocks)

@@ -70,7 +70,7 @@ def check(net: Net, goal: Formula) -> Reduced:
 @pytest.mark.seeds
 @pytest.mark.parametrize("chunk", range(4))
 def test_goals_of_nets_whose_transitions_compete_are_kept(chunk: int) -> None:
-    for seed in seeds(60, chunk):
+    for seed in seeds(30, chunk):
         draw = random.Random(seed)
         net = lively_net(draw, 10)
         check(net, Deadlock())
@@ -78,20 +78,20 @@ def test_goals_of_nets_whose_transitions_compete_are_kept(chunk: int) -> None:
         check(net, part_of(draw, net, draw.getrandbits(len(net.places)), 4))
 
 
-@examples(75)
+@examples(38)
 @given(st.data())
 def test_a_goal_is_reachable_in_the_reduced_net_exactly_if_it_is_in_the_original(data: st.DataObject) -> None:
     net = data.draw(NETS)
     check(net, data.draw(goals(net)))
 
 
-@examples(100)
+@examples(50)
 @given(NETS)
 def test_there_is_a_deadlock_in_the_reduced_net_exactly_if_there_is_one_in_the_original(net: Net) -> None:
     check(net, Deadlock())
 
 
-@examples(30)
+@examples(15)
 @given(NETS)
 def test_a_transition_is_live_or_dead_exactly_if_its_image_is(net: Net) -> None:
     original, reduced = NaiveSpace(net), reduce_for_liveness(net)
@@ -105,7 +105,7 @@ def test_a_transition_is_live_or_dead_exactly_if_its_image_is(net: Net) -> None:
     assert (original.count(original.deadlocks) > 0) == (space.count(space.deadlocks) > 0)
 
 
-@examples(60)
+@examples(30)
 @given(NETS)
 def test_literals_that_are_true_together_somewhere_are_not_said_to_exclude_each_other(net: Net) -> None:
     facts = pairs(Draft(net, None), None, NEVER)
@@ -166,7 +166,7 @@ def test_where_the_deadline_is_over_nothing_but_what_cannot_fire_is_gone() -> No
     assert len(reduced.net.places) == 2
 
 
-@examples(60)
+@examples(30)
 @given(cell_nets(), st.integers(1, 12))
 def test_whatever_the_deadline_interrupts_the_result_is_sound(net: Net, polls: int) -> None:
     class Clock(Deadline):

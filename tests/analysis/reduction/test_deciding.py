@@ -129,7 +129,7 @@ def test_a_transition_without_places_keeps_a_net_together() -> None:
     assert len(parts(loose, Deadlock())) == 1
 
 
-@examples(40)
+@examples(20)
 @given(cell_nets(), cell_nets(), st.booleans())
 def test_parts_reach_their_goals_exactly_if_the_whole_does(first: Net, second: Net, deadlock: bool) -> None:
     goals = [Holds(f"{net.places[-1].name}{i}") for i, net in enumerate((first, second))]
@@ -164,7 +164,7 @@ def test_one_part_that_does_not_reach_its_goal_decides_and_one_that_is_undecided
         assert decide_reduced(beside(late, late), Deadlock(), Limits(), next_of).reachable is expected
 
 
-@examples(30)
+@examples(15)
 @given(cell_nets())
 def test_stubborn_sets_on_the_reduced_net_find_a_deadlock_exactly_if_there_is_one(net: Net) -> None:
     found = decide_by_reduction(net, Deadlock(), Limits())
