@@ -220,12 +220,12 @@ def test_person_at_the_terminal_is_asked_for_the_reset_as_soon_as_the_contact_op
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True)
 
-    def asked(*words: str) -> None:
-        """All of this is said, in this order, and then something is asked."""
+    def asked(*words: str, end: str = ": ") -> None:
+        """All of this is said, and then something is asked."""
         assert process.stdout is not None
         said = ""
         with heard_in_time(process):
-            while not (said.endswith(": ") and all(word in said for word in words)):
+            while not (said.endswith(end) and all(word in said for word in words)):
                 character = process.stdout.read(1)
                 assert character, said
                 said += character
@@ -244,7 +244,8 @@ def test_person_at_the_terminal_is_asked_for_the_reset_as_soon_as_the_contact_op
         typed("reset")
         asked("not reset: plc: 'button' is not closed", "type reset")
         lamp.show("button", value=True)
-        until(lambda: lamp.machine.outputs.count(False) > 2, "the safe outputs of the next connection")
+        asked(end="it can be reset; then nothing moves until it is resumed\n")
+        assert lamp.machine.outputs.count(False) > 2, "the safe outputs of the next connection"
         typed("reset")
         asked("nothing moves until it is resumed", "take the run up")
         typed("")
