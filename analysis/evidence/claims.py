@@ -35,6 +35,7 @@ class ClaimKind(StrEnum):
     ALWAYS_POSSIBLE = "always_possible"  # from every reachable marking one can be reached where it holds: AG EF goal
     LOST = "lost"  # from some reachable marking none can be reached where it holds: EF AG not goal
     FIRES = "fires"  # some run meets the goal and fires each of these transitions afterwards
+    LATER = "later"  # some run meets the goal, and at that moment or later meets `then`
     IN_ORDER = "in_order"  # some run meets the goal, then fires these transitions, each later than the one before it
     CTL = "ctl"  # the goal, a formula of CTL, holds in M0
     LTL = "ltl"  # the goal, a formula of LTL, holds of every maximal run
@@ -85,6 +86,8 @@ class Claim:
                 return f"a run meets ({goal}) and then fires {shown}"
             case ClaimKind.IN_ORDER:
                 return f"a run meets ({goal}) and then fires {', and later '.join(self.fires)}"
+            case ClaimKind.LATER:
+                return f"a run meets ({goal}) and then or later ({format_formula(self.then)})"
             case ClaimKind.LEADS_TO | ClaimKind.NOT_LEADS_TO:
                 runs = {Fairness.NONE: "run"}.get(self.fairness, f"{self.fairness}ly fair run")
                 every, ends = ("every", "meets") if self.kind is ClaimKind.LEADS_TO else ("some", "never meets")

@@ -14,7 +14,8 @@ the document and seals it anew has either made another proof, or none.
     sets              the sets of markings, named by their numbers: listed, in hexadecimal, bit i being place i of the
                       net; or a decision diagram
     verdicts          for each its name (none: bare claims), status, the query that it answers; `shown`: claims, each
-                      with its certificate; `lacking`: why nothing shows it, where that is so
+                      with its certificate, which is only named (`before`) where an earlier verdict has the claim with
+                      the same one; `lacking`: why nothing shows it, where that is so
 
 A verdict that nothing shows stands there too, and why: what is only claimed is to be seen. A document larger than a
 mebibyte is compressed (gzip); it is read like any other. Rejected: a file for each verdict, which repeats net and
@@ -40,7 +41,7 @@ from firable.analysis.evidence.certificate import Certificate
 from firable.analysis.evidence.certificate_records import certificate_to_json
 from firable.analysis.evidence.claim_records import Sets, claim_to_json
 from firable.analysis.evidence.claims import Claim
-from firable.analysis.evidence.document_records import EvidenceRecord
+from firable.analysis.evidence.document_records import BeforeRecord, EvidenceRecord
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.formula import FormulaError
 from firable.nets.interchange import canonical_json, net_digest, net_from_json, net_to_json
@@ -81,7 +82,7 @@ class Document:
 
     def to_text(self) -> str:
         """The document; `document_from_text` reads it back."""
-        sets = Sets()
+        sets, before = Sets(), _Before()
         verdicts = [
             {
                 "name": record.name,
@@ -89,7 +90,12 @@ class Document:
                 "query": record.query,
                 "lacking": record.lacking,
                 "shown": [
-                    {"claim": claim_to_json(claim), "certificate": certificate_to_json(certificate, sets)}
+                    {
+                        "claim": claim_to_json(claim),
+                        "certificate": {"kind": "before"}
+                        if before.has(claim, certificate)
+                        else certificate_to_json(certificate, sets),
+                    }
                     for claim, certificate in record.shown
                 ],
             }
@@ -109,6 +115,26 @@ class Document:
         """The document as a file holds it: compressed where it is large, and always the same."""
         data = self.to_text().encode()
         return data if len(data) <= PLAIN_BYTES_MAX else gzip.compress(data, mtime=0)
+
+
+class _Before:
+    """The claims of a document from its beginning on, each with the first certificate that it has there."""
+
+    def __init__(self) -> None:
+        self.known: dict[Claim, Certificate] = {}
+
+    def has(self, claim: Claim, certificate: Certificate) -> bool:
+        """Whether the claim stood there before with this very certificate; if it never did, it does from now on."""
+        if claim in self.known:
+            return self.known[claim] is certificate
+        self.known[claim] = certificate
+        return False
+
+    def certificate(self, claim: Claim) -> Certificate:
+        """The certificate that the claim had before; `ValueError` where it had none."""
+        if claim not in self.known:
+            raise ValueError(f"no verdict before has '{claim}'")
+        return self.known[claim]
 
 
 def _laid_out(data: Mapping[str, Any]) -> str:
@@ -208,13 +234,19 @@ def _document(record: EvidenceRecord) -> Document:
     names = [verdict.name for verdict in record.verdicts if verdict.name]
     if len(set(names)) != len(names):
         raise ValueError("a verdict stands twice")
-    sets = [one.space(net) for one in record.sets]
+    sets, before = [one.space(net) for one in record.sets], _Before()
     records = []
     for verdict in record.verdicts:
         if verdict.query:
             if not verdict.name.startswith("query."):
                 raise ValueError(f"'{verdict.name}' is no query, and comes with the text of one")
             parse_query(verdict.query)
-        shown = tuple((one.claim.of(net), one.certificate.of(net, sets)) for one in verdict.shown)
-        records.append(Record(verdict.name, verdict.status == "proved", shown, verdict.lacking, verdict.query))
+        shown = []
+        for one in verdict.shown:
+            claim = one.claim.of(net)
+            of = one.certificate
+            certificate = before.certificate(claim) if isinstance(of, BeforeRecord) else of.of(net, sets)
+            before.has(claim, certificate)
+            shown.append((claim, certificate))
+        records.append(Record(verdict.name, verdict.status == "proved", tuple(shown), verdict.lacking, verdict.query))
     return Document(net, Discipline(record.discipline), tuple(records))

@@ -10,9 +10,15 @@ from firable.analysis.evidence.certificate_records import CertificateRecord
 from firable.analysis.evidence.claim_records import ClaimRecord, Data, DiagramRecord, MarkingsRecord
 
 
+class BeforeRecord(Data):
+    """The certificate that an earlier verdict of the document has for the same claim."""
+
+    kind: Literal["before"]
+
+
 class _ShownRecord(Data):
     claim: ClaimRecord
-    certificate: CertificateRecord
+    certificate: CertificateRecord | BeforeRecord
 
 
 class _VerdictRecord(Data):

@@ -144,6 +144,8 @@ class Shown:
         of_runs = [c for c in claims if c.kind in {ClaimKind.FIRES, ClaimKind.IN_ORDER}]
         self.fired = {name for claim in of_runs for name in claim.fires}
         self.fired_at_home = {name for claim in of_runs if claim.goal in self.homes for name in claim.fires}
+        later = (claim for claim in claims if claim.kind is ClaimKind.LATER)
+        self.met_at_home = {claim.then for claim in later if claim.goal in self.homes}
 
     def __contains__(self, claim: Claim) -> bool:
         return claim in self.claims or (claim.kind is ClaimKind.NEVER and claim.goal == Constant(value=False))
@@ -152,6 +154,10 @@ class Shown:
         """Whether a transition is shown to be live."""
         possible = Claim(ClaimKind.ALWAYS_POSSIBLE, Firable(name))
         return name in self.fired_at_home or possible in self or Claim(ClaimKind.LIVE) in self
+
+    def possible(self, goal: Formula) -> bool:
+        """Whether it is shown that the goal can be reached from everywhere: by itself, or from a home marking."""
+        return goal in self.met_at_home or Claim(ClaimKind.ALWAYS_POSSIBLE, goal) in self
 
     def fires(self, name: str) -> bool:
         """Whether a transition is shown to fire in some run."""
@@ -334,7 +340,8 @@ def _served(shown: Shown, proved: bool) -> bool:
 def _property(shown: Shown, of: Property | TemporalProperty, proved: bool) -> bool:
     if isinstance(of, TemporalProperty):
         return _temporal(shown, of.logic, of.formula, proved)
-    return property_claim(of, proved=proved) in shown
+    claim = property_claim(of, proved=proved)
+    return shown.possible(claim.state_goal) if claim.kind is ClaimKind.ALWAYS_POSSIBLE else claim in shown
 
 
 def property_claim(of: Property, *, proved: bool) -> Claim:

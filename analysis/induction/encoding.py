@@ -50,9 +50,7 @@ class Relation:
 
     def is_marking(self, marking: Marking, *, after: bool = False) -> Term:
         """The marking before (or after) is this one."""
-        places = self.after if after else self.before
-        literals = (p if marking >> i & 1 else self.terms.negation(p) for i, p in enumerate(places))
-        return self.terms.conjunction(literals)
+        return marking_term(self.terms, marking, self.after if after else self.before)
 
     def is_firing(self, fired: FiringSet) -> Term:
         """Exactly these transitions fire."""
@@ -65,6 +63,11 @@ class Relation:
         before = sum(1 << i for i, p in enumerate(self.before) if assignment[p.name])
         after = sum(1 << i for i, p in enumerate(self.after) if assignment[p.name])
         return before, tuple(t for t, f in enumerate(self.fires) if assignment[f.name]), after
+
+
+def marking_term(terms: Terms, marking: Marking, holds: tuple[Term, ...]) -> Term:
+    """The places hold the tokens of this marking; `holds` says of each place, in their order, that it holds one."""
+    return terms.conjunction(p if marking >> i & 1 else terms.negation(p) for i, p in enumerate(holds))
 
 
 def interleaving_relation(net: Net, terms: Terms | None = None) -> Relation:

@@ -51,6 +51,12 @@ class Components:
     bottom: Column
     trivial: Column
 
+    def each_bottom_meets(self, targets: Column) -> bool:
+        """Whether each bottom component holds a target."""
+        met = np.zeros(len(self.bottom), dtype=np.bool_)
+        met[self.of[targets]] = True
+        return bool(met[self.bottom].all())
+
     @property
     def nontrivial(self) -> Column:
         """The markings on some cycle within the set."""

@@ -248,6 +248,19 @@ class ReachabilityGraph(Derived["Column"]):
         """The home markings: those that can be reached from every reachable marking."""
         return _column(self.engine.home_markings(**self._limits))
 
+    @cached_property
+    def _whole(self) -> Components:
+        """The components of the whole graph, for questions of which there are many."""
+        return self.components()
+
+    def is_always_possible(self, targets: Column) -> bool:
+        """Whether from every marking a target can be reached (AG EF): one is in each bottom component.
+
+        The components are found once, so that many questions cost a look at their markings each.
+        """
+        self.require_complete()
+        return self._whole.each_bottom_meets(targets)
+
     def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""
         return tuple(lowest is not None for lowest in self.engine.effective_conflicts(list(pairs), **self._limits))

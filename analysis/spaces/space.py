@@ -187,6 +187,10 @@ class StateSpace(Protocol[S]):
         """The home markings: those that can be reached from every reachable marking."""
         ...
 
+    def is_always_possible(self, targets: S) -> bool:
+        """Whether from every marking a target can be reached (AG EF)."""
+        ...
+
     def firable_together(self, pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""
         ...
@@ -248,6 +252,11 @@ class Derived(Generic[S]):
         """The home markings: the bottom component, where every marking leads into it."""
         bottom = self.bottom()
         return bottom if self.count(self.backward(bottom)) == self.n_markings else self.algebra.disjunction(())
+
+    def is_always_possible(self: StateSpace[S], targets: S) -> bool:
+        """Whether from every marking a target can be reached (AG EF)."""
+        self.require_complete()
+        return self.count(self.backward(targets)) == self.n_markings
 
     def firable_together(self: StateSpace[S], pairs: Sequence[tuple[int, int]]) -> Sequence[bool]:
         """For each pair of transitions, whether some marking found makes both firable by Eq. (1)."""

@@ -1,10 +1,11 @@
 """What a document may ask of its checker: it ends in time, and says one thing of each verdict."""
 
+import json
 import random
 from dataclasses import replace
 
 import pytest
-from support.evidence_examples import LOOP, RACING
+from support.evidence_examples import EXAMPLES, LOOP, RACING
 
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.deadline import NEVER, Deadline
@@ -22,7 +23,7 @@ from firable.analysis.evidence.checking.checker import check_document, check_evi
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.checking.obligations import obligations
 from firable.analysis.evidence.claims import Claim, ClaimKind
-from firable.analysis.evidence.document import Document, Record, document_from_text
+from firable.analysis.evidence.document import Document, Record, document_from_text, seal
 from firable.analysis.evidence.meaning import suffices
 from firable.analysis.evidence.producing import spaces as producing
 from firable.analysis.evidence.producing.claims import Certifier
@@ -94,6 +95,27 @@ def test_a_document_says_one_thing_of_each_verdict(records: list[Record], reason
     with pytest.raises(InputError, match=reason) as caught:
         document_from_text(text)
     assert [found.code for found in caught.value.diagnostics] == ["F6001"]
+
+
+def test_a_claim_that_stood_before_names_its_certificate_and_one_that_did_not_is_refused() -> None:
+    found = EXAMPLES["markings"]()
+    assert found is not None
+    one = ((found.claim, found.certificate),)
+    document = Document(found.net, found.discipline, (Record("deadlock-free", True, one), Record("", True, one)))
+    text = document.to_text()
+    assert text.count('{"kind":"before"}') == 1
+    again = document_from_text(text)
+    assert again.to_text() == text
+    assert again.records[1].shown[0][1] is again.records[0].shown[0][1]
+    assert [checked.shown for checked in check_document(again)] == [True, True]
+    other = document_from_text(replace(document, records=(document.records[0],)).to_text()).records[0].shown[0][1]
+    assert other is not found.certificate
+    whole = replace(document, records=(document.records[0], Record("", True, ((found.claim, other),)))).to_text()
+    assert "before" not in whole  # it is another certificate
+    data = json.loads(text)
+    data["verdicts"].reverse()
+    with pytest.raises(InputError, match="no verdict before has"):
+        document_from_text(json.dumps({**data, "seal": seal(data)}))
 
 
 def test_claims_of_no_verdict_may_stand_beside_each_other() -> None:

@@ -27,12 +27,34 @@ from firable.analysis.evidence.meaning import (
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.report import report_on
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
-from firable.nets.net import Command, Net, Place, Transition
+from firable.nets.net import Command, Net, Place, Property, PropertyKind, Transition
 from firable.nets.temporal import parse_temporal
 from firable.nets.verdict import Status
 from firable.semantics.trace import Discipline
 
 FIRES_ALL = fires(Constant(value=True), "t0", "t1")
+
+
+def test_what_is_met_from_a_home_marking_is_always_possible_and_from_another_it_is_not() -> None:
+    asked = Property("p", PropertyKind.ALWAYS_POSSIBLE, Firable("t0"))
+    of = replace(net("ring", "a", ("a", "b"), ("b", "a")), properties=(asked,))
+    home, start = tidy(is_marking(of, of.initial_marking)), Claim(ClaimKind.ALWAYS_POSSIBLE, Holds("a"))
+    possible, later = Claim(ClaimKind.ALWAYS_POSSIBLE, home), Claim(ClaimKind.LATER, home, then=Firable("t0"))
+
+    def enough(*claims: Claim) -> bool:
+        return suffices(of, Discipline.INTERLEAVING, "property.p", True, claims, None)
+
+    assert enough(possible, later)
+    assert enough(Claim(ClaimKind.ALWAYS_POSSIBLE, Firable("t0")))
+    for claims in (
+        (possible,),
+        (later,),
+        (start, replace(later, goal=Holds("a"))),  # which is not one marking
+        (possible, replace(later, goal=Holds("b"))),
+        (possible, replace(later, then=Firable("t1"))),
+        (Claim(ClaimKind.REACHABLE, home), later),
+    ):
+        assert not enough(*claims)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
+from support.lively_nets import lively_nets
 from support.reference import load_net
 from support.ring_nets import ring_nets
 
@@ -38,6 +39,16 @@ def test_columns_agree_with_single_markings(net: Net, discipline: Discipline) ->
         assert list(graph.satisfying(formula)) == [evaluate(BOOL, net, formula, holds_in(m)) for m in markings]
     assert [graph.index_of(m) for m in markings] == list(range(len(markings)))
     assert list(graph.deadlocks) == [player.deadlocked(m) for m in markings]
+
+
+@examples(50)
+@given(lively_nets(), st.sampled_from(Discipline))
+def test_what_each_bottom_component_meets_is_always_possible(net: Net, discipline: Discipline) -> None:
+    graph = explore(net, discipline)
+    for p in range(len(net.places)):
+        for targets in (graph.marked(p), ~graph.marked(p)):
+            possible = graph.count(graph.backward(targets)) == graph.n_markings
+            assert graph.is_always_possible(targets) is possible
 
 
 def test_columns_do_not_depend_on_the_size_of_their_chunks(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -172,6 +172,7 @@ EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
     "in order": lambda: _invented(
         TURNS, Claim(ClaimKind.IN_ORDER, Holds("b"), fires=("tock", "go", "tock")), "tick tock go tick tock"
     ),
+    "later": lambda: _invented(TURNS, Claim(ClaimKind.LATER, Holds("b"), then=Holds("done")), "tick tock tick go tock"),
     "weak": lambda: certified(TURNS, _leads(Fairness.WEAK)),
     "strong": lambda: certified(SOMETIMES, _leads(Fairness.STRONG)),
     "unanswered": lambda: _invented(

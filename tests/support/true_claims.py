@@ -36,6 +36,8 @@ def true(evidence: Evidence) -> bool:
     match claim.kind:
         case ClaimKind.FIRES:
             return _fires(space, claim)
+        case ClaimKind.LATER:
+            return _later(space, claim)
         case ClaimKind.IN_ORDER:
             return _in_order(space, claim)
         case ClaimKind.LTL | ClaimKind.NOT_LTL:
@@ -69,6 +71,12 @@ def _fires(space: NaiveSpace, claim: Claim) -> bool:
                 seen.add(pair)
                 todo.append(pair)
     return False
+
+
+def _later(space: NaiveSpace, claim: Claim) -> bool:
+    """Some run meets the goal and then, at once or later, the other one: EF (goal and EF then)."""
+    met = where(space, Exists(Eventually(claim.then)))
+    return bool(space.satisfying(claim.state_goal) & met)
 
 
 def _in_order(space: NaiveSpace, claim: Claim) -> bool:

@@ -75,7 +75,7 @@ EDGES_MAX: Final = 100_000
 
 _SHOWS: Final = {
     FiringSequence: {
-        *(ClaimKind.REACHABLE, ClaimKind.FIRES, ClaimKind.IN_ORDER, ClaimKind.UNORDERED),
+        *(ClaimKind.REACHABLE, ClaimKind.FIRES, ClaimKind.IN_ORDER, ClaimKind.LATER, ClaimKind.UNORDERED),
         *(ClaimKind.NOT_LTL, ClaimKind.NOT_LEADS_TO),
     },
     InductiveInvariant: {ClaimKind.NEVER},
@@ -167,15 +167,25 @@ def _checked(checker: _Checker, document: Document, record: Record) -> CheckedRe
 
 @dataclass
 class _Checker:
-    """What is found of a set once serves all claims that rest on it."""
+    """What is found of a set once serves all claims that rest on it, and of a claim, wherever it stands again."""
 
     timeout_ms: int
+    _claims: dict[Claim, tuple[Net, Certificate, Checked]] = field(default_factory=dict)
     _spaces: list[tuple[Net, Markings | Diagram, Listed | Diagrams]] = field(default_factory=list)
     _parts: list[tuple[Net, Markings, Part]] = field(default_factory=list)
     _sets: list[tuple[Net, Markings, Closed]] = field(default_factory=list)
 
     def check(self, evidence: Evidence) -> Checked:
         """Check one claim."""
+        claim, certificate = evidence.claim, evidence.certificate
+        net, known, checked = self._claims.get(claim, (None, None, None))
+        if checked is not None and net is evidence.net and known is certificate:
+            return checked
+        checked = self._shown(evidence)
+        self._claims[claim] = evidence.net, certificate, checked
+        return checked
+
+    def _shown(self, evidence: Evidence) -> Checked:
         claim, certificate = evidence.claim, evidence.certificate
         if claim.kind not in _SHOWS[type(certificate)]:
             refuse(f"evidence of this kind cannot show '{claim}'")
@@ -376,7 +386,10 @@ def _run(evidence: Evidence, of: FiringSequence) -> Checked:
     begin = next((i for i, marking in enumerate(markings) if holds(net, claim.state_goal, marking)), None)
     if begin is None:
         refuse(f"({format_formula(claim.state_goal)}) holds nowhere on the run")
-    if claim.kind is ClaimKind.IN_ORDER:
+    if claim.kind is ClaimKind.LATER:
+        if not any(holds(net, claim.then, marking) for marking in markings[begin:]):
+            refuse(f"({format_formula(claim.then)}) holds nowhere on the run after that goal")
+    elif claim.kind is ClaimKind.IN_ORDER:
         _require_in_order(claim, of.firings[begin:])
     elif left := set(claim.fires) - {name for fired in of.firings[begin:] for name in fired}:
         refuse(f"the run does not fire {min(left)}")

@@ -48,7 +48,7 @@ from firable.analysis.evidence.checking.siphons import of_siphons
 from firable.analysis.evidence.claims import Claim, ClaimKind, without_start
 from firable.analysis.evidence.meaning import contact
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse
-from firable.analysis.induction.encoding import Relation, interleaving_relation, step_relation
+from firable.analysis.induction.encoding import Relation, interleaving_relation, marking_term, step_relation
 from firable.analysis.induction.smt import Operator, Term, Terms, subterms
 from firable.nets.net import Marking, Net
 from firable.semantics.counting import TableTooLargeError, at_most
@@ -61,8 +61,11 @@ LITERALS_MAX: Final = 20_000  # of a set of markings that is written as a formul
 ENTRIES_MAX: Final = 200_000  # of the table of a sum
 
 
-def obligations(evidence: Evidence, deadline: Deadline = NEVER) -> tuple[Obligation, ...]:
+def obligations(evidence: Evidence, deadline: Deadline = NEVER, *, closed: bool = False) -> tuple[Obligation, ...]:
     """All obligations in propositional logic; none for what is played, and for a large set.
+
+    Where it is known that the set of markings that the evidence rests on is `closed`, because another claim rests on it
+    as well, those that say so are left out.
 
     Raises `TimeIsOverError` where writing them takes too long, or a sum has too many values to be written at all.
     """
@@ -70,13 +73,13 @@ def obligations(evidence: Evidence, deadline: Deadline = NEVER) -> tuple[Obligat
         case InductiveInvariant() as invariant:
             return tuple(_of_invariant(evidence, invariant, TimedTerms(deadline=deadline)))
         case Labelling(space) if _size(evidence.net, space) <= LITERALS_MAX:
-            return tuple(_of_set(evidence, space, TimedTerms(deadline=deadline)))
+            return tuple(_of_set(evidence, space, TimedTerms(deadline=deadline), closed=closed))
         case Reduction():
             left = left_of(evidence, deadline)
             rest = () if left.rest is None else obligations(left.rest, deadline)
             return (*left.obligations, *rest)
         case Continuation():
-            return obligations(continued(evidence), deadline)
+            return obligations(continued(evidence), deadline, closed=closed)
         case Theorem() as theorem:
             siphons = of_siphons(evidence.net, theorem, TimedTerms(deadline=deadline))
             return (*obligations(contact_free(evidence), deadline), *siphons)
@@ -162,19 +165,23 @@ def _of_invariant(evidence: Evidence, invariant: InductiveInvariant, terms: Term
     yield Obligation("goal", f"the invariant{after_so_many} excludes the goal", (*run, *last))
 
 
-def _of_set(evidence: Evidence, space: Markings | Diagram, terms: Terms) -> Iterator[Obligation]:
-    net, relation = evidence.net, _relation(evidence, terms)
-    if isinstance(space, Diagram):
-        among = diagram_term(terms, net, space, relation.before.__getitem__)
-        outside = terms.negation(diagram_term(terms, net, space, relation.after.__getitem__))
-    else:
-        among = terms.disjunction(relation.is_marking(marking) for marking in space.markings)
-        outside = terms.negation(terms.disjunction(relation.is_marking(m, after=True) for m in space.markings))
-    initial = (relation.initial(), terms.negation(among))
-    yield Obligation("initial", "the initial marking is in the set", initial)
-    yield Obligation("step", "no firing leads out of the set", (among, relation.term, outside))
+def _of_set(evidence: Evidence, space: Markings | Diagram, terms: Terms, *, closed: bool) -> Iterator[Obligation]:
+    net = evidence.net
+    before, after = (tuple(terms.variable(f"{place.name}{mark}") for place in net.places) for mark in ("", "'"))
+
+    def within(holds: tuple[Term, ...]) -> Term:
+        if isinstance(space, Diagram):
+            return diagram_term(terms, net, space, holds.__getitem__)
+        return terms.disjunction(marking_term(terms, marking, holds) for marking in space.markings)
+
+    among = within(before)
+    if not closed:
+        relation = _relation(evidence, terms)
+        yield Obligation("initial", "the initial marking is in the set", (relation.initial(), terms.negation(among)))
+        outside = terms.negation(within(after))
+        yield Obligation("step", "no firing leads out of the set", (among, relation.term, outside))
     if evidence.claim.kind is ClaimKind.NEVER:
-        goal = evaluate(terms, net, evidence.claim.state_goal, relation.before.__getitem__)
+        goal = evaluate(terms, net, evidence.claim.state_goal, before.__getitem__)
         yield Obligation("goal", "the goal holds in no marking of the set", (among, goal))
 
 

@@ -35,6 +35,7 @@ from firable.analysis.evidence.producing.runs import (
     NotFoundError,
     maximal,
     parting,
+    run_by_way_of,
     run_in_order,
     runs_by_search,
     runs_on_graph,
@@ -108,7 +109,7 @@ class Certifier:
                 return None if witness is None else self._unordered(witness)
             case ClaimKind.LIVE | ClaimKind.HOME:
                 return self.theorem(claim)
-            case ClaimKind.FIRES:
+            case ClaimKind.FIRES | ClaimKind.LATER:
                 raise LackingError("runs are looked for together")
         return self._labelled(claim)
 
@@ -282,10 +283,28 @@ class Certifier:
                     return (pair if fired.index(pair[0]) < fired.index(pair[1]) else pair[::-1]), run
         return None
 
-    def homes(self) -> Marking | None:
+    def later(self, goal: Formula) -> FiringSequence:
+        """A run that meets the home marking, and then the goal; raises `LackingError` where none is found."""
+        home, found = self.home, None
+        try:
+            if home is None:
+                raise LackingError("no home marking is known")
+            if (graph := self.spaces.graph or self.spaces.wide) is not None:
+                found = run_by_way_of(graph, home, graph.satisfying(goal))
+            elif home == self.net.initial_marking:
+                way = self.spaces.way(lambda space: space.satisfying(goal))
+                found = None if way is None else FiringSequence(way.firings)
+        except (BudgetExceeded, IncompleteGraph):
+            raise LackingError(NO_TIME) from None
+        if found is None:
+            raise LackingError("no run was found from the home marking to the goal")
+        return found
+
+    @cached_property
+    def home(self) -> Marking | None:
         """A home marking, M0 if it is one; None where there is none or it is not known."""
         space: StateSpace[Any] | None = self.spaces.graph or (
-            self.spaces.symbolic if self.spaces.diagram is not None else None
+            self.spaces.symbolic if self.spaces.diagram is not None else self.spaces.wide
         )
         if space is None:
             return None

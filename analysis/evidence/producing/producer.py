@@ -8,7 +8,7 @@ The run that decided hands over what it held: its state space, and the findings 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations
 from typing import Final
 
@@ -39,7 +39,7 @@ from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
-from firable.nets.net import Marking, Property, TemporalProperty
+from firable.nets.net import Marking, Property, PropertyKind, TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
 from firable.nets.temporal import Logic, Temporal, TemporalAnd, TemporalNot, TemporalOr
 from firable.nets.verdict import Status, Verdict, Witness
@@ -168,9 +168,8 @@ class _Verdicts:
         return Claim(ClaimKind.ALWAYS_POSSIBLE, tidy(is_marking(self.net, home)))
 
     def _home(self) -> Iterator[tuple[Claim, Certificate]]:
-        home = self.certifier.homes()
-        if home is not None:
-            return self._one(self._home_claim(home))
+        if self.certifier.home is not None:
+            return iter([self._at_home()])
         return iter([(Claim(ClaimKind.HOME), self.certifier.theorem(Claim(ClaimKind.HOME)))])
 
     def _or_theorem(self, claim: Claim, witness: Witness | None) -> Iterator[tuple[Claim, Certificate]]:
@@ -210,12 +209,9 @@ class _Verdicts:
         return [(Claim(ClaimKind.LIVE), self.certifier.theorem(Claim(ClaimKind.LIVE)))]
 
     def _by_home(self, names: tuple[str, ...]) -> Shown:
-        home = self.certifier.homes()
-        if home is None:
-            raise LackingError("no home marking is known")
-        claim = self._home_claim(home)
-        shown: Shown = [(claim, self.certifier.certify(claim))]
-        return shown + self._fired(claim.state_goal, self.certifier.runs_firing(names, home))
+        shown = self._at_home()
+        runs = self.certifier.runs_firing(names, self.certifier.home)
+        return [shown, *self._fired(shown[0].state_goal, runs)]
 
     def _fired(self, goal: Formula, runs: Iterable[FiringSequence]) -> Shown:
         """What each run fires from where the goal first holds."""
@@ -312,7 +308,42 @@ class _Verdicts:
     ) -> Iterator[tuple[Claim, Certificate]]:
         if isinstance(of, TemporalProperty):
             return self._temporal(of.logic, of.formula, verdict, proved)
-        return self._one(property_claim(of, proved=proved), verdict.witness)
+        claim = property_claim(of, proved=proved)
+        if claim.kind is ClaimKind.ALWAYS_POSSIBLE and self._possibilities > 1:
+            try:
+                return iter(self._from_home(claim.state_goal))
+            except LackingError:
+                pass  # there is no home marking, or it is not known
+        return self._one(claim, verdict.witness)
+
+    @cached_property
+    def _possibilities(self) -> int:
+        """How many properties say that something is always possible: of several, labels for one home marking do."""
+        kinds = (of.kind for of in self.net.properties if isinstance(of, Property))
+        return sum(kind is PropertyKind.ALWAYS_POSSIBLE for kind in kinds)
+
+    @cached_property
+    def _home_shown(self) -> tuple[Claim, Certificate] | str:
+        """That some marking is a home marking, or why that is not shown: looked for once."""
+        if self.certifier.home is None:
+            return "no home marking is known"
+        try:
+            claim = self._home_claim(self.certifier.home)
+            return claim, self.certifier.certify(claim)
+        except LackingError as error:
+            return str(error)
+
+    def _at_home(self) -> tuple[Claim, Certificate]:
+        """That some marking is a home marking; raises `LackingError`."""
+        if isinstance(self._home_shown, str):
+            raise LackingError(self._home_shown)
+        return self._home_shown
+
+    def _from_home(self, goal: Formula) -> Shown:
+        """That a goal is always possible, since a home marking is, and from there a run meets it."""
+        shown = self._at_home()
+        later = Claim(ClaimKind.LATER, shown[0].state_goal, then=goal)
+        return [shown, (later, self.certifier.later(goal))]
 
     def _temporal(
         self, logic: Logic | QueryKind, formula: Temporal, verdict: Verdict, proved: bool

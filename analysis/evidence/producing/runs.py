@@ -65,6 +65,14 @@ def runs_on_graph(graph: ReachabilityGraph, names: Sequence[str], home: Marking 
     return runs
 
 
+def run_by_way_of(graph: ReachabilityGraph, first: Marking, targets: Any) -> FiringSequence | None:
+    """A run of a complete graph to a marking and from there to the nearest target; None where there is no way."""
+    run, index = _Run(graph), graph.index_of(first)
+    if index is None or not run.go(_column(graph, [index])) or not run.go(targets):
+        return None
+    return FiringSequence(tuple(run.firings))
+
+
 def run_in_order(graph: ReachabilityGraph, one: Sequence[str], then: Sequence[str]) -> InOrder | None:
     """A run of a complete graph that fires one of these, and later one of those, and which two; None without one.
 
