@@ -12,6 +12,7 @@ from click.core import ParameterSource
 
 from firable.analysis.methods import Method
 from firable.cli import text
+from firable.cli.evidence_files import is_evidence
 from firable.cli.loop import loop_report, machines_option, show_loop
 from firable.cli.options import (
     analysis_options,
@@ -63,10 +64,6 @@ class _Asked:
             "budget": allowed,
             "queries": [(query.name, format_query(query)) for query in queries],
         }
-
-
-_EVIDENCE = ".evidence.json"
-_NAME_MAX = 100  # of a net, in the name of a file
 
 
 @click.command(short_help="Check nets: deadlock, contact, liveness, conflicts, their own properties.")
@@ -145,7 +142,11 @@ def check(
         raise click.UsageError("--report is a page on one net: name one NET")
     if machines is not None:
         _refuse_beside_machines()
-        closed = [with_page(partial(loop_report, net, machines, allowed, loop_file), page) for net in nets]
+        many = len(nets) > 1
+        closed = []
+        for net in nets:
+            folder = None if evidence_dir is None else _folder(evidence_dir, net, many=many)
+            closed.append(with_page(partial(loop_report, net, machines, allowed, loop_file, folder), page))
         return answer_all("check", format_, closed, partial(show_loop, verbose=verbose))
     if loop_file is not None:
         raise click.UsageError("--loop-net goes with --machines")
@@ -157,10 +158,10 @@ def check(
 def _refuse_beside_machines() -> None:
     """Refuse what is asked of a net and not of a loop: the loop is a net, once it is written."""
     context = click.get_current_context()
-    alone = ("discipline", "method", "trace_dir", "evidence_dir", "structure", "query_file", "query_texts")
+    alone = ("discipline", "method", "trace_dir", "structure", "query_file", "query_texts")
     given = [name for name in alone if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
     if given:
-        option = {"query_texts": "query", "query_file": "queries", "evidence_dir": "evidence"}.get(given[0], given[0])
+        option = {"query_texts": "query", "query_file": "queries"}.get(given[0], given[0])
         message = f"--{option.replace('_', '-')} does not go with --machines: write the loop by --loop-net FILE, "
         raise click.UsageError(f"{message}and check that file")
     if len(context.params["nets"]) > 1 and context.params["loop_file"] is not None:
@@ -270,16 +271,11 @@ def _traces(net: Net, verdicts: Iterable[Verdict], discipline: str) -> dict[str,
 
 def _evidence(found: CheckReport, queries: Sequence[Query], asked: _Asked) -> dict[str, bytes]:
     """The document of evidence on all that was decided, by the name of its file."""
-    from firable.analysis.deadline import Deadline
     from firable.analysis.evidence.producing.producer import evidence_of_report
-    from firable.analysis.goal import Limits
-    from firable.nets.bundle import file_stem
+    from firable.cli.evidence_files import evidence_file, evidence_limits
 
-    seconds = 30.0 if asked.budget.seconds is None else asked.budget.seconds
-    document = evidence_of_report(found, queries, Limits(Deadline.after(seconds), asked.budget.memory_bytes))
-    data = document.to_bytes()
-    name = file_stem(found.net.name[:_NAME_MAX] or "net") + _EVIDENCE
-    return {name if data.startswith(b"{") else f"{name}.gz": data}
+    document = evidence_of_report(found, queries, evidence_limits(asked.budget))
+    return dict([evidence_file(found.net.name, document)])
 
 
 def _show(report: Report, *, verbose: bool) -> None:
@@ -300,7 +296,7 @@ def _show(report: Report, *, verbose: bool) -> None:
         for line in structure_lines(figures["structure"]):
             click.echo(f"  {line}")
     text.show_summary(report)
-    documents = [file for file in report.files if file.endswith((_EVIDENCE, f"{_EVIDENCE}.gz"))]
+    documents = [file for file in report.files if is_evidence(file)]
     for file in report.files:
         if file not in documents:
             click.echo(f"  replay it: firable replay {file} --net {report.input}")

@@ -12,10 +12,14 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
-from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_text
+from firable.cli.evidence_files import is_evidence
+from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_folder, write_text
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from firable.analysis.loop.families import Answered
     from firable.analysis.loop.verdicts import Difference
     from firable.analysis.spaces.reachability import Budget
     from firable.nets.machines.plant_file import PlantModel
@@ -56,9 +60,11 @@ def _plant_file(argument: str) -> Path | str:
     return path
 
 
-def loop_report(argument: str, machines: str, allowed: Budget, loop_file: str | None) -> Report:
-    """The report on one net with its machines."""
-    from firable.analysis.loop.faults import check_faults
+def loop_report(
+    argument: str, machines: str, allowed: Budget, loop_file: str | None, evidence_dir: str | None
+) -> Report:
+    """The report on one net with its machines; the evidence on each of its loops goes into a folder."""
+    from firable.analysis.loop.faults import ask_faults
     from firable.analysis.loop.verdicts import check_loop
     from firable.nets.printing import format_net
     from firable.nets.verdict import held_to
@@ -66,14 +72,17 @@ def loop_report(argument: str, machines: str, allowed: Budget, loop_file: str | 
     loaded, model = load_net(argument), read_machines(machines)
     with loaded.placing():
         report = check_loop(loaded.net, model, allowed)
-    faults = check_faults(report, model, allowed)
+    faults = ask_faults(report.asked, model, allowed)
     files: tuple[str, ...] = ()
     if loop_file is not None:
         write_text(loop_file, format_net(report.closed.net))
         files = (loop_file,)
+    if evidence_dir is not None:
+        loops = {"loop": report.asked, "loop.failing": faults.for_good, "loop.repaired": faults.repaired}
+        files += write_folder(evidence_dir, _documents(loaded.net.name, loops, allowed))
     figures = report.closed.figures
     with loaded.placing():
-        verdicts = held_to(loaded.net.expected, (*report.verdicts, *faults))
+        verdicts = held_to(loaded.net.expected, (*report.verdicts, *faults.verdicts()))
     return Report(
         "check",
         argument,
@@ -95,6 +104,14 @@ def loop_report(argument: str, machines: str, allowed: Budget, loop_file: str | 
             "comparison": [_compared(one) for one in report.differences],
         },
     )
+
+
+def _documents(net: str, loops: Mapping[str, Answered | None], allowed: Budget) -> dict[str, bytes]:
+    """The document on each loop that was asked, by the name of its file."""
+    from firable.cli.evidence_files import evidence_file, evidence_limits
+
+    asked = ((kind, one) for kind, one in loops.items() if one is not None)
+    return dict(evidence_file(net, one.document(evidence_limits(allowed)), kind) for kind, one in asked)
 
 
 def _compared(one: Difference) -> dict[str, str]:
@@ -127,4 +144,5 @@ def show_loop(report: Report, *, verbose: bool) -> None:
     text.show_summary(report)
     for file in report.files:
         if file != "-":
-            click.echo(f"  the loop as a net file: {Path(file)}")
+            of = "evidence: firable verify" if is_evidence(file) else "the loop as a net file:"
+            click.echo(f"  {of} {Path(file)}")

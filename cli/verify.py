@@ -248,7 +248,7 @@ def _show(report: Report) -> None:
 def _show_bundle(report: Report) -> None:
     from firable.decompose.verification.bereft import PREFIX as DEAD
     from firable.decompose.verification.explored import TITLES
-    from firable.decompose.verification.machines import TITLE as MACHINES
+    from firable.decompose.verification.machines import TITLES as MACHINES
     from firable.decompose.verification.outages import TITLE as WHILE_DEAD
     from firable.decompose.verification.protocol import TITLE
     from firable.decompose.verification.refinement import TITLE as REFINEMENT
@@ -262,7 +262,7 @@ def _show_bundle(report: Report) -> None:
         "protocol": TITLE,
         **TITLES,
         DEAD: WHILE_DEAD,
-        "o4": MACHINES,
+        **MACHINES,
         "refinement": REFINEMENT,
         "persistent": "of each vote it is shown whether it is persistent",
     }

@@ -19,7 +19,7 @@ from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
-from firable.decompose.proofs.held_gates import held_gates
+from firable.decompose.proofs.closed_loops import PREFIXES, sealed_loops
 from firable.decompose.proofs.proving import TIMEOUT_MS, prove
 from firable.decompose.protocol.outages import sealed_outages
 from firable.decompose.protocol.shown import proved_without_exploring
@@ -28,7 +28,6 @@ from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import persistence
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.machines.plant_file import parse_plant
 from firable.nets.right_to_run import unproved
 from firable.nets.verdict import Verdict
 from firable.semantics.trace import Discipline
@@ -57,9 +56,9 @@ def make_bundle(
     `limits` are for each kind of evidence anew: what of the report cannot be shown in that time is only claimed.
     `firable verify` will say so of a warning; a verdict that is required is no reason to run without evidence. With
     `protocol` and `faults` the bundle holds the verdicts on the protocol of this very net, too, with the parts that are
-    free of promise, proved by an invariant. With the text of a `plant` file, the bundle holds it and that its machines
-    keep what votes rely on (O4); with an `origin`, the conceptual net and the tasks of which the net is made, and that
-    it does what that one does.
+    free of promise, proved by an invariant. With the text of a `plant` file it holds that file, that its machines keep
+    what votes rely on (O4), that the cell does with them what it must, and what their faults lead to; with an `origin`,
+    the conceptual net and the tasks of which the net is made, and that it does what that one does.
 
     Raises `InputError`: F4001 and F2011 where the net cannot be split; F4003 where the report is not that of exploring
     this net by interleaving, which is how it will be executed, and for everything that must be proved and is not, or
@@ -87,7 +86,7 @@ def make_bundle(
         dead, last_rites = sealed_outages(decomposition, lambda: _anew(limits, seconds), timeout_ms)
     held, machines = tuple[Verdict, ...](), dict[str, str]()
     if plant:
-        held, machines = held_gates(decomposition, parse_plant(plant)).sealed(plant, _anew(limits, seconds))
+        held, machines = sealed_loops(decomposition, plant, lambda: _anew(limits, seconds))
     refined, opened = sealed(report.net, origin, _anew(limits, seconds), timeout_ms) if origin else ((), {})
     verdicts = (*on_the_net, *proof.verdicts, *run, *dead, *held, *voted, *refined)
     proofs = {**proof.files, **obligations, **last_rites}
@@ -109,8 +108,9 @@ def _anew(limits: Limits | None, seconds: float | None) -> Limits:
 def _unbundled(problem: Diagnostic, lacking: Mapping[str, str]) -> Diagnostic:
     """What keeps a bundle from running, said to who makes it."""
     name = problem.subject[-1]
-    if name.startswith("o4.") and name not in lacking:
-        hint = f"{problem.hint}; `firable prove NET --machines PLANT` shows the run"
+    if name.startswith(PREFIXES) and name not in lacking:
+        command = "prove" if name.startswith("o4.") else "check"
+        hint = f"{problem.hint}; `firable {command} NET --machines PLANT` shows the run"
         return replace(problem, code="F4003", hint=hint)
     if name not in lacking:
         return replace(problem, code="F4003")

@@ -13,9 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from firable.analysis.check import check
+from firable.analysis.goal import Limits
 from firable.analysis.question import listed
 from firable.analysis.report import CheckReport
 from firable.analysis.spaces.reachability import Budget
@@ -25,6 +26,9 @@ from firable.nets.machines.loop import ClosedLoop
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
 from firable.nets.temporal import Fires, TemporalOr
 from firable.nets.verdict import Status, Verdict, Weight, Witness
+
+if TYPE_CHECKING:
+    from firable.analysis.evidence.document import Document
 
 T = TypeVar("T")
 
@@ -105,15 +109,36 @@ def in_loop(loop: ClosedLoop, formula: T) -> T:
     return result
 
 
-def answers(
-    loop: ClosedLoop, families: Sequence[Family], budget: Budget | None = None
-) -> tuple[tuple[Verdict, ...], CheckReport]:
-    """The verdict on each family, and the report of `check` on the net with all their properties."""
+@dataclass(frozen=True)
+class Answered:
+    """What was asked of a loop and answered: a verdict for each family, and what was found of its net.
+
+    `report` is that of `check` on the loop's net with the properties of all families; the runs of the verdicts are of
+    this net.
+    """
+
+    loop: ClosedLoop
+    families: tuple[Family, ...]
+    verdicts: tuple[Verdict, ...]
+    report: CheckReport
+
+    def document(self, limits: Limits | None = None) -> Document:
+        """The evidence on the properties, as far as it was found within the limits."""
+        from firable.analysis.evidence.producing.producer import evidence_of_report
+
+        names = {f"property.{prop.name}" for family in self.families for prop in family.of.values()}
+        verdicts = tuple(verdict for verdict in self.report.verdicts if verdict.name in names)
+        return evidence_of_report(replace(self.report, verdicts=verdicts), (), limits)
+
+
+def answers(loop: ClosedLoop, families: Iterable[Family], budget: Budget | None = None) -> Answered:
+    """Ask each family of a loop; raises `InputError` as `check` does."""
+    families = tuple(families)
     properties = tuple(prop for family in families for prop in family.of.values())
     report = check(replace(loop.net, properties=properties), budget=budget)
     found = {verdict.name.removeprefix("property."): verdict for verdict in report.verdicts}
     joined = (_joined(loop, family, {of: found[p.name] for of, p in family.of.items()}) for family in families)
-    return tuple(joined), report
+    return Answered(loop, families, tuple(joined), report)
 
 
 def _joined(loop: ClosedLoop, family: Family, found: Mapping[str, Verdict]) -> Verdict:

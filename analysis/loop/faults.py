@@ -15,10 +15,10 @@ takes, nor of a machine that forgets its command: that is another plant, in whic
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from firable.analysis.loop.families import Family, answers, fires, never, possible
-from firable.analysis.loop.verdicts import LoopReport
+from firable.analysis.loop.families import Answered, Family, answers, fires, never, possible
+from firable.analysis.loop.verdicts import LoopReport, live_in
 from firable.analysis.question import listed
 from firable.analysis.spaces.reachability import Budget
 from firable.nets.formula import Formula, Holds, Not, Or
@@ -30,64 +30,74 @@ from firable.nets.net import Property
 from firable.nets.verdict import Status, Verdict, Weight
 
 
+@dataclass(frozen=True)
+class FaultsAsked:
+    """What was asked of the loops in which a machine fails: for good, and until it is repaired; None where none may."""
+
+    live: tuple[str, ...]
+    for_good: Answered | None
+    repaired: Answered | None
+
+    @property
+    def answered(self) -> tuple[Answered, ...]:
+        """The loops that were asked."""
+        return tuple(one for one in (self.for_good, self.repaired) if one is not None)
+
+    def verdicts(self) -> Iterator[Verdict]:
+        """The verdicts as they are told: what stands still after a fault, and what hangs, in one."""
+        if self.for_good is not None:
+            safe, *pairs = self.for_good.verdicts
+            yield safe
+            for still, hang in zip(pairs[::2], pairs[1::2], strict=True):
+                yield _consequence(still, hang, self.live)
+        if self.repaired is not None:
+            yield from self.repaired.verdicts
+
+
 def check_faults(report: LoopReport, model: PlantModel, budget: Budget | None = None) -> tuple[Verdict, ...]:
     """The verdicts on the faults that the plant file declares, none where it declares none.
 
     `report` is that of the loop without faults. Cost: two more explorations, of loops with a place more for each
     machine that can fail, and a backward closure for each such machine with each transition and each place.
     """
-    net = report.loop.cell
+    return tuple(ask_faults(report.asked, model, budget).verdicts())
+
+
+def ask_faults(asked: Answered, model: PlantModel, budget: Budget | None = None) -> FaultsAsked:
+    """Ask what the faults that the plant file declares do to a cell; `asked` are the answers without faults."""
+    net, live = asked.loop.cell, live_in(asked)
     for_good, repaired = close(net, model, Faults.FOR_GOOD), close(net, model, Faults.REPAIRED)
-    found: list[Verdict] = []
-    if for_good.failed:
-        live = _live(report)
-        found += _for_good(for_good, live, budget)
-        # Of a cell in which nothing is live, a fault takes nothing, and repair cannot give it back.
-        if repaired.failed and live:
-            families = [_recovery(repaired, machine, live) for machine in repaired.failed]
-            found += answers(repaired, families, budget)[0]
-    return tuple(found)
+    # Of a cell in which nothing is live, a fault takes nothing, and repair cannot give it back.
+    recoveries = [_recovery(repaired, machine, live) for machine in repaired.failed] if live else []
+    return FaultsAsked(
+        live,
+        answers(for_good, _for_good(for_good, live), budget) if for_good.failed else None,
+        answers(repaired, recoveries, budget) if recoveries else None,
+    )
 
 
-def _live(report: LoopReport) -> tuple[str, ...]:
-    """The transitions that are live without faults: of the others a fault takes nothing."""
-    verdict = report.verdict("loop.live")
-    if verdict.status is Status.UNKNOWN:
-        return tuple(report.loop.variants)
-    return tuple(name for name in report.loop.variants if name not in verdict.subjects)
-
-
-def _for_good(loop: ClosedLoop, live: tuple[str, ...], budget: Budget | None) -> Iterator[Verdict]:
-    accidents = Family(
+def _for_good(loop: ClosedLoop, live: tuple[str, ...]) -> Iterator[Family]:
+    yield Family(
         "fault.safe",
         "no accident follows when a machine fails and is not repaired",
         {"": never("fault.accident", Or((Holds(ACCIDENT), Holds(OVERRUN))))},
         hint="a fault must stop what depends on the machine: gate it by a completion, not by a time",
     )
-    families = [accidents]
     for machine, failed in loop.failed.items() if live else ():
-        families.append(
-            Family(
-                f"fault.{machine}",
-                f"when {machine} has failed for good, every transition can still fire again",
-                {name: _goes_on(f"fault.{machine}.t{i}", failed, fires(loop, name)) for i, name in enumerate(live)},
-                Weight.INFORMATION,
-                note=f"{machine} has failed, and {{}} can never fire again",
-            )
+        yield Family(
+            f"fault.{machine}",
+            f"when {machine} has failed for good, every transition can still fire again",
+            {name: _goes_on(f"fault.{machine}.t{i}", failed, fires(loop, name)) for i, name in enumerate(live)},
+            Weight.INFORMATION,
+            note=f"{machine} has failed, and {{}} can never fire again",
         )
         places = [place.name for place in loop.cell.places]
-        families.append(
-            Family(
-                f"fault.{machine}.places",
-                f"when {machine} has failed for good, every place can still lose its token",
-                {name: _goes_on(f"fault.{machine}.p{i}", failed, Not(Holds(name))) for i, name in enumerate(places)},
-                Weight.INFORMATION,
-            )
+        yield Family(
+            f"fault.{machine}.places",
+            f"when {machine} has failed for good, every place can still lose its token",
+            {name: _goes_on(f"fault.{machine}.p{i}", failed, Not(Holds(name))) for i, name in enumerate(places)},
+            Weight.INFORMATION,
         )
-    verdicts = answers(loop, families, budget)[0]
-    yield verdicts[0]
-    for still, hang in zip(verdicts[1::2], verdicts[2::2], strict=True):
-        yield _consequence(still, hang, live)
 
 
 def _goes_on(name: str, failed: str, formula: Formula) -> Property:

@@ -26,6 +26,7 @@ from typing import Final
 from firable.analysis.check import check
 from firable.analysis.loop.families import (
     ENDED,
+    Answered,
     Family,
     answers,
     any_of,
@@ -47,6 +48,7 @@ from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
 from firable.nets.verdict import Status, Verdict, Weight, overall
 
+LIVE: Final = "loop.live"
 _PROPERTY: Final = "cell."
 _HANGS: Final = "from here no transition of the cell ever fires again"
 _NOTES: Final = {
@@ -75,11 +77,20 @@ class Difference:
 class LoopReport:
     """What was found of a cell with its machines, beside what was found with gates free."""
 
-    loop: ClosedLoop
+    asked: Answered
     verdicts: tuple[Verdict, ...]
     differences: tuple[Difference, ...]
-    closed: CheckReport
     opened: CheckReport
+
+    @property
+    def loop(self) -> ClosedLoop:
+        """The loop that was asked."""
+        return self.asked.loop
+
+    @property
+    def closed(self) -> CheckReport:
+        """What `check` found of its net."""
+        return self.asked.report
 
     @property
     def status(self) -> Status:
@@ -104,12 +115,28 @@ def check_loop(net: Net, model: PlantModel, budget: Budget | None = None) -> Loo
     >>> report.closed.figures.markings, str(report.status), any(one.differs for one in report.differences)
     (746, 'proved', False)
     """
-    loop = close(net, model)
-    asked = [of for of in net.properties if not _unclear(model, of)]
-    verdicts, closed = answers(loop, (*_families(loop), *(_family_of(loop, of) for of in asked)), budget)
-    verdicts += tuple(_not_asked(of) for of in net.properties if of not in asked)
+    asked = ask_loop(net, model, budget)
+    unclear = (_not_asked(of) for of in net.properties if _unclear(model, of))
+    verdicts = (*asked.verdicts, *unclear)
     opened = check(net, budget=budget)
-    return LoopReport(loop, verdicts, tuple(_differences(verdicts, opened)), closed, opened)
+    return LoopReport(asked, verdicts, tuple(_differences(verdicts, opened)), opened)
+
+
+def ask_loop(net: Net, model: PlantModel, budget: Budget | None = None) -> Answered:
+    """Ask everything of a net with the machines of a plant, but for properties of which the answer would be empty.
+
+    Raises `InputError` as `close` does, and as `check` does.
+    """
+    loop = close(net, model)
+    of_the_file = (_family_of(loop, of) for of in net.properties if not _unclear(model, of))
+    return answers(loop, (*_families(loop), *of_the_file), budget)
+
+
+def live_in(asked: Answered) -> tuple[str, ...]:
+    """The transitions of the cell that are live, or may be: those that `loop.live` is not violated for."""
+    verdict = next(verdict for verdict in asked.verdicts if verdict.name == LIVE)
+    lost = verdict.subjects if verdict.status is Status.VIOLATED else ()
+    return tuple(name for name in asked.loop.variants if name not in lost)
 
 
 def _families(loop: ClosedLoop) -> Iterator[Family]:
@@ -151,7 +178,7 @@ def _families(loop: ClosedLoop) -> Iterator[Family]:
         note="from here the gates of {} never open again",
     )
     yield Family(
-        "loop.live",
+        LIVE,
         "from every reachable marking every transition can fire again, as its machines allow",
         {name: possible(f"loop.live.{i}", fires(loop, name)) for i, name in enumerate(names)},
         Weight.WARNING,

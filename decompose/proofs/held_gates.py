@@ -24,12 +24,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from hashlib import sha256
-from typing import TYPE_CHECKING
 
 from firable.analysis.goal import Limits
-from firable.analysis.loop.families import ENDED, Family, all_of, answers, any_of, never
-from firable.analysis.report import CheckReport
+from firable.analysis.loop.families import ENDED, Answered, Family, all_of, answers, any_of, never
 from firable.analysis.spaces.reachability import Budget
 from firable.decompose.proofs.assumptions import Assumption, assumptions
 from firable.nets.decomposition import Coordinated, Decomposition
@@ -41,13 +38,9 @@ from firable.nets.net import SignalKind, Transition
 from firable.nets.verdict import Status, Verdict, Witness
 from firable.semantics.player import Player
 
-if TYPE_CHECKING:
-    from firable.analysis.evidence.document import Document
-
 COMPLETIONS = "o4.completions"
 COMMANDS = "o4.commands"
 EVIDENCE = "o4.evidence.json"
-PLANT = "plant.yaml"
 _HINT = "put the interlock into the machine's own controller, or make the signal one that a command clears"
 
 
@@ -58,46 +51,23 @@ def name_of(assumption: Assumption) -> str:
 
 @dataclass(frozen=True)
 class HeldGates:
-    """The verdicts on the gates, and what was found of the loop with the same questions as its properties.
+    """The verdicts on the gates, and what was asked of the loop of commands that are sent late.
 
-    The runs of the verdicts are of the loop's net.
+    The runs of the verdicts are of the loop's net, led on by the firing that closes the gate.
     """
 
     verdicts: tuple[Verdict, ...]
-    loop: ClosedLoop
-    asked: CheckReport
+    asked: Answered
 
-    def document(self, limits: Limits | None = None) -> Document:
-        """The evidence on the questions."""
-        from firable.analysis.evidence.producing.producer import evidence_of_report
-
-        questions = tuple(verdict for verdict in self.asked.verdicts if verdict.name.startswith("property."))
-        return evidence_of_report(replace(self.asked, verdicts=questions), (), limits)
+    @property
+    def loop(self) -> ClosedLoop:
+        """The loop that was asked."""
+        return self.asked.loop
 
     def evidence(self, limits: Limits | None = None) -> dict[str, bytes]:
         """The document, for `firable verify`, by the name of its file."""
-        data = self.document(limits).to_bytes()
+        data = self.asked.document(limits).to_bytes()
         return {EVIDENCE if data.startswith(b"{") else f"{EVIDENCE}.gz": data}
-
-    def sealed(self, plant: str, limits: Limits | None = None) -> tuple[tuple[Verdict, ...], dict[str, str]]:
-        """The verdicts as a bundle holds them, with the text of the plant that they are about, and the document."""
-        document = self.document(limits)
-        lacking = any(record.lacking for record in document.records)
-        method = f"closed loop with the machines of the plant {sha256(plant.encode()).hexdigest()}"
-        shown = [
-            Verdict(
-                verdict.name,
-                verdict.status,
-                verdict.statement,
-                method,
-                evidence=(EVIDENCE, PLANT),
-                discipline=verdict.discipline,
-            )
-            if verdict.holds and not lacking
-            else verdict
-            for verdict in self.verdicts
-        ]
-        return tuple(shown), {EVIDENCE: document.to_text(), PLANT: plant}
 
 
 def held_gates(decomposition: Decomposition, model: PlantModel, budget: Budget | None = None) -> HeldGates:
@@ -138,10 +108,10 @@ def held_gates(decomposition: Decomposition, model: PlantModel, budget: Budget |
             hint="let a completion of the one machine gate the command to the other",
         )
     )
-    verdicts, report = answers(loop, families, budget)
+    answered = answers(loop, families, budget)
     every = [(one,) for one in assumptions(decomposition)] + [tuple(completions), ()]
-    shown = (_shown(loop, decomposition, verdict, ones) for verdict, ones in zip(verdicts, every, strict=True))
-    return HeldGates(tuple(shown), loop, report)
+    shown = (_shown(loop, decomposition, verdict, ones) for verdict, ones in zip(answered.verdicts, every, strict=True))
+    return HeldGates(tuple(shown), answered)
 
 
 def _part(decomposition: Decomposition, row: Coordinated, controller: str | None) -> Transition:

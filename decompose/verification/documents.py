@@ -14,9 +14,10 @@ witness is played, and that of a vote which falls ends with who takes it back.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeAlias
 
 from firable.analysis.deadline import Deadline
+from firable.analysis.evidence.certificate import Certificate, Continuation, Labelling
 from firable.analysis.evidence.checking.checker import CheckedRecord, check_document
 from firable.analysis.evidence.checking.obligation import Evidence
 from firable.analysis.evidence.checking.obligations import obligations
@@ -38,6 +39,9 @@ from firable.semantics.player import NotFirableError, Player
 from firable.semantics.trace import Discipline
 
 SUFFIX: Final = ".evidence.json"
+
+ShownRecord: TypeAlias = CheckedRecord
+"""A record of a document with what checking it found, for those here who hold verdicts against records."""
 
 
 @dataclass
@@ -126,17 +130,32 @@ def _read(
 def _ask_again(document: Document, file: str, answers: Answers, timeout_ms: int) -> None:
     """Ask the solver every obligation of a document; where it refutes one, the document is refused."""
     asked: set[str] = set()
+    closed: set[tuple[object, ...]] = set()
     for record in document.records:
         for claim, certificate in record.shown:
             evidence = Evidence(document.net, document.discipline, claim, certificate)
+            on, deadline = _set_of(certificate), Deadline.after(timeout_ms / 1000)
             try:
-                texts = [one.text(evidence) for one in obligations(evidence, Deadline.after(timeout_ms / 1000))]
+                found = obligations(evidence, deadline, closed=on in closed)
+                texts = [one.text(evidence) for one in found]
             except TimeIsOverError:
                 continue  # the record is then only claimed, as the checker says of it
             for text in texts:
                 if text not in asked and answers(text, timeout_ms)[-1:] == ("sat",):
                     raise NotShownError(f"an obligation of '{file}' on '{record.name}' is refuted", "evidence", file)
                 asked.add(text)
+            if on is not None:
+                closed.add(on)
+
+
+def _set_of(certificate: Certificate) -> tuple[object, ...] | None:
+    """What tells the set of markings that a claim rests on, and where it begins: whether it is closed is asked once."""
+    match certificate:
+        case Labelling(space):
+            return (id(space),)
+        case Continuation(firings, Labelling(space)):
+            return (id(space), firings)
+    return None
 
 
 def _judge_votes(examination: Examination, formulas: Formulas, shown: _Shown) -> None:

@@ -1,16 +1,18 @@
 """A second reading of the plant file: what can happen in a cell with its machines, told as an interpreter would.
 
-The loop that O4 is asked of is made by `firable.nets.machines`, for prover and checker alike. So the checker reads the
+The loops of a bundle are made by `firable.nets.machines`, for prover and checker alike. So the checker reads the
 plant file a second time, and not as arcs: here a machine *is at* a command or at none, a hand *is at* a position, a
 station or a hand *has* nothing, a raw or a machined workpiece; and of each thing that can happen it is told, in one
 state, which states may follow. That the net of the loop does the same in every state is compared in `same_loop`.
 
-The meaning is that of docs/machines.md, with the commands sent late: each controller sends a command some time after
-the firing that it belongs to, and what reads or takes the token of that place waits until then.
+The meaning is that of docs/machines.md. Commands are sent in the firing itself, one after the other, or late: each
+controller sends a command some time after the firing that it belongs to, and what reads or takes the token of that
+place waits until then.
 
-    fire/T             a transition of the cell
-    sent/P             the command of place P reaches its machine, or cannot be taken: an accident, and all ends
+    T                  a transition of the cell fires
+    sent/P             late, the command of place P reaches its machine, or cannot be taken: an accident, and all ends
     M/done/P           the machine is done with it;           M/accident/P   it ends in an accident
+    M/fails/P          M, at the command of P, fails, while no other machine has;   M/repaired   it goes on
     S/shown            the sensor of an acknowledged completion shows it
     arrives/E, leaves/E   a workpiece comes, or is taken away
     S/drops, S/returns, S/clears     a sensor that is not exact
@@ -28,6 +30,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 from firable.decompose.verification.plant import ACCIDENT, OVERRUN, State, Things, Value, target_of
+from firable.nets.machines.loop import Faults, Sending
 from firable.nets.machines.plant_file import Action, Carry, Clamp, Grasp, Move, Process, Put, Release, Stop
 from firable.nets.net import Place, Transition
 
@@ -44,10 +47,14 @@ class Plant(Things):
         """Everything that can happen, by its name: after a state, what changes, once for each way that it can go."""
         found: dict[str, Happens] = {t.name: partial(self.fires, t) for t in self.net.transitions}
         for place in self.commanding:
-            found[f"sent/{place.name}"] = partial(self.sent, place)
+            if self.sending is Sending.LATE:
+                found[f"sent/{place.name}"] = partial(self.sent_late, place)
             if place.name not in self.stops:
                 found[f"{self.machine_of(place)}/done/{place.name}"] = partial(self.done, place)
                 found[f"{self.machine_of(place)}/accident/{place.name}"] = partial(self.spoils, place)
+        found |= {f"{self.machine_of(place)}/fails/{place.name}": partial(self.fails, place) for place in self.failing}
+        if self.faults is Faults.REPAIRED:
+            found |= {f"{name}/repaired": partial(self.repaired, name) for name in self.may_fail}
         found |= {f"{name}/shown": partial(self.comes_to_be_shown, name) for name in self.sensed}
         found[f"arrives/{self.model.arrivals.station}"] = self.arrives
         found[f"leaves/{self.model.departures.station}"] = self.leaves
@@ -75,13 +82,31 @@ class Plant(Things):
         if may and all(self.shown(gate.signal, state) == gate.wanted for gate in read):
             changes: Changes = {f"token of {p}": False for p in t.inputs}
             changes |= {f"token of {p}": True for p in t.outputs}
-            yield changes | {f"unsent {p}": True for p in t.outputs if f"unsent {p}" in self.things}
+            if self.sending is Sending.LATE:
+                yield changes | {f"unsent {p}": True for p in t.outputs if f"unsent {p}" in self.things}
+                return
+            commanding = [place for p in t.outputs if (place := self.net.place(p)).command is not None]
+            yield from self.all_sent(commanding, changes, state)
+
+    def sent_late(self, place: Place, state: State) -> Iterator[Changes]:
+        """A command that was still to be sent is."""
+        if state[f"unsent {place.name}"]:
+            yield from self.all_sent([place], {f"unsent {place.name}": False}, state)
+
+    def all_sent(self, places: list[Place], changes: Changes, state: State) -> Iterator[Changes]:
+        """Commands are sent one after the other; after an accident none is, and no sensor sees anything more."""
+        if not places:
+            yield from ({**changes, **seen} for seen in self.sensors_see(changes, state))
+            return
+        for sent in self.sent(places[0], _Overlaid(changes, state)):
+            if ACCIDENT in sent or OVERRUN in sent:
+                yield changes | sent
+            else:
+                yield from self.all_sent(places[1:], changes | sent, state)
 
     def sent(self, place: Place, state: State) -> Iterator[Changes]:
         """The command reaches its machine, and clears the completion that it will set."""
-        if not state[f"unsent {place.name}"]:
-            return
-        cleared: Changes = {f"unsent {place.name}": False}
+        cleared: Changes = {}
         if place.completion is not None:
             cleared[f"signal {place.completion}"] = False
             if place.completion in self.sensed:
@@ -90,11 +115,7 @@ class Plant(Things):
                     return  # no completion is both: it is shown, or waits to be
         if place.within is not None and place.within.timer in self.timers:
             cleared[f"signal {place.within.timer}"] = False
-        for taken in self.taken(place, state):
-            if ACCIDENT in taken or OVERRUN in taken:
-                yield cleared | taken
-            else:
-                yield from ({**cleared, **taken, **seen} for seen in self.sensors_see(taken, state))
+        yield from (cleared | taken for taken in self.taken(place, state))
 
     def taken(self, place: Place, state: State) -> Iterator[Changes]:
         """How a machine takes a command."""
@@ -120,7 +141,7 @@ class Plant(Things):
     def done(self, place: Place, state: State) -> Iterator[Changes]:
         """A machine is done with what it is at: the effect, what sensors see of it, and the completion."""
         name = self.machine_of(place)
-        if state[f"at {name}"] != place.name:
+        if state[f"at {name}"] != place.name or self.has_failed(name, state):
             return
         for effect in self.effect(place, state):
             for seen in self.sensors_see(effect, state):
@@ -163,8 +184,24 @@ class Plant(Things):
     def spoils(self, place: Place, state: State) -> Iterator[Changes]:
         """What a machine is at ends in an accident."""
         name, action = self.machine_of(place), self.action(place)
-        if state[f"at {name}"] == place.name and self.goes_wrong(name, action, place, state):
+        at_work = state[f"at {name}"] == place.name and not self.has_failed(name, state)
+        if at_work and self.goes_wrong(name, action, place, state):
             yield {f"at {name}": None, ACCIDENT: True}
+
+    def has_failed(self, machine: str, state: State) -> bool:
+        """Whether a machine has failed: nothing that it is at gets done then."""
+        return machine in self.may_fail and bool(state[f"failed {machine}"])
+
+    def fails(self, place: Place, state: State) -> Iterator[Changes]:
+        """A machine fails at a command, once and alone."""
+        name = self.machine_of(place)
+        if state[f"at {name}"] == place.name and not any(state[f"failed {other}"] for other in self.may_fail):
+            yield {f"failed {name}": True}
+
+    def repaired(self, machine: str, state: State) -> Iterator[Changes]:
+        """A machine that has failed is repaired, and goes on with what it is at."""
+        if state[f"failed {machine}"]:
+            yield {f"failed {machine}": False}
 
     def goes_wrong(self, name: str, action: Action, place: Place, state: State) -> bool:
         """Whether it does."""

@@ -1,24 +1,28 @@
-"""The verdicts on O4 with the machines of a plant: the loop is closed anew, and a document must show what is asked.
+"""The verdicts on a cell with its machines: each loop is closed anew, and its document must show what is asked of it.
 
-A bundle that has them holds the plant file itself, and each verdict names the SHA-256 of it. The questions are stated
-anew: of each gate that a vote relies on, whether a marking of the loop can be reached in which the part could vote, its
-places as Eq. (1) wants them and the gate open, and a move may close the gate. That the document shows this of the loop
-is checked as of any net.
+A bundle that has them holds the plant file itself, and each verdict names the SHA-256 of it. There are four loops, each
+with a document: of commands sent late, what votes rely on (O4); of machines that do not fail, `loop.*`; of machines of
+which one fails, for good or until it is repaired, `fault.*`. What is asked is stated anew, of O4 here: of each gate
+that a vote relies on, whether a marking of the loop can be reached in which the part could vote, its places as Eq. (1)
+wants them and the gate open, and a move may close the gate; of the others in `loop_questions`. That a document shows
+this of the loop is checked as of any net.
 
-The net of the loop is made by the same text as in the prover, `firable.nets.machines`, and then held against a second
+The net of each loop is made by the same text as in the prover, `firable.nets.machines`, and then held against a second
 reading of the plant file that shares nothing with it (`same_loop`), in every state. That the plant is like the real
 machines nobody can show; it is assumed instead of O4.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from typing import Final
 
 from firable.decompose.verification.checked import Examination
-from firable.decompose.verification.documents import checked_document
+from firable.decompose.verification.documents import ShownRecord, checked_document
+from firable.decompose.verification.happenings import Plant
+from firable.decompose.verification.loop_questions import Asked, Question
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.same_loop import DiffersError, compare
@@ -27,15 +31,25 @@ from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or
 from firable.nets.machines.closing import close
 from firable.nets.machines.laws import ACCIDENT, OVERRUN
-from firable.nets.machines.loop import ClosedLoop, Sending
-from firable.nets.machines.plant_file import parse_plant
-from firable.nets.net import ExternalGate, Property, PropertyKind, SignalKind
+from firable.nets.machines.loop import ClosedLoop, Faults, Sending
+from firable.nets.machines.plant_file import PlantModel, parse_plant
+from firable.nets.net import ExternalGate, Net, Property, PropertyKind, SignalKind
 from firable.nets.verdict import Status, Verdict
 
-PREFIX: Final = "o4."
+PREFIXES: Final = ("o4.", "loop.", "fault.")
 PLANT: Final = "plant.yaml"
-DOCUMENT: Final = "o4.evidence.json"
-TITLE: Final = "the machines of the plant keep each gate that a vote relies on (O4)"
+METHOD: Final = "closed loop with the machines of the plant"
+O4: Final = "o4.evidence.json"
+LOOP: Final = "loop.evidence.json"
+FAILING: Final = "loop.failing.evidence.json"
+REPAIRED: Final = "loop.repaired.evidence.json"
+TITLES: Final = {
+    "o4": "the machines of the plant keep each gate that a vote relies on (O4)",
+    "loop": "what the cell does with its machines, as the plant file says they go",
+    "fault": "what it leads to that one of them fails",
+}
+"""What the verdicts of each prefix show, in a line."""
+UNDECIDED: Final = "not decided within the limits"
 
 _ENDED: Final = Or((Holds(ACCIDENT), Holds(OVERRUN)))
 _COMPLETIONS: Final = "a completion that a coordinated transition waits for stays from the vote until it fires"
@@ -43,56 +57,117 @@ _COMMANDS: Final = "no machine is given what it cannot do, however late its cont
 
 
 def check_machines(examination: Examination, cut: Cut, answers: Answers, timeout_ms: int) -> None:
-    """Judge the verdicts on O4, if there are any; raises `NotShownError` where one is not shown."""
-    if not any(verdict.name.startswith(PREFIX) for verdict in examination.bundle.verdicts):
+    """Judge the verdicts on a cell with its machines, if there are any; raises `NotShownError` where one is not shown.
+
+    Whoever speaks of the machines at all must say everything: O4, the loop, and each fault that the plant declares.
+    """
+    if not any(verdict.name.startswith(PREFIXES) for verdict in examination.bundle.verdicts):
         return
-    plant = examination.text(PLANT)
+    text = examination.text(PLANT)
     try:
-        model = parse_plant(plant, PLANT)
-        loop = close(cut.net, model, sending=Sending.LATE)
-        compare(cut.net, model, loop)
-    except DiffersError as error:
-        raise NotShownError(f"the loop with '{PLANT}' is not what that says: {error}", "evidence", PLANT) from None
+        model = parse_plant(text, PLANT)
     except InputError as error:
-        message = f"'{PLANT}' closes no loop with the net: {error.diagnostics[0].message}"
-        raise NotShownError(message, "evidence", PLANT) from None
-    asked = list(_asked(cut, loop))
-    net = replace(loop.net, properties=tuple(prop for _, _, properties in asked for prop in properties))
-    records = {}
-    for one in checked_document(examination, DOCUMENT, net, answers, timeout_ms):
-        if one.record.name in records or one.record.query or not one.record.proved:
-            raise NotShownError(f"'{DOCUMENT}' speaks of '{one.record.name}' as no bundle does", "evidence", DOCUMENT)
-        records[one.record.name] = one
-    if missing := {f"property.{prop.name}" for prop in net.properties} ^ set(records):
-        raise NotShownError(f"'{DOCUMENT}' lacks '{min(missing)}', or nobody asks it", "evidence", DOCUMENT)
-    method = f"closed loop with the machines of the plant {sha256(plant.encode()).hexdigest()}"
-    for name, sentence, properties in asked:
-        verdict, evidence = examination.verdict(name), (DOCUMENT, PLANT)
-        wanted = Verdict(name, Status.PROVED, sentence, method, evidence=evidence, discipline="interleaving")
-        if verdict != wanted:
+        raise _closes_nothing(error) from None
+    judging = _Judging(examination, cut, model, f"{METHOD} {sha256(text.encode()).hexdigest()}", answers, timeout_ms)
+    judging.judge(O4, Sending.LATE, Faults.NONE, lambda loop, _: _asked(cut, loop))
+    found = judging.judge(LOOP, Sending.AT_ONCE, Faults.NONE, lambda _, asked: asked.of_the_loop())
+    # What is live without faults: a fault takes nothing of the others.
+    live = [t.name for t in cut.net.transitions if t.name not in found["loop.live"]]
+    if Plant(cut.net, model, faults=Faults.FOR_GOOD).may_fail:
+        judging.judge(FAILING, Sending.AT_ONCE, Faults.FOR_GOOD, lambda _, asked: asked.of_faults(live))
+    if live and Plant(cut.net, model, faults=Faults.REPAIRED).may_fail:
+        judging.judge(REPAIRED, Sending.AT_ONCE, Faults.REPAIRED, lambda _, asked: asked.of_repairs(live))
+
+
+def _closes_nothing(error: InputError) -> NotShownError:
+    message = f"'{PLANT}' closes no loop with the net: {error.diagnostics[0].message}"
+    return NotShownError(message, "evidence", PLANT)
+
+
+@dataclass(frozen=True)
+class _Judging:
+    """A bundle whose verdicts on the machines of `model` are judged; `method` is what each says of itself."""
+
+    examination: Examination
+    cut: Cut
+    model: PlantModel
+    method: str
+    answers: Answers
+    timeout_ms: int
+
+    def judge(
+        self, file: str, sending: Sending, faults: Faults, ask: Callable[[ClosedLoop, Asked], Iterable[Question]]
+    ) -> dict[str, tuple[str, ...]]:
+        """Judge the verdicts that one document shows, of one loop: for each, of what it is violated."""
+        plant = Plant(self.cut.net, self.model, sending, faults)
+        try:
+            loop = close(self.cut.net, self.model, faults, sending)
+            compare(plant, loop)
+        except DiffersError as error:
+            message = f"the loop with '{PLANT}' is not what that says: {error}"
+            raise NotShownError(message, "evidence", PLANT) from None
+        except InputError as error:
+            raise _closes_nothing(error) from None
+        questions = list(ask(loop, Asked(plant, loop.net)))
+        net = replace(loop.net, properties=tuple(prop for one in questions for prop in one.of.values()))
+        records = self.records(file, net)
+        return {question.name: self.judge_one(question, file, records) for question in questions}
+
+    def records(self, file: str, net: Net) -> dict[str, ShownRecord]:
+        """What a document says of the properties of a loop, by their names; of nothing else."""
+        names, found = {f"property.{prop.name}" for prop in net.properties}, dict[str, ShownRecord]()
+        for one in checked_document(self.examination, file, net, self.answers, self.timeout_ms):
+            if one.record.name in found or one.record.query or one.record.name not in names:
+                raise NotShownError(f"'{file}' speaks of '{one.record.name}' as no bundle does", "evidence", file)
+            found[one.record.name] = one
+        return found
+
+    def judge_one(self, question: Question, file: str, records: Mapping[str, ShownRecord]) -> tuple[str, ...]:
+        """Hold a verdict against the records of all that it comes down to: it must say what they say."""
+        some = {of: records.get(f"property.{prop.name}") for of, prop in question.of.items()}
+        decided = {of: one for of, one in some.items() if one is not None}
+        against = [of for of, one in decided.items() if not one.record.proved]
+        status = Status.VIOLATED if against else Status.PROVED if len(decided) == len(some) else Status.UNKNOWN
+        shown = status is not Status.UNKNOWN and not any(one.record.lacking for one in decided.values())
+        subjects = tuple(of for of in against if of)
+        verdict = Verdict(
+            question.name,
+            status,
+            question.sentence,
+            self.method,
+            question.weight,
+            bound=UNDECIDED if status is Status.UNKNOWN else "",
+            subjects=subjects,
+            evidence=(file, PLANT) if shown else (),
+            discipline="interleaving",
+        )
+        name = question.name
+        if self.examination.verdict(name) != verdict:
             raise NotShownError(f"the verdict on '{name}' is not what its proof shows", "verdicts", name)
-        some = [records[f"property.{prop.name}"] for prop in properties]
-        methods = list(dict.fromkeys(method for one in some for method in one.methods))
-        late = next((one.only_claimed for one in some if not one.shown), "")
-        how = f"the loop closed anew with {PLANT}: {'; '.join(methods) or 'there is nothing of the kind'}"
-        examination.judge(verdict, shown=not late, method=how, only_claimed=late)
+        methods = "; ".join(dict.fromkeys(method for one in decided.values() for method in one.methods))
+        late = next((one.only_claimed for one in decided.values() if not one.shown), "")
+        if status is Status.UNKNOWN:
+            late = "undecided: the bundle itself does not say"
+        how = f"the loop closed anew with {PLANT}: {methods or 'there is nothing of the kind'}"
+        self.examination.judge(verdict, shown=not late, method=how, only_claimed=late)
+        return subjects
 
 
-def _asked(cut: Cut, loop: ClosedLoop) -> Iterator[tuple[str, str, tuple[Property, ...]]]:
-    """Each verdict with its sentence, and the properties of the loop that it comes down to."""
-    completions = list[Property]()
+def _asked(cut: Cut, loop: ClosedLoop) -> Iterator[Question]:
+    """What votes rely on (O4), by the properties of the loop that it comes down to."""
+    completions = dict[str, Property]()
     for row in cut.coordinated:
         for gate in cut.net.transition(row.name).external:
             question = _closes_after_vote(cut, loop, row.name, gate)
             completion = cut.net.signal(gate.signal).kind is SignalKind.COMPLETION
             if gate.wanted and completion:
-                completions.append(_never(f"o4.completion.{len(completions)}", question))
+                completions[f"{gate.signal} for {row.name}"] = _never(f"o4.completion.{len(completions)}", question)
                 continue
             name = f"o4.{row.name}.{gate.signal}"
             sentence = f"'{gate.signal}' stays {int(gate.wanted)} from the vote for '{row.name}' until it fires"
-            yield name, sentence, (_never(name, question),)
-    yield "o4.completions", _COMPLETIONS, tuple(completions)
-    yield "o4.commands", _COMMANDS, (_never("o4.command", _ENDED),)
+            yield Question(name, sentence, {gate.signal: _never(name, question)})
+    yield Question("o4.completions", _COMPLETIONS, completions)
+    yield Question("o4.commands", _COMMANDS, {"": _never("o4.command", _ENDED)})
 
 
 def _never(name: str, formula: Formula) -> Property:

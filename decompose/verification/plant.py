@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
-from firable.nets.machines.plant_file import Action, Carry, Clamp, PlantModel, Process, Release, Sensor, Stop
+from firable.nets.machines.loop import Faults, Sending
+from firable.nets.machines.plant_file import Action, Carry, Clamp, Failure, PlantModel, Process, Release, Sensor, Stop
 from firable.nets.net import Net, Place, SignalKind
 
 ACCIDENT: Final = "accident"
@@ -23,10 +24,15 @@ State = Mapping[str, Value]
 
 @dataclass(frozen=True)
 class Things:
-    """A net with the machines of a plant file; each thing has a name here, and a value in each state."""
+    """A net with the machines of a plant file; each thing has a name here, and a value in each state.
+
+    What there is depends on when commands are sent, and on which of them may fail.
+    """
 
     net: Net
     model: PlantModel
+    sending: Sending = Sending.LATE
+    faults: Faults = Faults.NONE
 
     # --- What there is, and what it is at the start
 
@@ -41,7 +47,9 @@ class Things:
             elif sensor.may_flicker or sensor.may_linger:
                 found[f"bit {name}"] = {True: f"plant.{name}.sensor" if name in self.completions else name}
         found |= {f"acknowledged {name}": {True: f"plant.{name}.acknowledged"} for name in self.sensed}
-        found |= {f"unsent {p.name}": {True: f"plant.unsent.{p.name}"} for p in self.commanding}
+        if self.sending is Sending.LATE:
+            found |= {f"unsent {p.name}": {True: f"plant.unsent.{p.name}"} for p in self.commanding}
+        found |= {f"failed {name}": {True: f"plant.{name}.failed"} for name in self.may_fail}
         for name, machine in self.model.machines.items():
             at: dict[Value, str] = {None: f"plant.{name}.idle"}
             at |= {p.name: f"plant.{name}.at.{p.name}" for p in self.commanding if self.machine_of(p) == name}
@@ -87,6 +95,23 @@ class Things:
     def stops(self) -> set[str]:
         """Those whose command stops the machine."""
         return {place.name for place in self.commanding if isinstance(self.action(place), Stop)}
+
+    @cached_property
+    def failing(self) -> tuple[Place, ...]:
+        """The places whose command may be taken and not be done."""
+        kinds = {
+            Faults.NONE: set[Failure](),
+            Faults.REPAIRED: {Failure.REPAIRABLE},
+            Faults.FOR_GOOD: {Failure.REPAIRABLE, Failure.FOR_GOOD},
+        }[self.faults]
+        some = ((place, self.action(place)) for place in self.commanding)
+        return tuple(place for place, action in some if not isinstance(action, Stop) and action.may_fail in kinds)
+
+    @cached_property
+    def may_fail(self) -> tuple[str, ...]:
+        """The machines at such a command, in the order of the plant file."""
+        some = {self.machine_of(place) for place in self.failing}
+        return tuple(name for name in self.model.machines if name in some)
 
     @cached_property
     def completions(self) -> tuple[str, ...]:

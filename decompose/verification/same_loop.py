@@ -16,9 +16,8 @@ from typing import Final
 
 from firable.decompose.verification.happenings import Plant
 from firable.decompose.verification.plant import ACCIDENT, OVERRUN, Value
-from firable.nets.machines.loop import ClosedLoop
-from firable.nets.machines.plant_file import PlantModel
-from firable.nets.net import Net, Transition
+from firable.nets.machines.loop import ClosedLoop, Sending
+from firable.nets.net import Transition
 
 STATES_MAX: Final = 1_000_000
 """In how many states one happening is compared; one that looks at more things is refused."""
@@ -28,12 +27,11 @@ class DiffersError(Exception):
     """The net of the loop is not what the plant file says, and where."""
 
 
-def compare(net: Net, model: PlantModel, loop: ClosedLoop) -> int:
-    """In how many states the net of a loop was compared with a second reading of the plant file; late commands.
+def compare(plant: Plant, loop: ClosedLoop) -> int:
+    """In how many states the net of a loop was compared with a second reading of the plant file.
 
     Raises `DiffersError` at the first difference.
     """
-    plant = Plant(net, model)
     _compare_places(plant, loop)
     _compare_names(plant, loop)
     some = by_happening(plant, loop.net.transitions)
@@ -63,7 +61,8 @@ def _compare_places(plant: Plant, loop: ClosedLoop) -> None:
 
 def _compare_names(plant: Plant, loop: ClosedLoop) -> None:
     """What the questions about O4 use: where each signal is shown, and which commands are still to be sent."""
-    if dict(loop.unsent) != {place.name: plant.things[f"unsent {place.name}"][True] for place in plant.commanding}:
+    late = plant.commanding if plant.sending is Sending.LATE else ()
+    if dict(loop.unsent) != {place.name: plant.things[f"unsent {place.name}"][True] for place in late}:
         raise DiffersError("the commands that are still to be sent are others")
     shown = {signal: (plant.things[f"signal {signal}"][True], True) for signal in (*plant.completions, *plant.timers)}
     for signal in (signal.name for signal in plant.net.signals if signal.name not in shown):

@@ -17,6 +17,7 @@ from firable.analysis.spaces.reachability import Budget, explore
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.formula import Deadlock, parse_formula
 from firable.nets.machines.closing import close
+from firable.nets.machines.loop import Faults
 from firable.nets.machines.plant_file import PlantModel, parse_plant
 from firable.nets.net import Net, Property, PropertyKind, TemporalProperty
 from firable.nets.temporal import Logic, parse_temporal
@@ -236,6 +237,24 @@ def test_a_budget_that_ends_leaves_the_loop_unknown() -> None:
 
 def faults_of(net: Net, plant: PlantModel) -> dict[str, Status]:
     return {verdict.name: verdict.status for verdict in check_faults(check_loop(net, plant), plant)}
+
+
+@pytest.mark.parametrize("cell", SIZES)
+def test_every_machine_of_every_cell_may_fail_and_be_repaired(cell: str) -> None:
+    plant = catalogue_plant(cell)
+    for faults in (Faults.FOR_GOOD, Faults.REPAIRED):
+        assert set(close(catalogue_net(cell), plant, faults).failed) == set(plant.machines)
+
+
+def test_no_fault_of_two_cells_is_an_accident_and_after_a_repair_every_transition_is_live() -> None:
+    net, plant = catalogue_net("two_cells"), catalogue_plant("two_cells")
+    loop = close(net, plant, Faults.FOR_GOOD)
+    space = explore(loop.net)
+    assert space.n_markings > 75_464
+    assert not any(space.fired()[loop.net.transition_index[name]] for name in loop.accidents)
+    loop = close(net, plant, Faults.REPAIRED)
+    live = explore(loop.net).live()
+    assert all(any(live[loop.net.transition_index[name]] for name in variants) for variants in loop.variants.values())
 
 
 def test_each_fault_of_the_one_robot_cell_is_safe_stops_all_and_is_recovered_from() -> None:

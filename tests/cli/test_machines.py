@@ -66,6 +66,19 @@ def test_the_loop_is_written_as_a_net_that_is_checked_like_any_other(
     assert "✓ proved    query.query-1" in told
 
 
+def test_the_evidence_on_each_loop_is_written_and_verified(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "evidence"
+    assert main(["check", CELL, "--machines", PLANT, "--evidence", str(folder)]) == 0
+    told = capsys.readouterr().out
+    loops = ("loop", "loop.failing", "loop.repaired")
+    assert sorted(path.name for path in folder.iterdir()) == [f"one-robot.{loop}.evidence.json" for loop in loops]
+    for loop, said in zip(loops, ("property.loop.live.0", "property.fault.R.t0", "property.repair.R"), strict=True):
+        path = str(folder / f"one-robot.{loop}.evidence.json")
+        assert f"evidence: firable verify {path}\n" in told
+        assert main(["verify", path]) == 0
+        assert said in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -16,7 +16,7 @@ from firable.nets.catalogue import catalogue_net, catalogue_plant
 from firable.nets.diagnostics import InputError
 from firable.nets.machines.closing import _Closing, close
 from firable.nets.machines.laws import Laws
-from firable.nets.machines.loop import ClosedLoop, Sending
+from firable.nets.machines.loop import ClosedLoop, Faults, Sending
 from firable.nets.machines.moment import Case
 from firable.nets.machines.plant_file import PlantModel
 from firable.nets.net import Net, Place, Transition
@@ -27,15 +27,30 @@ CELLS = (
 )
 
 
+KINDS = (
+    (Sending.LATE, Faults.NONE),
+    (Sending.AT_ONCE, Faults.NONE),
+    (Sending.AT_ONCE, Faults.FOR_GOOD),
+    (Sending.AT_ONCE, Faults.REPAIRED),
+)
+"""The loops of which a bundle speaks."""
+
+
 @cache
-def closed(name: str) -> tuple[Net, PlantModel, ClosedLoop]:
+def closed(
+    name: str, sending: Sending = Sending.LATE, faults: Faults = Faults.NONE
+) -> tuple[Net, PlantModel, ClosedLoop]:
     net, model = catalogue_net(name), catalogue_plant(name)
-    return net, model, close(net, model, sending=Sending.LATE)
+    return net, model, close(net, model, faults, sending)
 
 
 @pytest.mark.parametrize("name", CELLS)
-def test_the_loop_of_every_cell_of_the_catalogue_is_what_its_plant_file_says(name: str) -> None:
-    assert compare(*closed(name)) > 5000
+@pytest.mark.parametrize(("sending", "faults"), KINDS)
+def test_the_loop_of_every_cell_of_the_catalogue_is_what_its_plant_file_says(
+    name: str, sending: Sending, faults: Faults
+) -> None:
+    net, model, loop = closed(name, sending, faults)
+    assert compare(Plant(net, model, sending, faults), loop) > 1000
 
 
 def other_plants(model: PlantModel, seed: int) -> PlantModel:
@@ -52,6 +67,8 @@ def other_plants(model: PlantModel, seed: int) -> PlantModel:
                 action["when_full"] = draw.choice(["collide", "wait"])
             if draw.random() < 0.1:
                 machine["commands"][name] = draw.choice([{"does": "stop"}, {"does": "work", "takes_s": 1.0}])
+            elif action["does"] != "stop":
+                action["may_fail"] = draw.choice(["repairable", "for_good", None])
     return PlantModel.model_validate(data)
 
 
@@ -60,12 +77,13 @@ def test_both_readings_agree_on_plants_of_every_kind() -> None:
     for seed in range(30):
         net = catalogue_net(CELLS[seed % len(CELLS)])
         model = other_plants(catalogue_plant(CELLS[seed % len(CELLS)]), seed)
+        sending, faults = KINDS[seed % len(KINDS)]
         try:
-            loop = close(net, model, sending=Sending.LATE)
+            loop = close(net, model, faults, sending)
         except InputError:
             continue  # a net that the plant does not fit
         count += 1
-        assert compare(net, model, loop) > 1000
+        assert compare(Plant(net, model, sending, faults), loop) > 1000
     assert count > 15
 
 
@@ -127,7 +145,7 @@ def test_a_loop_of_another_kind_is_refused() -> None:
     )
     for other, message in others:
         with pytest.raises(DiffersError, match=message):
-            compare(net, model, other)
+            compare(Plant(net, model), other)
 
 
 def with_token(net: Net, name: str) -> Net:
@@ -167,7 +185,7 @@ def test_a_mistake_in_the_laws_is_found(
     net, model, _ = closed("one_robot")
     monkeypatch.setattr(Laws, law, spoil(getattr(Laws, law)))
     with pytest.raises(DiffersError):
-        compare(net, model, close(net, model, sending=Sending.LATE))
+        compare(Plant(net, model), close(net, model, sending=Sending.LATE))
 
 
 @pytest.mark.parametrize("step", ["cleared", "formed", "sent_late", "workpieces"])
@@ -176,32 +194,49 @@ def test_a_mistake_in_the_closing_is_found(step: str, monkeypatch: pytest.Monkey
     before = getattr(_Closing, step)
     monkeypatch.setattr(_Closing, step, lambda *of: list(before(*of))[:1])
     with pytest.raises(DiffersError):
-        compare(net, model, close(net, model, sending=Sending.LATE))
+        compare(Plant(net, model), close(net, model, sending=Sending.LATE))
 
 
 def test_a_firing_that_does_not_wait_for_the_command_before_it_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     net, model, _ = closed("one_robot")
     monkeypatch.setattr(_Closing, "applied", lambda *_: Case())
     with pytest.raises(DiffersError):
-        compare(net, model, close(net, model, sending=Sending.LATE))
+        compare(Plant(net, model), close(net, model, sending=Sending.LATE))
 
 
 @pytest.mark.parametrize("name", ["fires", "sent", "taken", "done", "effect", "spoils", "formed", "arrives", "leaves"])
 def test_a_mistake_in_the_second_reading_is_found(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Plant, name, lambda *_: iter(()))
     with pytest.raises(DiffersError):
-        compare(*closed("one_robot"))
+        compare(Plant(*closed("one_robot")[:2]), closed("one_robot")[2])
+
+
+@pytest.mark.parametrize("name", ["sent", "taken", "done", "has_failed", "fails", "repaired"])
+def test_a_mistake_in_the_second_reading_of_machines_that_fail_is_found(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    net, model, loop = closed("one_robot", Sending.AT_ONCE, Faults.REPAIRED)
+    monkeypatch.setattr(Plant, name, lambda *_: iter(()))
+    with pytest.raises(DiffersError):
+        compare(Plant(net, model, Sending.AT_ONCE, Faults.REPAIRED), loop)
+
+
+@pytest.mark.parametrize("other", KINDS[:-1])
+def test_a_loop_whose_machines_fail_in_another_way_is_refused(other: tuple[Sending, Faults]) -> None:
+    net, model, loop = closed("one_robot", *other)
+    with pytest.raises(DiffersError):
+        compare(Plant(net, model, Sending.AT_ONCE, Faults.REPAIRED), loop)
 
 
 def test_sensors_that_are_not_exact_are_read_twice_too(monkeypatch: pytest.MonkeyPatch) -> None:
     net, model = catalogue_net("one_robot"), other_plants(catalogue_plant("one_robot"), 3)
     loop = close(net, model, sending=Sending.LATE)
-    compare(net, model, loop)
+    compare(Plant(net, model), loop)
     for name in ("sensors_see", "wavers"):
         with monkeypatch.context() as patch:
             patch.setattr(Plant, name, lambda *_: iter([{}]))
             with pytest.raises(DiffersError):
-                compare(net, model, loop)
+                compare(Plant(net, model), loop)
 
 
 def test_a_place_of_the_net_may_bear_any_name_that_the_plant_does_not() -> None:

@@ -1,0 +1,90 @@
+"""What a bundle holds of a cell with its machines: every verdict of each closed loop, with a document that shows it.
+
+There are four loops: commands sent late, for what votes rely on (O4); machines that do not fail; and, where the plant
+file says that some may, one that fails for good, and one that is repaired. Each has questions of its own and a document
+on its net. A verdict is sealed as what the document shows of it: its status, and of which transitions or places it is
+violated. How it was found, the run and the hint stay behind, since the document holds the run of each violation; but a
+verdict that must hold and does not is left as it is, because of it no bundle is made.
+
+What `firable check --machines` tells in one verdict, what stands still after a fault and which places hang, are two
+here, as they were asked. Properties that are not asked of a loop (a deadlock, where a sensor never rests) have none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from hashlib import sha256
+from typing import Final
+
+from firable.analysis.evidence.document import Record
+from firable.analysis.goal import Limits
+from firable.analysis.loop.families import Answered, Family
+from firable.analysis.loop.faults import ask_faults
+from firable.analysis.loop.verdicts import ask_loop
+from firable.decompose.proofs.held_gates import EVIDENCE, held_gates
+from firable.nets.decomposition import Decomposition
+from firable.nets.machines.plant_file import parse_plant
+from firable.nets.verdict import Status, Verdict, Weight
+
+PREFIXES: Final = ("o4.", "loop.", "fault.")
+PLANT: Final = "plant.yaml"
+LOOP: Final = "loop.evidence.json"
+FAILING: Final = "loop.failing.evidence.json"
+REPAIRED: Final = "loop.repaired.evidence.json"
+UNDECIDED: Final = "not decided within the limits"
+
+
+def sealed_loops(
+    decomposition: Decomposition, plant: str, limits: Callable[[], Limits]
+) -> tuple[tuple[Verdict, ...], dict[str, str]]:
+    """The verdicts on a net with the machines of a plant file, given as its text, and the files that they name.
+
+    `limits` are those of each document. A verdict of which a part is not shown names no evidence. Raises `InputError`
+    as `close` does, and as `check` does.
+    """
+    net, model = decomposition.net, parse_plant(plant)
+    held = held_gates(decomposition, model)
+    loop = ask_loop(net, model)
+    faults = ask_faults(loop, model)
+    found = {EVIDENCE: held.asked, LOOP: loop}
+    found |= {} if faults.for_good is None else {FAILING: faults.for_good}
+    found |= {} if faults.repaired is None else {REPAIRED: faults.repaired}
+    method = f"closed loop with the machines of the plant {sha256(plant.encode()).hexdigest()}"
+    verdicts, files = list[Verdict](), {PLANT: plant}
+    for file, asked in found.items():
+        document = asked.document(limits())
+        files[file] = document.to_text()
+        records = {record.name: record for record in document.records}
+        told = held.verdicts if asked is held.asked else asked.verdicts
+        verdicts += _sealed(asked, told, records, file, method)
+    return tuple(verdicts), files
+
+
+def _sealed(
+    asked: Answered, told: tuple[Verdict, ...], records: Mapping[str, Record], file: str, method: str
+) -> Iterator[Verdict]:
+    for family, verdict in zip(asked.families, told, strict=True):
+        if verdict.weight is Weight.REQUIRED and not verdict.holds:
+            yield verdict
+        else:
+            yield _as_shown(family, records, file, method)
+
+
+def _as_shown(family: Family, records: Mapping[str, Record], file: str, method: str) -> Verdict:
+    """The verdict on a family as the records on its properties show it."""
+    decided = {of: records[f"property.{p.name}"] for of, p in family.of.items() if f"property.{p.name}" in records}
+    violated = [of for of, record in decided.items() if not record.proved]
+    whole = Status.PROVED if len(decided) == len(family.of) else Status.UNKNOWN
+    status = Status.VIOLATED if violated else whole
+    shown = status is not Status.UNKNOWN and not any(record.lacking for record in decided.values())
+    return Verdict(
+        family.name,
+        status,
+        family.statement,
+        method,
+        family.weight,
+        bound=UNDECIDED if status is Status.UNKNOWN else "",
+        subjects=tuple(of for of in violated if of),
+        evidence=(file, PLANT) if shown else (),
+        discipline="interleaving",
+    )
