@@ -23,10 +23,11 @@ from firable.cli.options import (
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from firable.analysis.goal import Limits
     from firable.analysis.spaces.reachability import Budget
+    from firable.decompose.refinement.binding import Binding
     from firable.decompose.refinement.closed import BlockProof
     from firable.decompose.refinement.refining import Refinement
     from firable.nets.decomposition import Coordinated
@@ -105,6 +106,7 @@ def _report(
     evidence_dir: str | None,
 ) -> Report:
     from firable.analysis.check import check
+    from firable.decompose.refinement.binding import opened_by
     from firable.decompose.refinement.carrying import carried, not_carried
     from firable.decompose.refinement.evidence import refinement_evidence
     from firable.decompose.refinement.refining import proved_tasks
@@ -117,7 +119,7 @@ def _report(
         blocks = proved_tasks(loaded.net, catalogue)
         unsound = next((block for block in blocks if not block.sound), None)
         if unsound is not None:
-            return _refused(argument, unsound)
+            return _refused(argument, unsound, blocks, opened_by(loaded.net, catalogue))
         refinement = refine_net(loaded.net, catalogue, cell)
     report = check(loaded.net, budget=most)
     verdicts: Sequence[Verdict] = [
@@ -172,10 +174,19 @@ def read_catalogue(files: tuple[str, ...]) -> Catalogue:
     return tasks
 
 
-def _refused(argument: str, block: BlockProof) -> Report:
-    """The report on a task that may not stand for a place: its net alone, and what it violates."""
-    course = (f"the task '{block.task.name}' is refused: it cannot stand for a place", "nothing was opened or written")
-    return Report("refine", argument, block.net, block.verdicts, discipline="interleaving", course=course)
+def _refused(argument: str, block: BlockProof, blocks: Sequence[BlockProof], bound: Mapping[str, Binding]) -> Report:
+    """The report on a task that may not stand for a place: its net alone, in words, and what it violates."""
+    from firable.decompose.refinement.traces import readable
+
+    name = block.task.name
+    too = [f"'{other.task.name}'" for other in blocks if other is not block and not other.sound]
+    course = (
+        f"the task '{name}' is refused: it cannot stand for a place",
+        *(f"{path} names it, with {_roles(binding)}" for path, binding in bound.items() if binding.task.name == name),
+        *([f"refused too, and told when this is mended: {', '.join(too)}"] if too else []),
+        "nothing was opened or written",
+    )
+    return Report("refine", argument, readable(block.net), block.verdicts, discipline="interleaving", course=course)
 
 
 def _contact_free(of: Verdict) -> Verdict:
@@ -222,12 +233,16 @@ def _told(refinement: Refinement) -> list[str]:
     """What was opened, a line for each place that names a task, subtasks with the path that leads to them."""
     lines = []
     for path, binding in refinement.bound.items():
-        roles = ", ".join(f"{role} {resource.rpartition('.')[2]}" for role, resource in binding.resources.items())
         task = binding.task
         early = f", {' and '.join(sorted(task.released))} released inside" if task.released else ""
         size = f"{text.counted(len(task.steps), 'step')}, {text.counted(len(task.moves), 'move')}"
-        lines.append(f"{path} is opened by {task.name} ({roles}): {size}{early}")
+        lines.append(f"{path} is opened by {task.name} ({_roles(binding)}): {size}{early}")
     return lines
+
+
+def _roles(binding: Binding) -> str:
+    """Who fills which role."""
+    return ", ".join(f"{role} {resource.rpartition('.')[2]}" for role, resource in binding.resources.items())
 
 
 def show_conditions(verdicts: Sequence[Verdict]) -> set[str]:

@@ -77,6 +77,20 @@ def bindings(net: Net, catalogue: Catalogue) -> dict[str, Binding]:
     return found
 
 
+def opened_by(net: Net, catalogue: Catalogue) -> dict[str, Binding]:
+    """What names a task and how it fills it: the places of a net, and after them the subtasks with the path to them.
+
+    Raises `InputError` as `bindings` does; that the subtasks fit was checked before.
+    """
+    found = bindings(net, catalogue)
+    todo = list(found.items())
+    for path, binding in todo:
+        inner = [(f"{path}/{one.name}", binding.within(one, catalogue)) for one in binding.task.subtasks]
+        found.update(inner)
+        todo += inner
+    return found
+
+
 def tasks_used(net: Net, catalogue: Catalogue) -> tuple[Task, ...]:
     """The tasks that a net's places name, and those within them, each once, inner ones after the outer."""
     order: dict[str, Task] = {}

@@ -23,7 +23,7 @@ role, some of which are left early, and gates that are free: a machine may take 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -33,7 +33,7 @@ from firable.nets.formula import And, Formula, Holds, Not, Or
 from firable.nets.net import ExternalGate, Net, Place, Signal, SignalKind, TimeLimit, Transition
 from firable.nets.tasks.model import Gate, Move, Task
 from firable.nets.time_limits import fault_transition, timer_name
-from firable.nets.verdict import Verdict, Weight
+from firable.nets.verdict import Verdict, Weight, Witness
 
 MARKINGS_MAX: Final = 1_000_000
 AGAIN: Final = "again"
@@ -245,12 +245,31 @@ class _Block:
             self.graph.require_complete()
             return yes()
         names = tuple(self.net.transitions[t].name for t in contacts)
-        return no(names, self.graph.witness_of_contact(contacts))
+        witness = self.graph.witness_of_contact(contacts)
+        return no(names, witness and replace(witness, note="from here only a full place holds back a move"))
 
     def complete(self) -> Answer:
         self.graph.require_complete()
-        dead = [self.net.transitions[t].name for t, count in enumerate(self.graph.fired()) if not count]
-        return no(tuple(dead)) if dead else yes()
+        dead = [t for t, count in zip(self.net.transitions, self.graph.fired(), strict=True) if not count]
+        if not dead:
+            return yes()
+        moves = [t for t in dead if t.name != AGAIN] or dead
+        shown = (self.held_back(t) for t in moves)
+        return no(tuple(t.name for t in moves), next((witness for witness in shown if witness), None))
+
+    def held_back(self, dead: Transition) -> Witness | None:
+        """A run to where a dead transition has all that it comes from, with what keeps it from firing there."""
+        witness = self.graph.witness(self.graph.satisfying(And(tuple(map(Holds, dead.inputs)))))
+        if witness is None:
+            return None
+        full = {*witness.marking}
+        why = [
+            *(f"'{place}' holds no token" for place in dead.permissive if place not in full),
+            *(f"'{place}' holds a token" for place in (*dead.inhibitive, *dead.outputs) if place in full),
+        ]
+        if not dead.openable:
+            why.append("its gates want one signal both 1 and 0")
+        return replace(witness, note=f"here '{dead.name}' has all that it comes from, but {' and '.join(why)}")
 
     def settles(self, inside: Formula) -> Answer:
         self.graph.require_complete()

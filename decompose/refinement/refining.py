@@ -18,10 +18,11 @@ from firable.decompose.refinement.closed import BlockProof, prove_block
 from firable.decompose.refinement.ledger import borrowings, net_problems, task_problems
 from firable.decompose.refinement.naming import Named, named, without_arbiters
 from firable.decompose.refinement.opening import Opened, open_tasks
+from firable.decompose.refinement.traces import told, with_run, with_run_of_task
 from firable.nets.diagnostics import Diagnostic, InputError, Severity, Span
 from firable.nets.net import Net
 from firable.nets.tasks.model import Catalogue, Task
-from firable.nets.verdict import Status, Verdict, Witness
+from firable.nets.verdict import Status, Verdict
 from firable.semantics.arbitration import Arbitration
 
 _BY_ARCS = "the arcs and gates of the conceptual net"
@@ -64,11 +65,15 @@ class Refinement:
 def proved_tasks(net: Net, catalogue: Catalogue) -> tuple[BlockProof, ...]:
     """The proof of each task that a net uses, whether it is sound or not.
 
-    Raises `InputError`: F4010 for an unknown task, F4011 for its arguments, F4012 for its resources.
+    Raises `InputError`: F4010 for an unknown task, F4011 for its arguments, F4012 for its resources, with a
+    run to where they do not add up.
     """
     bindings(net, catalogue)
     tasks = tasks_used(net, catalogue) if not (unknown := _unknown_subtasks(net, catalogue)) else ()
-    problems = [*unknown, *(problem for task in tasks for problem in task_problems(task, catalogue))]
+    problems = [
+        *unknown,
+        *(problem for task in tasks for problem in with_run_of_task(task_problems(task, catalogue), task)),
+    ]
     if problems:
         raise InputError(_placed(problems, catalogue))
     return tuple(prove_block(task) for task in tasks)
@@ -88,7 +93,7 @@ def refine(net: Net, catalogue: Catalogue, cell: str = "") -> Refinement:
     """
     bound = bindings(net, catalogue)
     blocks = proved_tasks(net, catalogue)
-    problems = [*net_problems(net, bound), *border_problems(net, bound)]
+    problems = [*with_run(net_problems(net, bound), net), *border_problems(net, bound)]
     problems += [_unsound(block) for block in blocks if not block.sound]
     if problems:
         raise InputError(_placed(problems, catalogue))
@@ -197,7 +202,7 @@ def _untold(correspondence: Correspondence) -> Iterator[Diagnostic]:
 
 def _unsound(block: BlockProof) -> Diagnostic:
     verdict = next(v for v in block.verdicts if not v.holds and v.code)
-    trace = _told(verdict.witness) if verdict.witness else ""
+    trace = told(verdict.witness) if verdict.witness else ""
     about = f" (about {', '.join(verdict.subjects)})" if verdict.subjects else ""
     state = "is violated" if verdict.status is Status.VIOLATED else f"is not known: {verdict.bound}"
     return Diagnostic(
@@ -206,11 +211,6 @@ def _unsound(block: BlockProof) -> Diagnostic:
         verdict.hint,
         ("tasks", block.task.name),
     )
-
-
-def _told(witness: Witness) -> str:
-    fired = ", ".join(name for step in witness.firings for name in step)
-    return f"; after {fired} {'the tokens are on ' + ', '.join(witness.marking) if witness.marking else ''}"
 
 
 def _unknown_subtasks(net: Net, catalogue: Catalogue) -> list[Diagnostic]:

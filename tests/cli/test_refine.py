@@ -63,6 +63,52 @@ def test_a_task_that_can_get_stuck_is_refused_with_its_trace_and_nothing_is_writ
     assert "nothing was opened or written" in said
 
 
+def test_a_refused_task_is_told_in_words_with_who_names_it_and_who_is_refused_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shipped = files("firable.nets").joinpath("catalogue", "cell.tasks.yaml").read_text(encoding="utf-8")
+    whole = "        if: target.present\n"
+    assert whole in shipped
+    tasks = tmp_path / "own.tasks.yaml"
+    tasks.write_text(shipped.replace(whole, "        if: [target.present, robot.approach]\n"))
+    code, said = refined(capsys, "catalogue:conceptual_one_robot", "--tasks", str(tasks))
+    assert code == 1
+    assert "system.loading names it, with robot robot, target mc, source cv1" in said
+    assert "1. start  start of loading from source" in said
+    assert "here 'placed' has all that it comes from, but 'robot.approach' holds no token" in said
+    assert "{" not in said
+    tasks.write_text(
+        "firable_tasks: 1\ntasks:\n"
+        "  process: {parameters: {program: }, roles: {m: {steps: {a: , b: }}},\n"
+        "    subtasks: {in: {task: {name: hold, of: m}}},\n"
+        "    start: {to: in}, moves: {x: {from: in, to: m.b}, y: {from: in, to: m.a}}, end: {from: m.b}}\n"
+        "  hold: {roles: {of: {steps: {a: , b: }}}}\n"
+    )
+    net = tmp_path / "net.firable.yaml"
+    net.write_text(
+        "firable: 1\ncell: c\ncontrollers:\n  s:\n    start: [m]\n    places:\n"
+        "      work: {task: {name: process, m: m, program: O1}}\n      m: {opens: {to: mc.free, machine: MC}}\n"
+        "  mc: {description: machine}\ntransitions:\n  begin: {from: s.m, to: s.work}\n  end: {from: s.work, to: s.m}\n"
+    )
+    code, said = refined(capsys, str(net), "--tasks", str(tasks))
+    assert code == 1
+    assert "the task 'process' is refused" in said
+    assert "refused too, and told when this is mended: 'hold'" in said
+
+
+def test_a_task_that_releases_twice_is_refused_with_the_run_that_shows_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shipped = files("firable.nets").joinpath("catalogue", "cell.tasks.yaml").read_text(encoding="utf-8")
+    whole = "        if: target.present\n"
+    tasks = tmp_path / "own.tasks.yaml"
+    tasks.write_text(shipped.replace(whole, f"{whole}        release: source\n"))
+    assert main(["refine", "catalogue:conceptual_one_robot", "--tasks", str(tasks)]) == 2
+    said = capsys.readouterr().err
+    assert "error[F4012]: 'placed' of the task 'load' frees 'source', which nobody holds there; " in said
+    assert "after 'start, a, grasped, b' the tokens are on 'load, robot.put, target.wait, source.idle'" in said
+
+
 def test_the_json_of_refining_has_the_shape_of_every_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     schema = json.loads(files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
     late = "catalogue:conceptual_one_robot_mc_late"
