@@ -29,19 +29,20 @@ MISSED, MET = "missed", "met"
 
 @dataclass(frozen=True)
 class Table:
-    """A table of results, with a sentence on what it shows."""
+    """A table of results, with a sentence on what it shows, and what is drawn of it, in Markdown."""
 
     title: str
     about: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+    drawn: str = ""
 
     def markdown(self) -> str:
         """The table in Markdown."""
         lines = [f"## {self.title}", "", self.about, "", f"| {' | '.join(self.columns)} |"]
         lines.append("|" + "---|" * len(self.columns))
         lines += [f"| {' | '.join(row)} |" for row in self.rows]
-        return "\n".join(lines) + "\n"
+        return "\n".join(lines) + "\n" + (f"\n{self.drawn}" if self.drawn else "")
 
 
 def timed(work: Callable[[], T]) -> tuple[T, float]:

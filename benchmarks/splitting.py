@@ -1,9 +1,9 @@
 """Splitting and proving generated cells, and checking the proofs again: time for each transition, as the cell grows.
 
-The curve is the point: a ratio to the smallest cell that stays near 1 says that everything is linear in the number of
-transitions. Measured is all that `firable prove` does after reading: the split, every static obligation, its text and
-z3's answer; and, apart, all that `firable verify` does with these files: the net cut anew, what must be proved stated
-anew and compared, and cvc5's answers.
+The curve is the point, and drawn under the table of generated cells (`curves`): a ratio to the smallest cell that
+stays near 1 says that everything is linear in the number of transitions. Measured is all that `firable prove` does
+after reading: the split, every static obligation, its text and z3's answer; and, apart, all that `firable verify` does
+with these files: the net cut anew, what must be proved stated anew and compared, and cvc5's answers.
 
 Groups of many competitors are measured apart: a robot whose jobs take turns, pigeons that compete for holes as well,
 and a chain in which each competes with its neighbours alone.
@@ -12,10 +12,11 @@ and a chain in which each competes with its neighbours alone.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
+from curves import curves
 from measuring import MET, MISSED, Table, timed
 
 from firable.decompose.proofs.proving import ProofReport, prove
@@ -31,6 +32,7 @@ from firable.nets.catalogue import family_net
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Arbiter, ArbitrationRule, Controller, Net, Place, Transition
 
+CELLS: Final = "Static obligations of generated cells"
 MACHINES: Final = (10, 100, 1_000)
 SECONDS_MAX: Final = 60.0
 RATIO_MAX: Final = 1.5
@@ -86,6 +88,11 @@ def checked_again(decomposition: Decomposition, proof: ProofReport) -> int:
     return sum(one.shown for one in examination.checked.values())
 
 
+def with_curves(of_cells: Table) -> Table:
+    """The table of generated cells, its curve drawn under it."""
+    return replace(of_cells, drawn=curves(of_cells, "Split and prove", "prove, s", "ms/transition"))
+
+
 def tables(repeat: int) -> list[Table]:
     """One row for each size."""
     cells = [family_net(f"workshop-{machines}") for machines in MACHINES]
@@ -98,14 +105,15 @@ def tables(repeat: int) -> list[Table]:
         "seconds to state it anew, compare and have cvc5 answer, and the same multiple; whether all is shown. The "
         "theorem on the protocol, which is the same for every net, is left out of all times."
     )
+    of_cells = Table(
+        CELLS,
+        "The family `workshop`: machines in cells of four, ten transitions each, which share robots and conveyors. "
+        + says,
+        columns,
+        tuple(_rows(cells, repeat, 0)),
+    )
     return [
-        Table(
-            "Static obligations of generated cells",
-            "The family `workshop`: machines in cells of four, ten transitions each, which share robots and conveyors. "
-            + says,
-            columns,
-            tuple(_rows(cells, repeat, 0)),
-        ),
+        with_curves(of_cells),
         Table(
             "Static obligations where many compete",
             "All transitions of a net are one group that takes turns: jobs of one robot, pigeons and holes, a chain. "
