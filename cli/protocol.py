@@ -7,8 +7,9 @@ fault do to the cell (`--faults`), and which of the protocols known to be wrong 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
@@ -20,11 +21,15 @@ if TYPE_CHECKING:
     from firable.decompose.protocol.building import ProtocolNet
     from firable.decompose.protocol.outages import Outage
     from firable.decompose.protocol.refuting import Refutation
+    from firable.decompose.protocol.single_faults import OneFault
     from firable.nets.decomposition import Decomposition
     from firable.nets.verdict import Verdict
 
 EVENTS_SHOWN: Final = 12
 """How many of the last events are told of a run that nobody reads whole."""
+
+NAMES_SHOWN: Final = 4
+"""Of how many verdicts that a finding rests on the names are told; of more, the first are, and the others counted."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -50,6 +55,7 @@ class Answered:
     protocols: Mapping[str, ProtocolNet] = field(default_factory=dict)
     files: Mapping[str, str | bytes] = field(default_factory=dict)
     outages: tuple[Outage, ...] = ()
+    faults: tuple[OneFault, ...] = ()
     refutations: tuple[Refutation, ...] = ()
     free: int = 0
     """How many parts need no promise in the protocol that was explored."""
@@ -61,7 +67,9 @@ def protocol_options(command: F) -> F:
         click.option(
             "--wrong", is_flag=True, help="Try on NET the protocols known to be wrong; tells what the cell lives on."
         ),
-        click.option("--faults", is_flag=True, help="Say what lost messages, crashes and dead controllers do; slower."),
+        click.option(
+            "--faults", is_flag=True, help="Say what a lost message, a crash, a dead controller does; slower."
+        ),
         click.option("--protocol", is_flag=True, help="Explore the voting protocol of the split, as a net of its own."),
     ):
         command = option(command)
@@ -86,6 +94,7 @@ def ask(
     from firable.decompose.protocol.dead_script import prove_of_the_dead
     from firable.decompose.protocol.outages import inquests, outage_verdict
     from firable.decompose.protocol.refuting import readable, refute
+    from firable.decompose.protocol.single_faults import single_faults
     from firable.decompose.protocol.verdicts import protocol_verdicts
     from firable.decompose.protocol.wrong import wrong_protocols
     from firable.decompose.splitting.persistence import persistence
@@ -128,7 +137,9 @@ def ask(
         interrupted = (_interrupted(),)
     verdicts += tuple(verdict for _, verdict in dead) + tuple(one.verdict for one in refutations) + interrupted
     protocols |= {refutation.verdict.name: refutation.protocol for refutation in refutations}
-    return Answered(verdicts, protocols, files, tuple(outage for outage, _ in dead), tuple(refutations), free)
+    outages = tuple(outage for outage, _ in dead)
+    faults = single_faults(decomposition, verdicts) if asked.faults else ()
+    return Answered(verdicts, protocols, files, outages, faults, tuple(refutations), free)
 
 
 def _packed(file: str, document: Document) -> tuple[str, bytes]:
@@ -156,6 +167,8 @@ def show(answered: Answered) -> None:
         if cost.markings is not None:
             told = f"; {text.counted(answered.free, 'part')} without a promise" if answered.free else ""
             click.echo(f"  {text.counted(cost.markings, 'configuration')} of the protocol ({shown[0].method}){told}")
+    if answered.faults:
+        _show_faults(answered.faults)
     if answered.outages:
         from firable.decompose.protocol.outages import outage_text
 
@@ -166,6 +179,33 @@ def show(answered: Answered) -> None:
         click.echo(f"\n{click.style('what this cell lives on', bold=True)}")
         for refutation in answered.refutations:
             _show_refutation(refutation)
+
+
+def _show_faults(faults: Sequence[OneFault]) -> None:
+    from firable.decompose.protocol.single_faults import LEAD, TITLES
+
+    click.echo(f"\n{click.style('what one fault does', bold=True)}")
+    for line in _folded(LEAD, 2):
+        click.echo(f"  {line}")
+    for fault in faults:
+        click.echo(f"  {fault.fault}")
+        for title, finding in zip(TITLES, fault.findings, strict=True):
+            status = "" if finding.status is None else f"{text.SIGNS[finding.status.value]} {finding.status.value}"
+            colour = {"proved": "green", "violated": "red", "unknown": "yellow"}.get(status[2:])
+            by = f" ({', '.join(_some(finding.by))})" if finding.by else ""
+            first, *rest = _folded(f"{title}: {finding.says}{by}", 16)
+            click.echo(f"    {click.style(f'{status:<10}', fg=colour)}  {first}")
+            for line in (*rest, *_folded(finding.lacking, 16)):
+                click.echo(f"{'':16}{line}")
+
+
+def _folded(words: str, indent: int) -> list[str]:
+    return wrap(words, max(text.columns() - indent, 40), break_long_words=False, break_on_hyphens=False)
+
+
+def _some(names: Sequence[str]) -> Sequence[str]:
+    """The first of many names, and how many more there are."""
+    return names if len(names) <= NAMES_SHOWN else (*names[:NAMES_SHOWN], f"and {len(names) - NAMES_SHOWN:,} more")
 
 
 def _show_refutation(refutation: Refutation) -> None:

@@ -128,6 +128,7 @@ def _report(
         positions=loaded.positions,
         protocols=told.protocols,
         outages=told.outages,
+        faults=told.faults,
         refutations=told.refutations,
         files=files,
     )

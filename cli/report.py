@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from firable.decompose.protocol.building import ProtocolNet
     from firable.decompose.protocol.outages import Outage
     from firable.decompose.protocol.refuting import Refutation
+    from firable.decompose.protocol.single_faults import OneFault
     from firable.nets.decomposition import Coordinated, Decomposition
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.net import Net
@@ -42,9 +43,9 @@ class Report:
     """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON.
 
     `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`), and `protocols` are others, by
-    the names of the verdicts on them; `outages` and `refutations` are told beside those. `page` is the report as a page
-    for a person, where one was written. `again` says that the same was decided before, which a program need not know;
-    `positions` say where the parts of the net stand in its file.
+    the names of the verdicts on them; `outages`, `faults` and `refutations` are told beside those. `page` is the report
+    as a page for a person, where one was written. `again` says that the same was decided before, which a program need
+    not know; `positions` say where the parts of the net stand in its file.
     """
 
     command: str
@@ -66,6 +67,7 @@ class Report:
     loop_net: Net | None = None
     protocols: Mapping[str, ProtocolNet] = field(default_factory=dict)
     outages: Sequence[Outage] = ()
+    faults: Sequence[OneFault] = ()
     refutations: Sequence[Refutation] = ()
     split: Mapping[str, Any] = field(default_factory=dict)
     page: str = ""

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from firable.nets.net import Net
     from firable.nets.verdict import Cost, Verdict, Witness
 
+SIGNS: Mapping[str, str] = {"proved": "✓", "violated": "✗", "unknown": "?"}
+"""The sign of each status."""
 WORDS: Mapping[str, str] = {"proved": "proved", "unknown": "unknown"}
 """What is said of a verdict that is proved, and of one that is unknown."""
 _HEADINGS = {"required": "must hold", "warning": "warnings", "information": "for information"}

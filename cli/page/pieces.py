@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from firable.cli.page.markup import Content, Markup, tag, together
-from firable.cli.text import WORDS, mark
+from firable.cli.text import SIGNS, WORDS, mark
 from firable.nets.verdict import Status, Verdict
 
 ROWS_MAX: Final = 400
@@ -26,7 +26,7 @@ def badge(verdict: Verdict) -> Markup:
 
 def status_badge(status: Status) -> Markup:
     """A status by itself."""
-    sign = {Status.PROVED: "✓", Status.VIOLATED: "✗", Status.UNKNOWN: "?"}[status]
+    sign = SIGNS[status.value]
     return tag("span", f"{sign} {status}", cls=classes(TONES[sign]))
 
 

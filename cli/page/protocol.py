@@ -1,4 +1,4 @@
-"""What the page says of the protocol: what may stand still while somebody is dead, and what the cell lives on.
+"""What the page says of the protocol: what one fault does, who stands still for the dead, what the cell lives on.
 
 The protocols that are known to be wrong are refuted on the cell, and a refutation is no counterexample of the cell: the
 protocol that runs is another. So they have a section of their own, in the words of the terminal. A wrong protocol that
@@ -10,18 +10,40 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from firable.cli.page.markup import Content, Markup, tag, together
-from firable.cli.page.pieces import classes, names, table
+from firable.cli.page.pieces import classes, names, status_badge, table
 from firable.cli.page.swimlanes import swimlanes
 from firable.cli.report import Report
 from firable.nets.verdict import Status, Verdict
 
 if TYPE_CHECKING:
     from firable.decompose.protocol.refuting import Refutation
+    from firable.decompose.protocol.single_faults import Finding
 
 
 def is_of_protocol(verdict: Verdict) -> bool:
     """Whether the sections here tell what this verdict says."""
     return verdict.name.startswith(("wrong.", "faults.dead"))
+
+
+def one_fault(report: Report) -> Markup | None:
+    """What one fault of each kind does, and the verdicts that show it."""
+    if not report.faults:
+        return None
+    from firable.decompose.protocol.single_faults import LEAD, TITLES
+
+    rows = [(tag("b", fault.fault), *(_finding(finding) for finding in fault.findings)) for fault in report.faults]
+    return together(
+        tag("p", LEAD, cls="lead"), table(("fault", *TITLES), rows, caption="What one fault of each kind does")
+    )
+
+
+def _finding(finding: Finding) -> Markup:
+    return together(
+        None if finding.status is None else status_badge(finding.status),
+        tag("p", finding.says),
+        tag("p", names(finding.by)) if finding.by else None,
+        tag("p", finding.lacking, cls="soft") if finding.lacking else None,
+    )
 
 
 def while_dead(report: Report) -> Markup | None:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 from firable.cli.page.listed import family_line, listed
 from firable.cli.page.markup import Content, Markup, raw, tag, together
 from firable.cli.page.pieces import ROWS_MAX, badge, classes, names, status_badge, table
-from firable.cli.page.protocol import is_of_protocol, lives_on, while_dead
+from firable.cli.page.protocol import is_of_protocol, lives_on, one_fault, while_dead
 from firable.cli.page.runs import strip
 from firable.cli.page.swimlanes import swimlanes
 from firable.cli.report import Report
@@ -348,6 +348,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section("assumptions", "Assumptions", _assumptions),
     Section("machines", "With its machines", _loop),
     Section("counterexamples", "Counterexamples", _counterexamples),
+    Section("fault", "What one fault does", one_fault),
     Section("dead", "What may stand still while somebody is dead", while_dead),
     Section("lives-on", "What this cell lives on", lives_on),
     Section("verdicts", "Verdicts", _others),

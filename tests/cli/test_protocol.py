@@ -207,7 +207,40 @@ def test_page_tells_what_stands_still(net: str, tmp_path: Path) -> None:
     assert '<tr><th scope="row"><b>robot</b></th><td data-of="stands still at once"><span class="code">fetch<' in dead
     assert '<td data-of="may stand still"><span class="code">hand_over, unload<' in dead
     assert '<td data-of="goes on">–</td>' in dead
-    assert "faults.dead." not in page, "told by the table, not once more among the verdicts"
+    others = page.replace(section(page, "fault"), "")
+    assert "faults.dead." not in others, "told by the table, not once more among the verdicts"
+
+
+def test_what_one_fault_does_is_told_with_the_verdicts_behind_it(
+    capsys: pytest.CaptureFixture[str], net: str, tmp_path: Path
+) -> None:
+    assert main(["prove", net, "--faults"]) == 0
+    told = capsys.readouterr().out.partition("what one fault does\n")[2].partition("\nwhat may stand still")[0]
+    lost = told.partition("  a message is lost\n")[2].partition("  a message comes twice\n")[0]
+    assert lost.count("✓ proved    ") == 2
+    assert "blocked safely: nothing fires that the central net could not fire (faults.follows, faults.agrees," in lost
+    assert "(faults.resumes)" in lost
+    crash = told.partition("  a controller crashes, and restarts\n")[2].partition("  a coordinator crashes")[0]
+    assert "told below\n                (faults.dead.robot, faults.dead.lathe)\n" in crash
+    assert "?" not in told
+    shown = section(page_of(net, tmp_path, "--faults"), "fault")
+    assert shown.count("✓ proved") == told.count("✓ proved")
+    assert '<th scope="row"><b>a message is lost</b></th><td data-of="blocked safely">' in shown
+
+
+def test_what_one_fault_does_is_not_proved_where_its_verdicts_are_not(
+    capsys: pytest.CaptureFixture[str], net: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exploring, "FIRST_MARKINGS", 50)
+    monkeypatch.setattr(exploring, "explore_symbolically", _given_up)
+    monkeypatch.setattr(verdicts, "prove_inductively", lambda *_: Proof("", frozenset({"starts", "divergence"})))
+    assert main(["prove", net, "--faults", "--timeout", "0.001"]) == 3
+    told = capsys.readouterr().out.partition("what one fault does\n")[2].partition("\nwhat may stand still")[0]
+    lost = told.partition("  a message is lost\n")[2].partition("  a message comes twice\n")[0]
+    assert lost.count("? unknown   ") == 2
+    assert "faults.resumes is unknown (" in lost
+    assert "✓ proved    blocked safely" not in told
+    assert "✓ proved    resumes" not in told
 
 
 def test_json_says_what_stands_still_and_goes_on(capsys: pytest.CaptureFixture[str], net: str) -> None:
