@@ -4,12 +4,17 @@ A shared machine is slow now and then, which is no failure. In CI a failure must
 new examples are drawn on the engineers' own machines, and many in a campaign, which goes by the seed it prints. The
 cache of `firable check` is off, so that no test is answered by an earlier one.
 
+A solver says the same of the same text, so it is asked once in a process: most bundles of the tests differ in one line.
+
 Whoever runs the tests in the background has Ctrl-C ignored, and so would all processes that the tests start.
 """
 
 import os
 import signal
+from collections.abc import Iterator
+from functools import lru_cache
 
+import pytest
 from hypothesis import settings
 from support.examples import FACTOR, FIRST_SEED
 
@@ -20,6 +25,16 @@ settings.load_profile("firable")
 os.environ["FIRABLE_CACHE"] = ""
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def asked_once() -> Iterator[None]:
+    """The solvers of the checker of bundles, each with what it said of the last texts."""
+    from firable.decompose.verification import checking
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(checking, "SOLVERS", {name: lru_cache(512)(ask) for name, ask in checking.SOLVERS.items()})
+        yield
 
 
 def pytest_report_header() -> list[str]:

@@ -54,7 +54,7 @@ def remembering(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, int], tuple[s
 
     monkeypatch.setattr("firable.decompose.verification.checking.SOLVERS", {"cvc5": solver})
     monkeypatch.setattr(documents, "check_document", checker)
-    monkeypatch.setattr(documents, "obligations", lambda *_: ())
+    monkeypatch.setattr(documents, "obligations", lambda *_, **__: ())
     return solver
 
 

@@ -109,7 +109,7 @@ def remembering(monkeypatch: pytest.MonkeyPatch) -> None:
         return iter(records[text])
 
     monkeypatch.setattr(documents, "check_document", checker)
-    monkeypatch.setattr(documents, "obligations", lambda *_: ())
+    monkeypatch.setattr(documents, "obligations", lambda *_, **__: ())
 
 
 def examined(bundle: Bundle) -> Examination:

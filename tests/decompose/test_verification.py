@@ -218,7 +218,7 @@ def test_every_single_change_of_a_verdict_on_the_net_or_on_a_vote_is_refused_or_
             examination.judge(verdict, shown=True, method="the test above")
 
     monkeypatch.setattr("firable.decompose.verification.checking.check_obligations", shown_before)
-    monkeypatch.setattr(documents, "obligations", lambda *_: ())  # no document is changed here
+    monkeypatch.setattr(documents, "obligations", lambda *_, **__: ())  # no document is changed here
     assert survives(lambda: bundle, bundle)
     mutants = [(how, make) for how, make in verdict_mutants(bundle) if changed_family(how) not in {*HEADS, "protocol"}]
     assert len(mutants) > 300
