@@ -8,6 +8,8 @@
     term   ::= |VARIABLE| | WORD | true | false | (not term) | (and term term+) | (or term term+) | (= term term)
 
 where no operand of an `and` or an `or` stands there twice or is a constant, and none of a `not` is one or a `not`.
+Variables are declared in the order in which they first stand in what is asserted, definitions written out; these are
+numbered from 1, in their order.
 
 What a solver is asked could be bent by a command in between: an option, an assertion outside of the blocks, a variable
 that is declared and then defined. So the reader knows no other command, a word is one that the block has defined
@@ -24,8 +26,7 @@ from typing import Final
 from firable.decompose.verification.formulas import FALSE, TRUE, Formula, Formulas
 
 _TOKEN: Final = re.compile(r"""\s+|(\(|\)|\|[^|\\]*\||"[^"]*"|;[^\n]*|[^\s()|";]+)""")
-_WORD: Final = re.compile(r"[a-z]+[0-9]*_*[0-9]*")
-_RESERVED: Final = frozenset(("true", "false", "not", "and", "or"))
+_WORD: Final = re.compile(r"shared_*([1-9][0-9]*)")
 
 
 class ReadingError(Exception):
@@ -112,7 +113,7 @@ class _Reader:
         self.expect(")")
         declared: dict[str, Formula] = {}
         defined: dict[str, Formula] = {}
-        used: set[str] = set()
+        names: dict[str, list[str]] = {"": []}  # what stands in each definition, and in what is asserted
         asserted: list[Formula] = []
         while True:
             self.expect("(")
@@ -125,26 +126,30 @@ class _Reader:
                     declared[symbol] = self.formulas.symbol(symbol[1:-1])
                 case "define-fun" if not asserted:
                     word = self.next()
-                    taken = word in defined or word in _RESERVED or f"|{word}|" in declared
-                    if taken or not _WORD.fullmatch(word):
+                    numbered = _WORD.fullmatch(word)
+                    taken = word in defined or f"|{word}|" in declared
+                    if taken or numbered is None or int(numbered[1]) != len(defined) + 1:
                         raise ReadingError(f"{word} cannot be defined here")
                     self.expect("(", ")", "Bool")
-                    value = self.term(declared, defined, used)
+                    value = self.term(declared, defined, names.setdefault(word, []))
                     self.expect(")")
                     defined[word] = value
                 case "assert":
-                    asserted.append(self.term(declared, defined, used))
+                    asserted.append(self.term(declared, defined, names[""]))
                     self.expect(")")
                 case "check-sat" if asserted:
                     self.expect(")", "(", "pop", "1", ")")
                     break
                 case other:
                     raise ReadingError(f"'{other}' may not stand here")
-        if unused := sorted({*declared, *defined} - used):
+        used = _in_order(names)
+        if unused := sorted({*declared, *defined}.difference(used)):
             raise ReadingError(f"{unused[0]} is of no use")
+        if list(declared) != [name for name in used if name in declared]:
+            raise ReadingError("the variables are declared in another order than that in which they stand")
         return Block(name[1:-1], sentences[0], tuple(asserted))
 
-    def term(self, declared: dict[str, Formula], defined: dict[str, Formula], used: set[str]) -> Formula:
+    def term(self, declared: dict[str, Formula], defined: dict[str, Formula], names: list[str]) -> Formula:
         stack: list[tuple[str, list[Formula]]] = []
         while True:
             token = self.next()
@@ -154,10 +159,10 @@ class _Reader:
             if token == ")" and stack:
                 value = self._applied(*stack.pop())
             elif token in declared:
-                used.add(token)
+                names.append(token)
                 value = declared[token]
             elif token in defined:
-                used.add(token)
+                names.append(token)
                 value = defined[token]
             elif token in ("true", "false"):
                 value = TRUE if token == "true" else FALSE
@@ -176,3 +181,15 @@ class _Reader:
             case "=", 2:
                 return self.formulas.equal(*operands)
         raise ReadingError(f"nobody writes '{operator}' of these {len(operands)} operands")
+
+
+def _in_order(names: dict[str, list[str]]) -> list[str]:
+    """What stands in what is asserted, definitions written out where they first stand, each once."""
+    found: dict[str, None] = {}
+    todo = list(reversed(names[""]))
+    while todo:
+        name = todo.pop()
+        if name not in found:
+            found[name] = None
+            todo += reversed(names.get(name, ()))
+    return list(found)
