@@ -31,9 +31,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 def asked_once() -> Iterator[None]:
     """The solvers of the checker of bundles, each with what it said of the last texts."""
     from firable.decompose.verification import checking
+    from firable.decompose.verification.solvers import SOLVERS
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(checking, "SOLVERS", {name: lru_cache(512)(ask) for name, ask in checking.SOLVERS.items()})
+        patch.setattr(checking, "SOLVERS", {name: lru_cache(512)(ask) for name, ask in SOLVERS.items()})
         yield
 
 
