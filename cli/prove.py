@@ -146,6 +146,7 @@ def _show(report: Report, answered: Sequence[Answered]) -> None:
         click.echo("  no transition has more than one participant")
     click.echo(f"\n{click.style('obligations', bold=True)}")
     show_obligations(report.verdicts)
+    _show_open_votes(report)
     click.echo(f"\n{click.style('what the running system needs', bold=True)}")
     for line in report.standing:
         click.echo(f"  {line.name}  {line.says}")
@@ -168,6 +169,17 @@ def _show(report: Report, answered: Sequence[Answered]) -> None:
         click.echo(f"  {len(report.files) - len(documents)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
         for file in documents:
             click.echo(f"  evidence: firable verify {file}")
+
+
+def _show_open_votes(report: Report) -> None:
+    """How many votes no obligation is on, since they may fall: a question on markings."""
+    assert report.decomposition is not None
+    votes = sum(len(row.parts) for row in report.decomposition.coordinated)
+    if left := votes - sum(verdict.name.startswith("persistent.") for verdict in report.verdicts):
+        which = "is left to the markings: `firable split` tells whether it stands"
+        if left > 1:
+            which = "are left to the markings: `firable split` tells whether they stand"
+        click.echo(f"  {left:,} of {text.counted(votes, 'vote')} {which}")
 
 
 def _show_assumptions(report: Report) -> None:

@@ -264,6 +264,7 @@ def _show_bundle(report: Report) -> None:
         DEAD: WHILE_DEAD,
         **MACHINES,
         "refinement": REFINEMENT,
+        "unit": "of the places of each unit one at most holds a token",
         "persistent": "of each vote it is shown whether it is persistent",
     }
     families: dict[str, list[Verdict]] = {family: [] for family in titles}

@@ -11,7 +11,7 @@ on all of it goes along, so that the bundle can be checked again without anythin
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -20,16 +20,18 @@ from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
 from firable.decompose.proofs.closed_loops import PREFIXES, sealed_loops
-from firable.decompose.proofs.proving import TIMEOUT_MS, prove
+from firable.decompose.proofs.proving import TIMEOUT_MS, ProofReport, prove
 from firable.decompose.protocol.outages import sealed_outages
 from firable.decompose.protocol.shown import proved_without_exploring
 from firable.decompose.refinement.sealing import Origin, sealed
 from firable.decompose.splitting.cut import split
 from firable.decompose.splitting.persistence import persistence
+from firable.decompose.splitting.votes import SECONDS as UNITS_SECONDS
+from firable.decompose.splitting.votes import votes
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.right_to_run import unproved
-from firable.nets.verdict import Verdict
+from firable.nets.verdict import Verdict, Weight
 from firable.semantics.trace import Discipline
 
 EVIDENCE: Final = "check.evidence.json"
@@ -72,8 +74,9 @@ def make_bundle(
         raise InputError([Diagnostic("F4003", message, "check the net with the discipline interleaving")])
     seconds = SECONDS if limits is None else limits.deadline.left_seconds
     decomposition = split(report.net)
-    proof = prove(decomposition, timeout_ms=timeout_ms)
-    found = persistence(decomposition, report.space)
+    cast = votes(decomposition, Deadline.after(UNITS_SECONDS))
+    proof = prove(decomposition, timeout_ms=timeout_ms, cast=cast)
+    found = persistence(decomposition, report.space, cast=cast)
     voted, shown = found.with_evidence()
     decomposition = replace(decomposition, free=found.free_as_shown(voted))
     document = evidence_of_report(report, (), _anew(limits, seconds))
@@ -92,7 +95,7 @@ def make_bundle(
     proofs = {**proof.files, **obligations, **last_rites}
     files = {EVIDENCE: document.to_text(), **proofs, **machines, **shown, **opened}
     bundle = Bundle(decomposition, verdicts, files)
-    if problems := unproved(bundle):
+    if problems := (*unproved(bundle), *_given_up(proof)):
         lacking = {record.name: record.lacking for record in document.records if record.proved and record.lacking}
         lacking |= {verdict.name: LATE for verdict in held if verdict.holds and not verdict.evidence}
         raise InputError(_unbundled(problem, lacking) for problem in problems)
@@ -103,6 +106,14 @@ def _anew(limits: Limits | None, seconds: float | None) -> Limits:
     """So many seconds from now on, and the memory of these limits."""
     deadline = NEVER if seconds is None else Deadline.after(seconds)
     return Limits(deadline) if limits is None else replace(limits, deadline=deadline)
+
+
+def _given_up(proof: ProofReport) -> Iterator[Diagnostic]:
+    """The obligations that no net requires, but what its bundle says of it does, and that were not answered in time."""
+    for verdict in proof.verdicts:
+        if verdict.weight is Weight.INFORMATION and not verdict.holds:
+            message = f"'{verdict.name}' is {verdict.status.value}, not proved: {verdict.statement}"
+            yield Diagnostic("F5002", message, verdict.hint, ("verdicts", verdict.name))
 
 
 def _unbundled(problem: Diagnostic, lacking: Mapping[str, str]) -> Diagnostic:

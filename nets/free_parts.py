@@ -2,8 +2,8 @@
 
 A part of which the yes stands until the firing is not asked, and promises nothing (docs/protocol-invariant.md). The
 theorem demands that it disturbs nobody at its controller, which is read off the net (`firable.nets.knowledge`), and
-that its vote is persistent, of which there must be a verdict that is PROVED. That verdict has evidence, but where the
-arcs alone show it; and so that nobody claims this of a part of which they do not, the arcs are looked at here.
+that its vote is persistent, of which there must be a verdict that is PROVED and names evidence: an obligation where
+arcs and units show it, else a document on the markings.
 
 Rejected: to believe a verdict without evidence, since whoever edits a bundle can write one.
 """
@@ -15,7 +15,6 @@ from typing import Final
 
 from firable.nets.decomposition import Decomposition
 from firable.nets.knowledge import knowledge
-from firable.nets.net import SignalKind, Transition
 from firable.nets.verdict import Verdict
 
 PERSISTENT: Final = "persistent."
@@ -36,24 +35,5 @@ def unfounded(decomposition: Decomposition, verdicts: Mapping[str, Sequence[Verd
             yield transition, f"'{name}' is said to be free of promise, and disturbs others at '{controller}'"
         elif not said or not all(verdict.holds for verdict in said):
             yield transition, f"'{name}' is said to be free of promise, and its vote is not proved persistent"
-        elif not all(verdict.evidence for verdict in said) and _may_fall(decomposition, transition, controller, name):
+        elif not all(verdict.evidence for verdict in said):
             yield transition, f"the vote on '{name}' is said to be persistent without evidence"
-
-
-def _may_fall(decomposition: Decomposition, transition: str, controller: str, name: str) -> bool:
-    """Whether, by the arcs, another transition could take the yes of a part back."""
-    net, part = decomposition.net, decomposition.subnet(controller).transition(name)
-    full, empty = {*part.inputs, *part.permissive}, {*part.outputs, *part.inhibitive}
-    awaited = {gate.signal for gate in part.external if gate.wanted}
-    lasting = {signal for signal in awaited if net.signal(signal).kind is not SignalKind.SENSOR}
-
-    def takes_back(other: Transition) -> bool:
-        bare = {gate.signal for gate in other.external if not gate.wanted}
-        cleared = {signal for place in other.outputs for signal in net.place(place).cleared} - bare
-        if full.isdisjoint(other.inputs) and empty.isdisjoint(other.outputs) and awaited.isdisjoint(cleared):
-            return False
-        needs, lacks = {*other.inputs, *other.permissive}, {*other.outputs, *other.inhibitive}
-        together = needs.isdisjoint(lacks | empty) and lacks.isdisjoint(full) and lasting.isdisjoint(bare)
-        return together and other.openable
-
-    return full.isdisjoint(empty) and any(takes_back(t) for t in net.transitions if t.name != transition)

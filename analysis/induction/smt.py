@@ -131,14 +131,48 @@ class Terms:
 
     def at_most_one(self, operands: Iterable[Term]) -> Term:
         """At most one operand holds: a balanced tree of linear size, without auxiliary variables."""
-        layer = [(term, self.true) for term in operands]  # (some holds, at most one holds) for each subtree
-        while len(layer) > 1:
-            paired = []
-            for (some, one), (other_some, other_one) in zip(layer[::2], layer[1::2], strict=False):
-                not_both = self.negation(self.conjunction([some, other_some]))
-                paired.append((self.disjunction([some, other_some]), self.conjunction([one, other_one, not_both])))
-            layer = paired + (layer[-1:] if len(layer) % 2 else [])
-        return layer[0][1] if layer else self.true
+        return AtMostOne(self, operands).term
+
+
+class AtMostOne:
+    """That at most one of some operands holds, as a balanced tree, and what it becomes where a few of them change.
+
+    What becomes of it shares all with the tree but the way from each changed operand to the top.
+
+    >>> terms = Terms()
+    >>> tree = AtMostOne(terms, map(terms.variable, "pq"))
+    >>> tree.term, tree.where({0: terms.true}), tree.where({0: terms.false})
+    ((not (and |p| |q|)), (not |q|), true)
+    """
+
+    def __init__(self, terms: Terms, operands: Iterable[Term]) -> None:
+        self._terms = terms
+        # For each subtree: some operand holds, at most one holds.
+        self._layers = [[(term, terms.true) for term in operands]]
+        while len(below := self._layers[-1]) > 1:
+            self._layers.append([self._joined(below[i : i + 2]) for i in range(0, len(below), 2)])
+
+    @property
+    def term(self) -> Term:
+        """That at most one of the operands holds."""
+        return self.where({})
+
+    def where(self, changed: Mapping[int, Term]) -> Term:
+        """The same, with other operands in these positions."""
+        new = {i: (term, self._terms.true) for i, term in changed.items()}
+        for below in self._layers[:-1]:
+            ways = ((i // 2, range(i - i % 2, min(i - i % 2 + 2, len(below)))) for i in new)
+            new = {above: self._joined([new.get(i, below[i]) for i in pair]) for above, pair in ways}
+        top = self._layers[-1]
+        return new.get(0, top[0])[1] if top else self._terms.true
+
+    def _joined(self, pair: Sequence[tuple[Term, Term]]) -> tuple[Term, Term]:
+        if len(pair) == 1:
+            return pair[0]
+        (some, one), (other_some, other_one) = pair
+        of = self._terms
+        not_both = of.negation(of.conjunction([some, other_some]))
+        return of.disjunction([some, other_some]), of.conjunction([one, other_one, not_both])
 
 
 def subterms(roots: Iterable[Term]) -> Iterator[Term]:

@@ -8,6 +8,7 @@ net's own names and with what either side says of it; the file then has the answ
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from firable.analysis.induction.smt import Answer, Decision, Operator, decide, value, variables
 from firable.decompose.proofs.family import Proved, Task
@@ -25,11 +26,17 @@ def static(name: str, says: str, obligations: Callable[[Sides], Iterator[Obligat
 
     def prove(task: Task) -> Proved:
         file, reader = evidence_name(name), Reader(task.timeout_ms)
-        text, verdicts = [head(comments(name, says, task.decomposition.net.name))], []
+        text, verdicts = [head(comments(name, says, task.decomposition.net.name))], list[Verdict]()
+        proved: set[str] = set()
         for obligation in obligations(task.sides):
             text.append(block(obligation.name, obligation.statement, obligation.asserted))
             answer = reader.answer(text[-1])
-            verdicts.append(_verdict(obligation, answer, task.timeout_ms, file))
+            verdict = _verdict(obligation, answer, task.timeout_ms, file)
+            if verdict.holds and (doubted := [name for name in obligation.rests_on if name not in proved]):
+                bound = f"it rests on '{doubted[0]}', which is not proved"
+                verdict = replace(verdict, status=Status.UNKNOWN, bound=bound)
+            verdicts.append(verdict)
+            proved |= {verdict.name} if verdict.holds else set()
         return Proved(verdicts, {file: "".join(text)} if verdicts else {})
 
     return prove
@@ -61,12 +68,14 @@ def _verdict(obligation: Obligation, answer: Answer, timeout_ms: int, file: str)
             status,
             obligation.statement,
             METHOD,
+            obligation.weight,
             code="F4002" if status is Status.VIOLATED else "",
             hint=hint,
             bound=bound,
             subjects=obligation.subjects,
             witness=witness,
             evidence=(file,),
+            discipline=obligation.discipline,
         )
 
     if answer is Answer.UNSAT:

@@ -8,6 +8,7 @@ net requires of it goes into `firable.nets.right_to_run`, and what a bundle must
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Final
 
 from firable.decompose.proofs.arbitration import arbitration
@@ -22,6 +23,7 @@ from firable.decompose.proofs.next_tokens import next_tokens
 from firable.decompose.proofs.obligation import Obligation
 from firable.decompose.proofs.openness import openness
 from firable.decompose.proofs.ownership import ownership
+from firable.decompose.proofs.persistent import persistent
 from firable.decompose.proofs.reading import reading
 from firable.decompose.proofs.sides import Sides
 from firable.decompose.protocol.parametric.proving import FILE, theorem
@@ -63,6 +65,10 @@ FAMILIES: Final[tuple[Family, ...]] = (
         "o8-apart", "O8 promises", "no coordinator's promise stands in the way of another coordinator", apart, "O8"
     ),
     _static("arbitration", "arbitration", "conflicts are decided as in the central net", arbitration, "O2"),
+    replace(
+        _static("persistence", "persistence", "a yes once given stays until its transition fires", persistent),
+        words=("persistent", "unit"),
+    ),
     Family(
         "protocol",
         "protocol",

@@ -12,21 +12,26 @@ from enum import StrEnum
 from functools import cached_property
 
 from firable.decompose.proofs.sides import Sides
+from firable.decompose.splitting.votes import Vote
 from firable.nets.decomposition import Decomposition
 from firable.nets.verdict import Verdict
 
 
 @dataclass(frozen=True)
 class Task:
-    """The decomposition that is to be proved; `timeout_ms` is for each question to a solver."""
+    """The decomposition that is to be proved; `timeout_ms` is for each question to a solver.
+
+    `cast` are its votes as arcs and units have them, where somebody has them already.
+    """
 
     decomposition: Decomposition
     timeout_ms: int
+    cast: Sequence[Vote] | None = None
 
     @cached_property
     def sides(self) -> Sides:
         """Both sides of it, looked up once for all families."""
-        return Sides(self.decomposition)
+        return Sides(self.decomposition, self.cast)
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,9 @@ class Kind(StrEnum):
 class Family:
     """Some obligations, of which the verdicts are named `name` or `name.SUBJECT`.
 
+    With `words` they are named so with one of these instead, and those of the family rest on its file: others of these
+    names may be shown otherwise.
+
     `title` is how a report calls it, `says` what it proves in a line; `serves` are the obligations of SEMANTICS that
     it proves, whole or in part.
     """
@@ -60,11 +68,14 @@ class Family:
     kind: Kind = Kind.STATIC
     apart: str = ""
     """The name of a family within this one that is told by itself."""
+    words: tuple[str, ...] = ()
 
     def has(self, verdict: Verdict) -> bool:
         """Whether the verdict is one of this family."""
         if self.apart and _within(verdict.name, self.apart):
             return False
+        if any(_within(verdict.name, word) for word in self.words):
+            return f"{self.name}.smt2" in verdict.evidence
         return _within(verdict.name, self.name)
 
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from firable.analysis.induction.smt import Term, Terms
+from firable.nets.verdict import Weight
 
 Item = TypeVar("Item")
 
@@ -32,6 +33,8 @@ class Obligation:
 
     `definitions` are those of the assumptions that say only what a variable stands for, which no message shows.
     `sides` are the two terms that the claim compares, where it compares two, with their descriptions: for the message.
+    `weight` is that of its verdict, and `discipline` says how transitions fire, where the claim depends on it.
+    `rests_on` are the obligations, before it in its family, of which the claims are among its assumptions.
     """
 
     name: str
@@ -41,6 +44,9 @@ class Obligation:
     asserted: tuple[Term, ...]
     sides: tuple[tuple[str, Term], ...] = ()
     definitions: tuple[Term, ...] = ()
+    weight: Weight = Weight.REQUIRED
+    discipline: str = ""
+    rests_on: tuple[str, ...] = ()
 
 
 def claimed(

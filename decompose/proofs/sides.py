@@ -6,10 +6,12 @@ linear in the net: which part belongs to which transition, which subnet is whose
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
+from firable.analysis.deadline import Deadline
 from firable.analysis.induction.smt import Term, Terms
+from firable.decompose.splitting.votes import SECONDS, Vote, votes
 from firable.nets.decomposition import ArbitrationGroup, Decomposition
 from firable.nets.net import Net
 from firable.semantics.arbitration import Arbitration, Group
@@ -21,8 +23,9 @@ Key = tuple[str, str]
 class Sides:
     """A decomposition, looked at from both sides."""
 
-    def __init__(self, decomposition: Decomposition) -> None:
+    def __init__(self, decomposition: Decomposition, cast: Sequence[Vote] | None = None) -> None:
         self.decomposition = decomposition
+        self._cast = cast
         self.net = decomposition.net
         self.subnets = decomposition.subnets
         self.by_name = {subnet.name: subnet for subnet in decomposition.subnets}
@@ -55,6 +58,11 @@ class Sides:
         """The AND over the parts of a transition; a part that is not there, or a transition without any, is false."""
         found = [self.part(key) for key in self.parts[name]]
         return terms.conjunction(value(*part) if part else terms.false for part in found) if found else terms.false
+
+    @cached_property
+    def votes(self) -> Sequence[Vote]:
+        """The votes on what the coordinator decides, as arcs and units have them; at most so many seconds."""
+        return self._cast if self._cast is not None else votes(self.decomposition, Deadline.after(SECONDS))
 
     @cached_property
     def arbitration(self) -> Arbitration:

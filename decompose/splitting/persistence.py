@@ -5,10 +5,11 @@ of the central net, external gates free, does the yes stand while another transi
 be it by a place or by clearing a completion that the part waits for. What machines and sensors do to gates is O4.
 A stale yes of any other part is how the paper's own cell gives its robot a second task while it carries a part.
 
-The arcs and the units of the net decide most parts (`firable.decompose.splitting.votes`). What is left is a goal for
-each part, "the yes stands and one of these is firable", and goes to the analysis: all markings where they are few, or
-where a decision diagram holds them; else the techniques that decide one goal (`firable.analysis.methods`). PROVED is
-persistent, VIOLATED comes with a firing sequence whose last firing takes the yes back, UNKNOWN says how far was looked.
+The arcs and the units of the net settle most parts (`firable.decompose.splitting.votes`), and obligations to a solver
+show it (`firable.decompose.proofs.persistent`). What is left is a goal for each part, "the yes stands and one of these
+is firable", and goes to the analysis: all markings where they are few, or where a decision diagram holds them; else the
+techniques that decide one goal (`firable.analysis.methods`). PROVED is persistent, VIOLATED comes with a firing
+sequence whose last firing takes the yes back, UNKNOWN says how far was looked.
 
 What a persistent part may leave out
 ------------------------------------
@@ -45,7 +46,7 @@ Rejected: the reference player over all markings, which is quick to write, has n
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Event
 from typing import Any, Final
@@ -53,7 +54,7 @@ from typing import Any, Final
 from firable.analysis._engine import BudgetExceeded
 from firable.analysis.check import FIRST_MARKINGS
 from firable.analysis.deadline import Deadline
-from firable.analysis.evidence.certificate import Certificate, FiringSequence, InductiveInvariant
+from firable.analysis.evidence.certificate import Certificate, FiringSequence
 from firable.analysis.evidence.claims import Claim, ClaimKind, tidy
 from firable.analysis.evidence.document import Document, Record
 from firable.analysis.evidence.producing.claims import Certifier
@@ -82,13 +83,13 @@ from firable.semantics.trace import Discipline
 PREFIX: Final = "persistent."
 SECONDS: Final = 20.0
 EVIDENCE: Final = "persistence.evidence.json"
-"""The file of a bundle that shows which votes are persistent."""
+"""The file of a bundle that shows of votes which arcs and units do not settle whether they are persistent."""
 WALK_VOTES: Final = 64
 """With more votes open than this, a walk looks out for all of them before any is asked for by itself."""
 _WALK_SHARE: Final = 0.6  # of the time
 _DIAGRAM_SHARE: Final = 0.4  # of the time, for all markings in a diagram
 _ARCS: Final = "arcs: no other transition can take it back"
-_UNITS: Final = "arcs and P-invariants with one token"
+_UNITS: Final = "arcs and sets of places with one token at most"
 
 
 @dataclass(frozen=True)
@@ -119,16 +120,16 @@ class Persistence:
         return tuple(part for part in persistent if part in may)
 
     def free_as_shown(self, verdicts: Iterable[Verdict]) -> tuple[tuple[str, str], ...]:
-        """The parts that may leave out the promise as far as these verdicts, with their evidence, show it."""
-        may = set(self.free_of_promise)
+        """The parts that may leave out the promise, as far as arcs and units settle it, or the evidence of verdicts."""
+        may, shown = set(self.free_of_promise), {verdict.name for verdict in verdicts if verdict.evidence}
         return tuple(
             (vote.transition, vote.controller)
-            for vote, verdict in zip(self.votes, verdicts, strict=True)
-            if vote.part in may and (verdict.evidence or not vote.accused)
+            for vote in self.votes
+            if vote.part in may and (vote.settled or _name(vote) in shown)
         )
 
     def evidence(self, limits: Limits | None = None) -> Document:
-        """The document on every verdict that some marking could refute; the other ones need no more than the arcs.
+        """The document on every decided verdict that the arcs and units do not settle.
 
         A record for each, without a name, in the order of the votes: that the goal of the vote is never reached, or is.
         """
@@ -136,31 +137,39 @@ class Persistence:
         flat = [finding for of in self.findings.values() for finding in of]
         certifier = Certifier(self.decomposition.net, Discipline.INTERLEAVING, limits, self.space, flat)
         shown = (
-            _record(vote, verdict, certifier)
-            for vote, verdict in zip(self.votes, self.verdicts, strict=True)
-            if vote.accused and verdict.status is not Status.UNKNOWN
+            _record(vote, verdict, certifier) for vote, verdict in self._open() if verdict.status is not Status.UNKNOWN
         )
         return Document(self.decomposition.net, Discipline.INTERLEAVING, tuple(shown))
 
     def with_evidence(self, limits: Limits | None = None) -> tuple[tuple[Verdict, ...], Mapping[str, str]]:
-        """The verdicts, those that the document shows with its name, and the text of the document by its name."""
+        """The verdicts on the votes that arcs and units do not settle, with the document on them by its name.
+
+        Those that the document shows name it. On the other votes there are obligations
+        (`firable.decompose.proofs.persistent`).
+        """
         document = self.evidence(limits)
-        if not document.records:
-            return self.verdicts, {}
         records = iter(document.records)
         verdicts = []
-        for vote, verdict in zip(self.votes, self.verdicts, strict=True):
-            stands = vote.accused and verdict.status is not Status.UNKNOWN and next(records).shown
+        for _, verdict in self._open():
+            stands = verdict.status is not Status.UNKNOWN and next(records).shown
             verdicts.append(replace(verdict, evidence=(EVIDENCE,)) if stands else verdict)
-        return tuple(verdicts), {EVIDENCE: document.to_text()}
+        return tuple(verdicts), {EVIDENCE: document.to_text()} if document.records else {}
+
+    def _open(self) -> Iterator[tuple[Vote, Verdict]]:
+        pairs = zip(self.votes, self.verdicts, strict=True)
+        return ((vote, verdict) for vote, verdict in pairs if not vote.settled)
 
 
 def persistence(
-    decomposition: Decomposition, space: StateSpace[Any] | None = None, limits: Limits | None = None
+    decomposition: Decomposition,
+    space: StateSpace[Any] | None = None,
+    limits: Limits | None = None,
+    cast: Sequence[Vote] | None = None,
 ) -> Persistence:
     """Decide of each part of a transition that the coordinator decides whether its yes is persistent.
 
-    `space` are the reachable markings under interleaving, where somebody has them already. Default limits: 20 seconds.
+    `space` are the reachable markings under interleaving, and `cast` the votes as arcs and units have them, where
+    somebody has them already. Default limits: 20 seconds.
 
     >>> from firable.decompose.splitting.cut import split
     >>> from firable.nets.catalogue import catalogue_net
@@ -169,12 +178,12 @@ def persistence(
     [('persistent.t1-21', ('G6',)), ('persistent.t1-41', ('G2',))]
     """
     limits = limits or Limits(Deadline.after(SECONDS))
-    cast = votes(decomposition, limits.deadline.within(_share(limits.deadline, 0.5)))
+    cast = cast if cast is not None else votes(decomposition, limits.deadline.within(_share(limits.deadline, 0.5)))
     one = _Deciding(decomposition.net, limits, space)
     open_ = [vote for vote in cast if vote.falsifiers]
     one.decide(open_)
     verdicts = tuple(one.found.get(vote.part) or _by_structure(vote) for vote in cast)
-    return Persistence(decomposition, cast, verdicts, one.space, one.findings)
+    return Persistence(decomposition, tuple(cast), verdicts, one.space, one.findings)
 
 
 def freed(decomposition: Decomposition) -> Decomposition:
@@ -348,8 +357,6 @@ def _record(vote: Vote, verdict: Verdict, certifier: Certifier) -> Record:
     claim, lacking, shown = claim_of(vote, persistent=verdict.holds), "", list[tuple[Claim, Certificate]]()
     if verdict.witness is not None:  # without its last firing it ends where the yes stands
         shown.append((claim, FiringSequence(verdict.witness.firings[:-1])))
-    elif not vote.falsifiers:
-        shown.append((claim, InductiveInvariant(vote.units)))
     else:
         try:
             shown.append((claim, certifier.certify(claim)))

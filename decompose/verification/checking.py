@@ -13,7 +13,7 @@ them anew. So everything is derived a second time, by code that shares nothing w
 4. where the bundle names machines, the loop that they close is closed anew, and its document must show of it that they
    keep each gate that a vote relies on (`machines`); the verdicts on the central net must be those that its documents
    of evidence show (`documents`), and each part that is free of promise must be one by the arcs, and its vote shown to
-   be persistent (`free_parts`);
+   be persistent, by an obligation or a document (`free_parts`);
 5. nothing is left over: no file that nobody needs, no verdict that nobody knows; and nothing is left out: each verdict
    that every net has is there, warnings too.
 

@@ -7,6 +7,8 @@ verdict that a record shows otherwise is refused, and a record that no verdict s
 record shows is only claimed, and so is one that was left undecided; one that is not there, though `check` gives it of
 every net, is missed.
 
+Of the votes, those that arcs and units settle have been judged before, by their obligations (`restating_votes`).
+
 How a verdict was found, what that cost and the hint that it gives are told, not shown; nothing rests on them. Its
 witness is played, and that of a vote which falls ends with who takes it back.
 """
@@ -25,7 +27,7 @@ from firable.analysis.evidence.claims import ClaimKind
 from firable.analysis.evidence.document import Document, document_from_text
 from firable.analysis.evidence.refusal import TimeIsOverError
 from firable.decompose.verification.checked import Examination
-from firable.decompose.verification.formulas import Formula, Formulas
+from firable.decompose.verification.formulas import FALSE, Formula, Formulas
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import Answers
 from firable.decompose.verification.votes import PREFIX, Vote, question_of, votes
@@ -159,19 +161,15 @@ def _set_of(certificate: Certificate) -> tuple[object, ...] | None:
 
 
 def _judge_votes(examination: Examination, formulas: Formulas, shown: _Shown) -> None:
-    demanded = votes(examination.bundle.decomposition, formulas)
+    demanded = {vote.name: vote for vote in votes(examination.bundle.decomposition)}
     for verdict in [v for v in examination.unjudged() if v.name.startswith(PREFIX)]:
         if verdict.name not in demanded:
             raise NotShownError(f"'{verdict.name}' is on no part", "verdicts", verdict.name)
         vote = demanded[verdict.name]
         _compare(examination, verdict, vote.sentence, frozenset({Weight.INFORMATION}))
-        if vote.question is None:
-            if not verdict.holds or verdict.evidence:
-                raise NotShownError(f"the arcs alone show '{verdict.name}'", "verdicts", verdict.name)
-            examination.judge(verdict, shown=True, method="the arcs: no other transition can take it back")
-            continue
-        never = shown.answer(ClaimKind.NEVER, vote.question)
-        reachable = None if never else shown.answer(ClaimKind.REACHABLE, vote.question)
+        question = vote.question(formulas) if vote.asked else FALSE  # which no document asks
+        never = shown.answer(ClaimKind.NEVER, question)
+        reachable = None if never else shown.answer(ClaimKind.REACHABLE, question)
         _by_record(examination, verdict, never or reachable, proved=never is not None)
         if verdict.status is Status.VIOLATED:
             _falls(examination, verdict, vote)
@@ -185,7 +183,7 @@ def _falls(examination: Examination, verdict: Verdict, vote: Vote) -> None:
     if (
         verdict.code
         or len(set(verdict.subjects)) < len(verdict.subjects)
-        or not vote.accused.issuperset(verdict.subjects)
+        or not set(vote.accused).issuperset(verdict.subjects)
     ):
         raise NotShownError(f"'{verdict.name}' blames what cannot take the yes back", *subject)
     if witness is None or not witness.firings or witness.cycle:

@@ -99,3 +99,42 @@ class Formulas:
     def equal(self, left: Formula, right: Formula) -> Formula:
         """The equation of two formulas."""
         return self._number(("=", left, right))
+
+
+class AtMostOne:
+    """At most one of some formulas: neighbours are joined to "one of us" and "not two of us", until one is left.
+
+    >>> of = Formulas()
+    >>> p, q, r = map(of.variable, "pqr")
+    >>> once = AtMostOne(of, [p, q, r])
+    >>> once.when({1: TRUE}) == of.all_of([of.negation(p), of.negation(r)])
+    True
+    """
+
+    def __init__(self, of: Formulas, operands: Iterable[Formula]) -> None:
+        self.of = of
+        self.rows: list[list[tuple[Formula, Formula]]] = [[(operand, TRUE) for operand in operands]]
+        while len(self.rows[-1]) > 1:
+            row = self.rows[-1]
+            self.rows.append([self._join(row, {}, i) for i in range(0, len(row), 2)])
+
+    def formula(self) -> Formula:
+        """That at most one of them holds."""
+        return self.rows[-1][0][1] if self.rows[0] else TRUE
+
+    def when(self, others: dict[int, Formula]) -> Formula:
+        """The same where some of them, by their positions, are others."""
+        changed = {i: (other, TRUE) for i, other in others.items()}
+        for row in self.rows[:-1]:
+            changed = {i // 2: self._join(row, changed, i - i % 2) for i in changed}
+        return changed[0][1] if changed else self.formula()
+
+    def _join(
+        self, row: list[tuple[Formula, Formula]], changed: dict[int, tuple[Formula, Formula]], i: int
+    ) -> tuple[Formula, Formula]:
+        one, one_once = changed.get(i, row[i])
+        if i + 1 == len(row):
+            return one, one_once
+        other, other_once = changed.get(i + 1, row[i + 1])
+        not_both = self.of.negation(self.of.all_of([one, other]))
+        return self.of.any_of([one, other]), self.of.all_of([one_once, other_once, not_both])

@@ -3,9 +3,8 @@
 Two things are asked. By the arcs: at the controller of the part nobody else takes what it takes or reads that full, nor
 fills what it fills or reads that empty; who reads a signal that it clears needs a place full that it fills; nobody who
 is kept from closing a gate of it is so by a signal alone; and of signals it reads completions of its own input places,
-at 1. Of the markings: that its vote is persistent must be shown,
-by the arcs or by a document (`votes`), and not only be claimed. What is said of the protocol of this very net
-(`explored`) rests on both.
+at 1. Of the markings: that its vote is persistent must be shown, by an obligation (`restating_votes`) or by a document,
+and not only be claimed. What is said of the protocol of this very net (`explored`) rests on both.
 """
 
 from __future__ import annotations

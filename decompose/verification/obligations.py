@@ -7,6 +7,7 @@ order counts, too, so that no obligation can be left out and no other one put in
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 from firable.decompose.verification.checked import Examination
@@ -15,6 +16,7 @@ from firable.decompose.verification.reading import ObligationFile, ReadingError,
 from firable.decompose.verification.recut import Cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.restating import HEADS, Restated, Stated
+from firable.decompose.verification.restating_votes import UNIT
 from firable.decompose.verification.solvers import Answers, SolverError, gave_up
 from firable.nets.source import printable
 from firable.nets.verdict import Status, Verdict
@@ -22,11 +24,21 @@ from firable.nets.verdict import Status, Verdict
 _METHOD: Final = "z3, of the negated obligation"  # what each such verdict says of itself
 
 
-def check_obligations(examination: Examination, cut: Cut, solver: str, answers: Answers, timeout_ms: int) -> None:
-    """Judge the verdicts of all families; raises `NotShownError` where one is not shown."""
-    families = {family: compared(examination, cut, family) for family in HEADS}
+def check_obligations(
+    examination: Examination,
+    cut: Cut,
+    solver: str,
+    answers: Answers,
+    timeout_ms: int,
+    families: Iterable[str] = HEADS,
+) -> None:
+    """Judge the verdicts of these families, of all unless somebody says which.
+
+    Raises `NotShownError` where one is not shown.
+    """
+    stated_of = {family: compared(examination, cut, family) for family in families}
     # What needs no solver comes first, so that a bundle that says something else is refused at once.
-    for family, stated in families.items():
+    for family, stated in stated_of.items():
         if stated:
             shown = _answered(examination, family, stated, answers, timeout_ms)
             _judge(examination, stated, solver, shown)
@@ -35,7 +47,8 @@ def check_obligations(examination: Examination, cut: Cut, solver: str, answers: 
 def compared(examination: Examination, cut: Cut, family: str) -> list[Stated]:
     """What must be proved of a family, once its file and its verdicts have been found to say exactly this."""
     decomposition, formulas, name = examination.bundle.decomposition, Formulas(), _file(family)
-    stated = list(Restated(decomposition, cut, formulas).family(family))
+    units = [verdict.subjects for verdict in examination.bundle.verdicts if verdict.name.startswith(UNIT)]
+    stated = list(Restated(decomposition, cut, formulas, units).family(family))
     if stated:
         try:
             file = read_file(examination.text(name), formulas)
@@ -43,7 +56,16 @@ def compared(examination: Examination, cut: Cut, family: str) -> list[Stated]:
             raise NotShownError(f"'{name}' is no file of obligations: {error}", "evidence", name) from None
         _compare(name, family, decomposition.net.name, file, stated)
     for one in stated:
-        demanded = Verdict(one.name, Status.PROVED, one.sentence, _METHOD, subjects=one.subjects, evidence=(name,))
+        demanded = Verdict(
+            one.name,
+            Status.PROVED,
+            one.sentence,
+            _METHOD,
+            one.weight,
+            subjects=one.subjects,
+            evidence=(name,),
+            discipline=one.discipline,
+        )
         if examination.verdict(one.name) != demanded:
             raise NotShownError(f"the verdict on '{one.name}' is not what its proof shows", "verdicts", one.name)
     return stated
@@ -94,7 +116,8 @@ def _answered(
 
 
 def _judge(examination: Examination, stated: list[Stated], solver: str, shown: list[bool]) -> None:
-    for one, is_shown in zip(stated, shown, strict=True):
+    for one, answered in zip(stated, shown, strict=True):
+        is_shown = answered and all(examination.checked[name].shown for name in one.rests_on)
         method = f"{solver}, of the negated obligation stated anew" if is_shown else "nothing"
         late = "" if is_shown else f"{solver} gave up"
         examination.judge(examination.verdict(one.name), shown=is_shown, method=method, only_claimed=late)

@@ -13,10 +13,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from firable.decompose.verification.formulas import TRUE, Formula, Formulas
+from firable.decompose.verification.formulas import AtMostOne, Formula, Formulas
 from firable.decompose.verification.recut import Cut
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Net, Place, Transition
+from firable.nets.verdict import Weight
 
 HEADS: Final = {
     "eq7": "a transition is firable iff all its parts are",
@@ -30,24 +31,34 @@ HEADS: Final = {
     "o8": "votes add up layer by layer, and competitors meet in one coordinator",
     "o8-apart": "no coordinator's promise stands in the way of another coordinator",
     "arbitration": "conflicts are decided as in the central net",
+    "persistence": "a yes once given stays until its transition fires",
 }
 """What stands at the head of the file of each family."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """An obligation: its name, its sentence, what it is about, and what must have no model."""
+    """An obligation: its name, its sentence, what it is about, what must have no model, and what its verdict weighs.
+
+    `rests_on` are those before it in its family of which the claims are given.
+    """
 
     name: str
     sentence: str
     subjects: tuple[str, ...]
     asserted: tuple[Formula, ...]
+    weight: Weight = Weight.REQUIRED
+    discipline: str = ""
+    rests_on: tuple[str, ...] = ()
 
 
 class Restated:
-    """The obligations of one decomposition."""
+    """The obligations of one decomposition; `units` are those that its bundle lists (`restating_votes`)."""
 
-    def __init__(self, decomposition: Decomposition, cut: Cut, formulas: Formulas) -> None:
+    def __init__(
+        self, decomposition: Decomposition, cut: Cut, formulas: Formulas, units: Sequence[tuple[str, ...]] = ()
+    ) -> None:
+        self.units = units
         self.decomposition, self.net, self.cut, self.of = decomposition, decomposition.net, cut, formulas
         self.subnet = {subnet.name: subnet for subnet in decomposition.subnets}
         self.listed = {row.name: row.parts for row in decomposition.coordinated}
@@ -55,7 +66,7 @@ class Restated:
 
     def family(self, name: str) -> Iterator[Stated]:
         """The obligations of a family, in order."""
-        from firable.decompose.verification import restating_choice, restating_facts, restating_layers
+        from firable.decompose.verification import restating_choice, restating_facts, restating_layers, restating_votes
 
         match name:
             case "eq7":
@@ -72,6 +83,8 @@ class Restated:
                 return restating_layers.apart(self)
             case "arbitration":
                 return restating_choice.arbitration(self)
+            case "persistence":
+                return restating_votes.persistence(self)
         return restating_facts.FAMILIES[name](self)
 
     # --- What the families share
@@ -102,16 +115,8 @@ class Restated:
         return [self.of.literal(name, full) for name in names]
 
     def at_most_one(self, operands: Iterable[Formula]) -> Formula:
-        """At most one of some formulas: neighbours are joined to "one of us" and "not two of us", until one is left."""
-        pairs = [(operand, TRUE) for operand in operands]
-        while len(pairs) > 1:
-            joined = []
-            for i in range(0, len(pairs) - 1, 2):
-                (left, left_once), (right, right_once) = pairs[i], pairs[i + 1]
-                not_both = self.of.negation(self.of.all_of([left, right]))
-                joined.append((self.of.any_of([left, right]), self.of.all_of([left_once, right_once, not_both])))
-            pairs = joined + (pairs[-1:] if len(pairs) % 2 else [])
-        return pairs[0][1] if pairs else TRUE
+        """At most one of some formulas."""
+        return AtMostOne(self.of, operands).formula()
 
     # --- Eq. (7) to (10)
 

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from support.free_parts import BY_A_UNIT
 from support.reference import load_net
 
 from firable.analysis.check import check
@@ -16,13 +17,13 @@ from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
 from firable.decompose.verification.documents import check_verdicts_on_the_net
 from firable.decompose.verification.free_parts import check_free_parts
+from firable.decompose.verification.obligations import check_obligations
 from firable.decompose.verification.recut import check_cut
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import SOLVERS
 from firable.nets.bundle import Bundle, read_bundle, write_bundle
 from firable.nets.catalogue import catalogue_net
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Controller, Net, Place, Transition
 from firable.nets.right_to_run import unproved
 from firable.nets.verdict import Status, Verdict
 
@@ -39,11 +40,12 @@ def saying(free: Free) -> Bundle:
 
 
 def judged(bundle: Bundle) -> None:
-    """What `firable verify` does of free parts, without the obligations on the split; raises `NotShownError`."""
-    examination = Examination(bundle)
+    """What `firable verify` does of free parts, without the other obligations on the split; raises `NotShownError`."""
+    examination, cut = Examination(bundle), check_cut(bundle.decomposition)
     examination.used |= {file for file in bundle.evidence if file.endswith(".smt2")}
+    check_obligations(examination, cut, "z3", SOLVERS["z3"], 10_000, ["persistence"])
     check_verdicts_on_the_net(examination, SOLVERS["z3"], 10_000)
-    check_free_parts(examination, check_cut(bundle.decomposition))
+    check_free_parts(examination, cut)
 
 
 def test_bundle_says_which_parts_are_free_and_shows_it(tmp_path: Path) -> None:
@@ -130,38 +132,12 @@ def test_free_part_needs_a_verdict_that_its_vote_is_persistent(part: str) -> Non
     assert unproved(changed(name, lambda v: [v, replace(v, status=Status.VIOLATED)]))
 
 
-def by_an_invariant() -> Net:
-    """`l` takes the gate of `G` when the token is on `a.x`, and then it is not on `a.i`, as `G` needs it."""
-    names = {
-        "a.i": True,
-        "a.j": False,
-        "a.x": False,
-        "a.w": False,
-        "a.g": True,
-        "a.h": False,
-        "b.p": True,
-        "b.q": False,
-    }
-    return Net(
-        "by_an_invariant",
-        tuple(Place(name, name[0], marked) for name, marked in names.items()),
-        (
-            Transition("G", ("a.i", "b.p"), ("a.j", "b.q"), ("a.g",)),
-            Transition("m", ("a.j",), ("a.x",)),
-            Transition("l", ("a.x", "a.g"), ("a.w", "a.h")),
-            Transition("k", ("a.w",), ("a.i",)),
-            Transition("n", ("a.h",), ("a.g",)),
-            Transition("back", ("b.q",), ("b.p",)),
-        ),
-        controllers=(Controller("a"), Controller("b")),
-    )
-
-
-def test_vote_that_the_arcs_do_not_show_needs_evidence() -> None:
-    bundle = make_bundle(check(by_an_invariant()))
+def test_vote_that_arcs_and_units_show_needs_their_evidence() -> None:
+    bundle = make_bundle(check(BY_A_UNIT))
     assert bundle.decomposition.free == (("G", "a"), ("G", "b"))
     verdict = next(v for v in bundle.verdicts if v.name == "persistent.t1-11")
-    assert verdict.evidence == ("persistence.evidence.json",)
+    assert verdict.evidence == ("persistence.smt2",)
+    assert [v.subjects for v in bundle.verdicts if v.name.startswith("unit.")] == [("a.i", "a.j", "a.w", "a.x")]
     judged(bundle)
     bare = tuple(replace(v, evidence=()) if v is verdict else v for v in bundle.verdicts)
     assert [problem.message for problem in unproved(replace(bundle, verdicts=bare))] == [

@@ -56,6 +56,18 @@ CLOSED_AGAIN = _net(
 """The yes of `t1-11` is not persistent: `l` closes the gate that it reads, again and again."""
 
 
+BY_A_UNIT = _net(
+    "a.i a.g b.p",
+    Transition("G", ("a.i", "b.p"), ("a.j", "b.q"), ("a.g",)),
+    Transition("m", ("a.j",), ("a.x",)),
+    Transition("l", ("a.x", "a.g"), ("a.w", "a.h")),
+    Transition("k", ("a.w",), ("a.i",)),
+    Transition("n", ("a.h",), ("a.g",)),
+    Transition("back", ("b.q",), ("b.p",)),
+)
+"""`l` takes the gate of `G` when the token is on `a.x`, and then it is not on `a.i`, as `G` needs it."""
+
+
 def parts_of(decomposition: Decomposition, *names: str) -> Decomposition:
     """The decomposition with the parts of these names free of promise, whether they may be or not."""
     free = [(row.name, p.controller) for row in decomposition.coordinated for p in row.parts if p.name in names]
