@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -110,11 +111,12 @@ def _report(
     with loaded.placing():
         made = make_bundle(found, Limits(Deadline.after(seconds), allowed.memory_bytes), **more)
     write_bundle(output, made)
+    told = {verdict.name: verdict for verdict in found.verdicts}  # with all that the bundle has no evidence on
     return Report(
         "bundle",
         argument,
         net,
-        made.verdicts,
+        tuple(replace(told.get(one.name, one), evidence=one.evidence) for one in made.verdicts),
         figures={**found.figures.to_json(), "bundle_digest": made.digest},
         notes=loaded.notes,
         table=made.decomposition.table,

@@ -19,7 +19,7 @@ from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.goal import Limits
 from firable.analysis.report import CheckReport
-from firable.decompose.proofs.closed_loops import PREFIXES, sealed_loops
+from firable.decompose.proofs.closed_loops import PREFIXES, UNDECIDED, sealed_loops
 from firable.decompose.proofs.proving import TIMEOUT_MS, ProofReport, prove
 from firable.decompose.protocol.outages import sealed_outages
 from firable.decompose.protocol.shown import proved_without_exploring
@@ -30,8 +30,9 @@ from firable.decompose.splitting.votes import SECONDS as UNITS_SECONDS
 from firable.decompose.splitting.votes import votes
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.net import Net
 from firable.nets.right_to_run import unproved
-from firable.nets.verdict import Verdict, Weight
+from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.trace import Discipline
 
 EVIDENCE: Final = "check.evidence.json"
@@ -40,6 +41,8 @@ SECONDS: Final = 30.0
 """How long evidence for the verdicts on the net is looked for, unless somebody says otherwise."""
 
 
+METHOD: Final = "shown by its evidence"
+"""How each verdict on the net was found, as a bundle says it: what it tells besides is for `firable check` to say."""
 LATE: Final = "the time for evidence was over"
 
 
@@ -78,10 +81,11 @@ def make_bundle(
     proof = prove(decomposition, timeout_ms=timeout_ms, cast=cast)
     found = persistence(decomposition, report.space, cast=cast)
     voted, shown = found.with_evidence()
+    voted = tuple(_as_shown(verdict, verdict.evidence, report.net) for verdict in voted)
     decomposition = replace(decomposition, free=found.free_as_shown(voted))
     document = evidence_of_report(report, (), _anew(limits, seconds))
     named = {record.name for record in document.records if not record.lacking}
-    on_the_net = (replace(v, evidence=(*v.evidence, EVIDENCE)) if v.name in named else v for v in report.verdicts)
+    on_the_net = (_as_shown(v, (EVIDENCE,) if v.name in named else (), report.net) for v in report.verdicts)
     families = ["explored"] * (protocol or faults) + ["faults"] * faults
     run, obligations = proved_without_exploring(decomposition, families, timeout_ms)
     dead, last_rites = tuple[Verdict, ...](), dict[str, str]()
@@ -100,6 +104,35 @@ def make_bundle(
         lacking |= {verdict.name: LATE for verdict in held if verdict.holds and not verdict.evidence}
         raise InputError(_unbundled(problem, lacking) for problem in problems)
     return bundle
+
+
+def _as_shown(verdict: Verdict, evidence: tuple[str, ...], net: Net) -> Verdict:
+    """A verdict on the net as a bundle holds it: what its evidence shows, and nothing that it does not.
+
+    One that must hold and does not is left as it is, since because of it no bundle is made.
+    """
+    if verdict.weight is Weight.REQUIRED and not verdict.holds:
+        return verdict
+    weight = verdict.weight
+    if verdict.name == "effective-conflicts":
+        weight = Weight.INFORMATION if verdict.holds or _arbitrated(net) else Weight.WARNING
+    return Verdict(
+        verdict.name,
+        verdict.status,
+        verdict.statement,
+        METHOD,
+        weight,
+        bound=UNDECIDED if verdict.status is Status.UNKNOWN else "",
+        evidence=evidence,
+        discipline=verdict.discipline,
+    )
+
+
+def _arbitrated(net: Net) -> bool:
+    """Whether all that takes from one place, or puts on it, is decided by one arbiter of the file."""
+    some = (together for together in (*net.competitors, *net.producers) if len(together) > 1)
+    named = ({net.transitions[t].name for t in together} for together in some)
+    return all(any(together.issubset(arbiter.among) for arbiter in net.arbiters) for together in named)
 
 
 def _anew(limits: Limits | None, seconds: float | None) -> Limits:

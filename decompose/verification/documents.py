@@ -9,8 +9,8 @@ every net, is missed.
 
 Of the votes, those that arcs and units settle have been judged before, by their obligations (`restating_votes`).
 
-How a verdict was found, what that cost and the hint that it gives are told, not shown; nothing rests on them. Its
-witness is played, and that of a vote which falls ends with who takes it back.
+A verdict says what is shown of it, and nothing else: how it was found, whom it is about, the run and the hint are told
+by `firable check`, and stand in the document as far as they show anything. So nothing in it can be edited unnoticed.
 """
 
 from __future__ import annotations
@@ -30,17 +30,20 @@ from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.formulas import FALSE, Formula, Formulas
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import Answers
-from firable.decompose.verification.votes import PREFIX, Vote, question_of, votes
-from firable.decompose.verification.words import SENTENCES, sentence_of
+from firable.decompose.verification.votes import PREFIX, question_of, votes
+from firable.decompose.verification.words import SENTENCES, sentence_of, weight_of_conflicts
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula as StateFormula
 from firable.nets.interchange import net_digest
 from firable.nets.net import Net
-from firable.nets.verdict import TOKENS_MAX, Status, Verdict, Weight
-from firable.semantics.player import NotFirableError, Player
+from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.trace import Discipline
 
 SUFFIX: Final = ".evidence.json"
+METHOD: Final = "shown by its evidence"
+"""What each such verdict says of how it was found."""
+UNDECIDED: Final = "not decided within the limits"
+Words: TypeAlias = tuple[str, frozenset[Weight]]
 
 ShownRecord: TypeAlias = CheckedRecord
 """A record of a document with what checking it found, for those here who hold verdicts against records."""
@@ -71,7 +74,7 @@ def check_verdicts_on_the_net(examination: Examination, answers: Answers, timeou
     _judge_votes(examination, formulas, shown)
     for verdict in list(examination.unjudged()):
         if (words := sentence_of(examination.bundle.net, verdict.name)) is not None:
-            _judge(examination, verdict, words, shown)
+            _judge_on_the_net(examination, verdict, words, shown)
     for name in (*SENTENCES, *(f"property.{prop.name}" for prop in examination.bundle.net.properties)):
         examination.verdict(name)  # nobody takes a warning out unnoticed
     for name in shown.records:
@@ -166,89 +169,57 @@ def _judge_votes(examination: Examination, formulas: Formulas, shown: _Shown) ->
         if verdict.name not in demanded:
             raise NotShownError(f"'{verdict.name}' is on no part", "verdicts", verdict.name)
         vote = demanded[verdict.name]
-        _compare(examination, verdict, vote.sentence, frozenset({Weight.INFORMATION}))
         question = vote.question(formulas) if vote.asked else FALSE  # which no document asks
         never = shown.answer(ClaimKind.NEVER, question)
-        reachable = None if never else shown.answer(ClaimKind.REACHABLE, question)
-        _by_record(examination, verdict, never or reachable, proved=never is not None)
-        if verdict.status is Status.VIOLATED:
-            _falls(examination, verdict, vote)
+        found = never or shown.answer(ClaimKind.REACHABLE, question)
+        _judge(examination, verdict, vote.sentence, Weight.INFORMATION, found, proved=never is not None)
     if missing := sorted(name for name in demanded if name not in examination.by_name):
         raise NotShownError(f"there is no verdict on '{missing[0]}'", "verdicts", missing[0])
 
 
-def _falls(examination: Examination, verdict: Verdict, vote: Vote) -> None:
-    """The run that a fallen vote tells ends with who takes it back, and names nobody who could not."""
-    subject, witness, net = ("verdicts", verdict.name), verdict.witness, examination.bundle.net
-    if (
-        verdict.code
-        or len(set(verdict.subjects)) < len(verdict.subjects)
-        or not set(vote.accused).issuperset(verdict.subjects)
-    ):
-        raise NotShownError(f"'{verdict.name}' blames what cannot take the yes back", *subject)
-    if witness is None or not witness.firings or witness.cycle:
-        raise NotShownError(f"'{verdict.name}' does not tell how the yes is taken back", *subject)
-    player, before = Player(net), net.initial_marking
-    for fired in witness.firings[:-1]:
-        before = player.fire(before, [net.transition_index[name] for name in fired])
-    stands = vote.full.issubset(net.names(before)) and vote.empty.isdisjoint(net.names(before))
-    if not stands or not set(verdict.subjects).issuperset(witness.firings[-1]):
-        raise NotShownError(f"the firings of '{verdict.name}' do not end with who takes the yes back", *subject)
-
-
-def _judge(examination: Examination, verdict: Verdict, words: tuple[str, frozenset[Weight]], shown: _Shown) -> None:
-    _compare(examination, verdict, *words)
+def _judge_on_the_net(examination: Examination, verdict: Verdict, words: Words, shown: _Shown) -> None:
+    sentence, weights = words
     found = shown.records.pop(verdict.name, None)
-    _by_record(examination, verdict, found, proved=found is not None and found[0].record.proved)
+    proved = found is not None and found[0].record.proved
+    weight = min(weights) if len(weights) == 1 else weight_of_conflicts(examination.bundle.net, proved=verdict.holds)
+    _judge(examination, verdict, sentence, weight, found, proved=proved)
 
 
-def _compare(examination: Examination, verdict: Verdict, sentence: str, weights: frozenset[Weight]) -> None:
-    """What a verdict says, how, and what it would play, as far as that can be known without any proof."""
-    subject = ("verdicts", verdict.name)
-    if verdict.statement != sentence or verdict.weight not in weights:
-        raise NotShownError(f"'{verdict.name}' says something else than what is shown of it", *subject)
-    if verdict.discipline != Discipline.INTERLEAVING.value:
-        raise NotShownError(f"'{verdict.name}' is on another discipline than interleaving", *subject)
-    if verdict.holds and (verdict.code or verdict.subjects):
-        raise NotShownError(f"'{verdict.name}' holds, and yet tells of an exception", *subject)
-    if verdict.witness is not None:
-        _play(examination, verdict)
-
-
-def _by_record(
-    examination: Examination, verdict: Verdict, found: tuple[CheckedRecord, str] | None, *, proved: bool
+def _judge(
+    examination: Examination,
+    verdict: Verdict,
+    sentence: str,
+    weight: Weight,
+    found: tuple[CheckedRecord, str] | None,
+    *,
+    proved: bool,
 ) -> None:
-    subject = ("verdicts", verdict.name)
+    """Hold a verdict against its record, where there is one: it says what that says, and nothing else."""
+    subject, status = ("verdicts", verdict.name), verdict.status
+    evidence: tuple[str, ...] = ()
+    if found is not None:
+        status = Status.PROVED if proved else Status.VIOLATED
+        evidence = () if found[0].record.lacking else (found[1],)
+    wanted = Verdict(
+        verdict.name,
+        status,
+        sentence,
+        METHOD,
+        weight,
+        bound=UNDECIDED if status is Status.UNKNOWN else "",
+        evidence=evidence,
+        discipline=Discipline.INTERLEAVING.value,
+    )
+    if verdict.status is not status:
+        raise NotShownError(f"'{verdict.name}' is {verdict.status.value}, and the evidence says otherwise", *subject)
+    if verdict.evidence != evidence:
+        raise NotShownError(f"'{verdict.name}' does not name the evidence on it, or names what is none", *subject)
+    if verdict != wanted:
+        raise NotShownError(f"'{verdict.name}' says something else than what is shown of it", *subject)
     if found is None:
-        if verdict.evidence:
-            raise NotShownError(f"the evidence that '{verdict.name}' names does not speak of it", *subject)
-        undecided = verdict.status is Status.UNKNOWN
+        undecided = status is Status.UNKNOWN
         said = "undecided: the bundle itself does not say" if undecided else "only claimed: no evidence is on it"
         examination.judge(verdict, shown=False, method="nothing", only_claimed=said)
         return
-    one, file = found
-    if verdict.status is not (Status.PROVED if proved else Status.VIOLATED):
-        raise NotShownError(f"'{verdict.name}' is {verdict.status.value}, and the evidence says otherwise", *subject)
-    if verdict.evidence != (() if one.record.lacking else (file,)):
-        raise NotShownError(f"'{verdict.name}' does not name the evidence on it", *subject)
-    method = "; ".join(one.methods) or "read off the net"
-    examination.judge(verdict, shown=one.shown, method=method, only_claimed=one.only_claimed)
-
-
-def _play(examination: Examination, verdict: Verdict) -> None:
-    net, witness = examination.bundle.net, verdict.witness
-    assert witness is not None
-    player, marking = Player(net), net.initial_marking
-    try:
-        for fired in witness.firings:
-            marking = player.fire(marking, [net.transition_index[name] for name in fired])
-        after = marking
-        for fired in witness.cycle:
-            after = player.fire(after, [net.transition_index[name] for name in fired])
-    except (NotFirableError, KeyError):
-        raise NotShownError(f"the firings of '{verdict.name}' cannot be played", "verdicts", verdict.name) from None
-    left_out = not witness.marking and marking.bit_count() > TOKENS_MAX
-    if witness.assignment or not (left_out or set(witness.marking) == set(net.names(marking))):
-        raise NotShownError(f"the firings of '{verdict.name}' end elsewhere", "verdicts", verdict.name)
-    if witness.cycle and after != marking:
-        raise NotShownError(f"the cycle of '{verdict.name}' does not close", "verdicts", verdict.name)
+    method = "; ".join(found[0].methods) or "read off the net"
+    examination.judge(verdict, shown=found[0].shown, method=method, only_claimed=found[0].only_claimed)

@@ -31,7 +31,7 @@ SENTENCES: Final[Mapping[str, tuple[str, frozenset[Weight]]]] = {
         (
             "effective-conflicts",
             "no two transitions compete for a place at a reachable marking",
-            *(_WARNING, _INFORMATION),  # a warning where no arbiter decides them
+            *(_WARNING, _INFORMATION),  # by `weight_of_conflicts`
         ),
         ("gate-races", "no transition closes an internal gate of another one", _INFORMATION),
         ("conflicting-commands", "no machine is under two different commands at once", _REQUIRED),
@@ -58,6 +58,14 @@ _FAIRNESS: Final = {
         "under strong fairness (a transition that is firable again and again fires; its external gates do open)"
     ),
 }
+
+
+def weight_of_conflicts(net: Net, *, proved: bool) -> Weight:
+    """A warning that there are effective conflicts, unless those at each place are decided by one arbiter."""
+    names, decided = [t.name for t in net.transitions], [set(arbiter.among) for arbiter in net.arbiters]
+    at_places = ({names[t] for t in some} for some in (*net.competitors, *net.producers) if len(some) > 1)
+    arbitrated = all(any(together <= among for among in decided) for together in at_places)
+    return Weight.INFORMATION if proved or arbitrated else Weight.WARNING
 
 
 def sentence_of(net: Net, name: str) -> tuple[str, frozenset[Weight]] | None:

@@ -12,6 +12,7 @@ import pytest
 
 from firable.analysis.evidence.document import document_from_text
 from firable.cli.main import main
+from firable.decompose.verification.documents import UNDECIDED
 from firable.decompose.verification.solvers import SOLVERS
 from firable.nets.bundle import read_bundle, write_bundle
 from firable.nets.verdict import Status
@@ -121,7 +122,7 @@ def test_what_the_bundle_leaves_undecided_is_told_and_claims_nothing(
     whole, file = read_bundle(bundle), "check.evidence.json"
     document = document_from_text(whole.evidence[file], file)
     text = replace(document, records=tuple(r for r in document.records if r.name != "starvation")).to_text()
-    unknown: dict[str, Any] = {"status": Status.UNKNOWN, "evidence": (), "witness": None}
+    unknown: dict[str, Any] = {"status": Status.UNKNOWN, "evidence": (), "bound": UNDECIDED}
     verdicts = tuple(replace(v, **unknown) if v.name == "starvation" else v for v in whole.verdicts)
     doubted = replace(whole, verdicts=verdicts, evidence={**whole.evidence, file: text})
     write_bundle(tmp_path / "doubted", doubted)

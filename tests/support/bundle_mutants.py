@@ -197,39 +197,18 @@ def _verdict_changes(bundle: Bundle, verdict: Verdict) -> Iterator[tuple[str, Ve
     yield "renamed", replace(verdict, name=f"{verdict.name}x")
     yield "statement", replace(verdict, statement=f"{verdict.statement} now")
     yield "discipline", replace(verdict, discipline="step" if verdict.discipline else "interleaving")
-    if verdict.name != "effective-conflicts":
-        yield from ((f"{w}", replace(verdict, weight=w)) for w in Weight if w is not verdict.weight)
-    else:
-        yield "weight", replace(verdict, weight=Weight.REQUIRED)
+    yield from ((f"{w}", replace(verdict, weight=w)) for w in Weight if w is not verdict.weight)
     yield "no evidence", replace(verdict, evidence=() if verdict.evidence else ("eq7.smt2",))
     other = next(file for file in bundle.evidence if verdict.evidence != (file,))
     yield f"evidence {other}", replace(verdict, evidence=(other,))
     if verdict.evidence:
         yield "evidence twice", replace(verdict, evidence=verdict.evidence * 2)
-    if verdict.witness is not None:
-        w = verdict.witness
-        yield "witness too long", replace(verdict, witness=replace(w, firings=(*w.firings, *w.firings[:1], ("none",))))
-        yield "witness ends elsewhere", replace(verdict, witness=replace(w, marking=w.marking[1:]))
-    if verdict.name.startswith("persistent.") and verdict.status is Status.VIOLATED and verdict.witness is not None:
-        w = verdict.witness
-        yield "code", replace(verdict, code="F1001")
-        yield "subjects", replace(verdict, subjects=(*verdict.subjects, "x"))
-        yield "blamed twice", replace(verdict, subjects=verdict.subjects * 2)
-        yield "nobody blamed", replace(verdict, subjects=())
-        yield "no witness", replace(verdict, witness=None)
-        yield "no firings", replace(verdict, witness=Witness(marking=bundle.net.names(bundle.net.initial_marking)))
-        others = (t.name for t in bundle.net.transitions if t.name not in verdict.subjects)
-        yield from ((f"{t} blamed", replace(verdict, subjects=(t,))) for t in others)
-        yield "witness goes on for ever", replace(verdict, witness=replace(w, cycle=w.firings[:1]))
-    if verdict.name in {v.name for v in bundle.verdicts if v.evidence and v.evidence[0].endswith(".smt2")}:
-        # Of an obligation every field is known.
-        yield "method", replace(verdict, method="by hand")
-        yield "hint", replace(verdict, hint="none")
-        yield "bound", replace(verdict, bound="none")
-        yield "code", replace(verdict, code="F4002")
-        yield "subjects", replace(verdict, subjects=(*verdict.subjects, "x"))
-        yield "cost", replace(verdict, cost=Cost(1, 1))
-        yield "witness", replace(verdict, witness=Witness(note="seen"))
+    for field, value in (("method", "by hand"), ("hint", "none"), ("bound", "none"), ("code", "F4002")):
+        changes: dict[str, Any] = {field: value}
+        yield field, replace(verdict, **changes)
+    yield "subjects", replace(verdict, subjects=(*verdict.subjects, "x"))
+    yield "cost", replace(verdict, cost=Cost(1, 1))
+    yield "witness", replace(verdict, witness=Witness(note="seen"))
 
 
 def evidence_mutants(bundle: Bundle) -> Iterator[Mutant]:
