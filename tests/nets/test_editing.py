@@ -260,8 +260,11 @@ def owned_otherwise(data: st.DataObject, text: str, net: Net) -> tuple[str, Net]
     if f"{owner}.{local}" in names:
         return text, net
     ends_with_comment = any(line.strip().startswith(f"{local}:") and "#c" in line for line in text.split("\n"))
-    if ends_with_comment and "places: {" in text:
-        return text, net  # it would have to go into a line, which is refused
+    in_a_line = "places: {" in text or re.search(rf"^ +{re.escape(owner)}: +\{{", text, re.MULTILINE) is not None
+    if ends_with_comment and in_a_line:
+        with pytest.raises(InputError, match="F1020"):  # it would have to go into a line
+            edited(text, lambda s: edits.own(s, Kind.PLACE, place.name, owner))
+        return text, net
     made = edited(text, lambda s: edits.own(s, Kind.PLACE, place.name, owner))
     owners = {place.name: place.owner or "" for place in net.places}
     owners |= {signal.name: signal.owner or "" for signal in net.signals}
