@@ -63,9 +63,14 @@ def check_faults(report: LoopReport, model: PlantModel, budget: Budget | None = 
     return tuple(ask_faults(report.asked, model, budget).verdicts())
 
 
-def ask_faults(asked: Answered, model: PlantModel, budget: Budget | None = None) -> FaultsAsked:
-    """Ask what the faults that the plant file declares do to a cell; `asked` are the answers without faults."""
-    net, live = asked.loop.cell, live_in(asked)
+def ask_faults(
+    asked: Answered, model: PlantModel, budget: Budget | None = None, live: tuple[str, ...] | None = None
+) -> FaultsAsked:
+    """Ask what the faults that the plant file declares do to a cell; `asked` are the answers without faults.
+
+    `live` are the transitions that a fault can take something of, unless somebody knows better those that may be live.
+    """
+    net, live = asked.loop.cell, live_in(asked) if live is None else live
     for_good, repaired = close(net, model, Faults.FOR_GOOD), close(net, model, Faults.REPAIRED)
     # Of a cell in which nothing is live, a fault takes nothing, and repair cannot give it back.
     recoveries = [_recovery(repaired, machine, live) for machine in repaired.failed] if live else []
@@ -86,7 +91,7 @@ def _for_good(loop: ClosedLoop, live: tuple[str, ...]) -> Iterator[Family]:
     for machine, failed in loop.failed.items() if live else ():
         yield Family(
             f"fault.{machine}",
-            f"when {machine} has failed for good, every transition can still fire again",
+            f"when {machine} has failed for good, all that is live without faults can still fire again",
             {name: _goes_on(f"fault.{machine}.t{i}", failed, fires(loop, name)) for i, name in enumerate(live)},
             Weight.INFORMATION,
             note=f"{machine} has failed, and {{}} can never fire again",
@@ -119,7 +124,7 @@ def _recovery(loop: ClosedLoop, machine: str, live: tuple[str, ...]) -> Family:
     mended = {name: possible(f"repair.{machine}.{i}", fires(loop, name)) for i, name in enumerate(live)}
     return Family(
         f"fault.{machine}.repaired",
-        f"after {machine} was repaired and goes on, every transition can fire again",
+        f"after {machine} was repaired and goes on, all that is live without faults can fire again",
         {**mended, "": possible(f"repair.{machine}", Not(Holds(failed)))},
         hint="something was lost while the machine stood still: see what the cell waits for at the end",
         note="from here {} can never fire again",

@@ -18,7 +18,7 @@ quick. An accident ends a run, so the others are asked of runs without one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import combinations
 from typing import Final
@@ -135,8 +135,13 @@ def ask_loop(net: Net, model: PlantModel, budget: Budget | None = None) -> Answe
 def live_in(asked: Answered) -> tuple[str, ...]:
     """The transitions of the cell that are live, or may be: those that `loop.live` is not violated for."""
     verdict = next(verdict for verdict in asked.verdicts if verdict.name == LIVE)
-    lost = verdict.subjects if verdict.status is Status.VIOLATED else ()
-    return tuple(name for name in asked.loop.variants if name not in lost)
+    return without(asked, verdict.subjects if verdict.status is Status.VIOLATED else ())
+
+
+def without(asked: Answered, lost: Iterable[str]) -> tuple[str, ...]:
+    """The transitions of the cell but for some."""
+    some = set(lost)
+    return tuple(name for name in asked.loop.variants if name not in some)
 
 
 def _families(loop: ClosedLoop) -> Iterator[Family]:

@@ -103,7 +103,7 @@ def _reachable(space: StateSpace[Any], of: Property) -> Answer:
     return no(hint="no reachable marking satisfies it; the whole state space was searched")
 
 
-def _possibilities(net: Net) -> int:
+def possibilities(net: Net) -> int:
     """How many properties say that something is always possible."""
     kinds = (of.kind for of in net.properties if isinstance(of, Property))
     return sum(kind is PropertyKind.ALWAYS_POSSIBLE for kind in kinds)
@@ -111,7 +111,7 @@ def _possibilities(net: Net) -> int:
 
 def _always_possible(space: StateSpace[Any], of: Property) -> Answer:
     targets = space.satisfying(of.formula)
-    if _possibilities(space.net) > _FEW and space.is_always_possible(targets):
+    if possibilities(space.net) > _FEW and space.is_always_possible(targets):
         return yes()
     lost = space.algebra.negation(space.backward(targets))
     witness = space.witness(lost, f"from here ({format_formula(of.formula)}) can never be reached again")

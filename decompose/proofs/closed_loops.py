@@ -12,7 +12,7 @@ here, as they were asked. Properties that are not asked of a loop (a deadlock, w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
 from typing import Final
 
@@ -20,7 +20,7 @@ from firable.analysis.evidence.document import Record
 from firable.analysis.goal import Limits
 from firable.analysis.loop.families import Answered, Family
 from firable.analysis.loop.faults import ask_faults
-from firable.analysis.loop.verdicts import ask_loop
+from firable.analysis.loop.verdicts import LIVE, ask_loop, without
 from firable.decompose.proofs.held_gates import EVIDENCE, held_gates
 from firable.nets.decomposition import Decomposition
 from firable.nets.machines.plant_file import parse_plant
@@ -43,31 +43,43 @@ def sealed_loops(
     as `close` does, and as `check` does.
     """
     net, model = decomposition.net, parse_plant(plant)
+    sealing = _Sealing(plant, limits)
     held = held_gates(decomposition, model)
+    sealing.add(EVIDENCE, held.asked, held.verdicts)
     loop = ask_loop(net, model)
-    faults = ask_faults(loop, model)
-    found = {EVIDENCE: held.asked, LOOP: loop}
-    found |= {} if faults.for_good is None else {FAILING: faults.for_good}
-    found |= {} if faults.repaired is None else {REPAIRED: faults.repaired}
-    method = f"closed loop with the machines of the plant {sha256(plant.encode()).hexdigest()}"
-    verdicts, files = list[Verdict](), {PLANT: plant}
-    for file, asked in found.items():
-        document = asked.document(limits())
-        files[file] = document.to_text()
+    lost = sealing.add(LOOP, loop, loop.verdicts)[LIVE]
+    # A fault takes nothing of what is not live without it: but only of what is shown not to be.
+    faults = ask_faults(loop, model, live=without(loop, lost))
+    for file, asked in ((FAILING, faults.for_good), (REPAIRED, faults.repaired)):
+        if asked is not None:
+            sealing.add(file, asked, asked.verdicts)
+    return tuple(sealing.verdicts), sealing.files
+
+
+class _Sealing:
+    """What a bundle comes to hold of the loops."""
+
+    def __init__(self, plant: str, limits: Callable[[], Limits]) -> None:
+        self.limits = limits
+        self.method = f"closed loop with the machines of the plant {sha256(plant.encode()).hexdigest()}"
+        self.verdicts: list[Verdict] = []
+        self.files = {PLANT: plant}
+
+    def add(self, file: str, asked: Answered, told: Sequence[Verdict]) -> dict[str, list[str]]:
+        """Add the document on a loop, and its verdicts; for each of what its violation is shown."""
+        document = asked.document(self.limits())
+        self.files[file] = document.to_text()
         records = {record.name: record for record in document.records}
-        told = held.verdicts if asked is held.asked else asked.verdicts
-        verdicts += _sealed(asked, told, records, file, method)
-    return tuple(verdicts), files
+        for family, verdict in zip(asked.families, told, strict=True):
+            unproved = verdict.weight is Weight.REQUIRED and not verdict.holds
+            self.verdicts.append(verdict if unproved else _as_shown(family, records, file, self.method))
+        return {family.name: _shown_to_fail(family, records) for family in asked.families}
 
 
-def _sealed(
-    asked: Answered, told: tuple[Verdict, ...], records: Mapping[str, Record], file: str, method: str
-) -> Iterator[Verdict]:
-    for family, verdict in zip(asked.families, told, strict=True):
-        if verdict.weight is Weight.REQUIRED and not verdict.holds:
-            yield verdict
-        else:
-            yield _as_shown(family, records, file, method)
+def _shown_to_fail(family: Family, records: Mapping[str, Record]) -> list[str]:
+    """Of what a family is about, that of which the document shows a violation."""
+    of = ((of, records.get(f"property.{prop.name}")) for of, prop in family.of.items())
+    return [one for one, record in of if record is not None and not record.proved and not record.lacking]
 
 
 def _as_shown(family: Family, records: Mapping[str, Record], file: str, method: str) -> Verdict:

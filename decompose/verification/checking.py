@@ -10,10 +10,11 @@ them anew. So everything is derived a second time, by code that shares nothing w
    the bundle speaks of the protocol of this very net, the net of that is made anew, too (`explored`), and what is left
    of the central net when somebody is dead (`outages`); where it says of which conceptual net and tasks its net is
    made, they are opened anew, and both nets related (`refinement`);
-4. where the bundle names machines, the loop that they close is closed anew, and its document must show of it that they
-   keep each gate that a vote relies on (`machines`); the verdicts on the central net must be those that its documents
-   of evidence show (`documents`), and each part that is free of promise must be one by the arcs, and its vote shown to
-   be persistent, by an obligation or a document (`free_parts`);
+4. where the bundle names machines, the loops that they close are closed anew, and their documents must show that they
+   keep each gate that a vote relies on, what the cell does with them, and what their faults lead to (`machines`); the
+   verdicts on the central net must be those that its documents of evidence show (`documents`), and each part that is
+   free of promise must be one by the arcs, and its vote shown to be persistent, by an obligation or a document
+   (`free_parts`);
 5. nothing is left over: no file that nobody needs, no verdict that nobody knows; and nothing is left out: each verdict
    that every net has is there, warnings too.
 

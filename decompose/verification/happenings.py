@@ -85,7 +85,7 @@ class Plant(Things):
             if self.sending is Sending.LATE:
                 yield changes | {f"unsent {p}": True for p in t.outputs if f"unsent {p}" in self.things}
                 return
-            commanding = [place for p in t.outputs if (place := self.net.place(p)).command is not None]
+            commanding = [place for place in self.commanding if place.name in t.outputs]
             yield from self.all_sent(commanding, changes, state)
 
     def sent_late(self, place: Place, state: State) -> Iterator[Changes]:
@@ -94,7 +94,7 @@ class Plant(Things):
             yield from self.all_sent([place], {f"unsent {place.name}": False}, state)
 
     def all_sent(self, places: list[Place], changes: Changes, state: State) -> Iterator[Changes]:
-        """Commands are sent one after the other; after an accident none is, and no sensor sees anything more."""
+        """Commands are sent in the order of the net; after an accident none is, and no sensor sees anything more."""
         if not places:
             yield from ({**changes, **seen} for seen in self.sensors_see(changes, state))
             return

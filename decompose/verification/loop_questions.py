@@ -105,7 +105,7 @@ class Asked:
             leaves = [Or((well, Not(Holds(place.name)))) for place in self.cell.places]
             yield Question(
                 f"fault.{machine}",
-                f"when {machine} has failed for good, every transition can still fire again",
+                f"when {machine} has failed for good, all that is live without faults can still fire again",
                 {name: self.possible(f"fault.{machine}.t{i}", fires[i]) for i, name in enumerate(live)},
                 Weight.INFORMATION,
             )
@@ -124,7 +124,7 @@ class Asked:
             well = Not(Holds(self.of(f"failed {machine}")))
             yield Question(
                 f"fault.{machine}.repaired",
-                f"after {machine} was repaired and goes on, every transition can fire again",
+                f"after {machine} was repaired and goes on, all that is live without faults can fire again",
                 {**asked, "": self.possible(f"repair.{machine}", well)},
             )
 

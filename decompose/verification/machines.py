@@ -70,9 +70,11 @@ def check_machines(examination: Examination, cut: Cut, answers: Answers, timeout
         raise _closes_nothing(error) from None
     judging = _Judging(examination, cut, model, f"{METHOD} {sha256(text.encode()).hexdigest()}", answers, timeout_ms)
     judging.judge(O4, Sending.LATE, Faults.NONE, lambda loop, _: _asked(cut, loop))
-    found = judging.judge(LOOP, Sending.AT_ONCE, Faults.NONE, lambda _, asked: asked.of_the_loop())
-    # What is live without faults: a fault takes nothing of the others.
-    live = [t.name for t in cut.net.transitions if t.name not in found["loop.live"]]
+    lost = judging.judge(LOOP, Sending.AT_ONCE, Faults.NONE, lambda _, asked: asked.of_the_loop())["loop.live"]
+    # A fault takes nothing of what is not live without it. What the document has no evidence on may be live, and what
+    # it has evidence on that could not be checked in time leaves the verdicts on faults without their premise.
+    live = [t.name for t in cut.net.transitions if t.name not in lost]
+    judging = replace(judging, premise="" if all(lost.values()) else "it rests on 'loop.live', which is not shown")
     if Plant(cut.net, model, faults=Faults.FOR_GOOD).may_fail:
         judging.judge(FAILING, Sending.AT_ONCE, Faults.FOR_GOOD, lambda _, asked: asked.of_faults(live))
     if live and Plant(cut.net, model, faults=Faults.REPAIRED).may_fail:
@@ -94,11 +96,16 @@ class _Judging:
     method: str
     answers: Answers
     timeout_ms: int
+    premise: str = ""
+    """What the verdicts rest on and is only claimed, if anything."""
 
     def judge(
         self, file: str, sending: Sending, faults: Faults, ask: Callable[[ClosedLoop, Asked], Iterable[Question]]
-    ) -> dict[str, tuple[str, ...]]:
-        """Judge the verdicts that one document shows, of one loop: for each, of what it is violated."""
+    ) -> dict[str, dict[str, bool]]:
+        """Judge the verdicts that one document shows, of one loop.
+
+        For each of them, of what there is evidence that it is violated, and whether that is shown.
+        """
         plant = Plant(self.cut.net, self.model, sending, faults)
         try:
             loop = close(self.cut.net, self.model, faults, sending)
@@ -122,7 +129,7 @@ class _Judging:
             found[one.record.name] = one
         return found
 
-    def judge_one(self, question: Question, file: str, records: Mapping[str, ShownRecord]) -> tuple[str, ...]:
+    def judge_one(self, question: Question, file: str, records: Mapping[str, ShownRecord]) -> dict[str, bool]:
         """Hold a verdict against the records of all that it comes down to: it must say what they say."""
         some = {of: records.get(f"property.{prop.name}") for of, prop in question.of.items()}
         decided = {of: one for of, one in some.items() if one is not None}
@@ -148,9 +155,10 @@ class _Judging:
         late = next((one.only_claimed for one in decided.values() if not one.shown), "")
         if status is Status.UNKNOWN:
             late = "undecided: the bundle itself does not say"
+        late = late or self.premise
         how = f"the loop closed anew with {PLANT}: {methods or 'there is nothing of the kind'}"
         self.examination.judge(verdict, shown=not late, method=how, only_claimed=late)
-        return subjects
+        return {of: decided[of].shown for of in against if not decided[of].record.lacking}
 
 
 def _asked(cut: Cut, loop: ClosedLoop) -> Iterator[Question]:

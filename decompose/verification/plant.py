@@ -77,7 +77,8 @@ class Things:
         places = self.things[thing]
         if all(isinstance(value, bool) for value in places):
             return [False, True]
-        return [value for value in places if not isinstance(value, str) or value not in self.stops]
+        never = self.stops if thing.startswith("at ") else ()
+        return [value for value in places if value not in never]
 
     @cached_property
     def start(self) -> State:

@@ -51,6 +51,8 @@ def by_happening(plant: Plant, transitions: Iterable[Transition]) -> dict[str, l
 
 
 def _compare_places(plant: Plant, loop: ClosedLoop) -> None:
+    if loop.net.signals or loop.net.arbiters or any(t.external for t in loop.net.transitions):
+        raise DiffersError("something of it waits for a signal, or is arbitrated")
     wanted: dict[str, bool] = {}
     for thing, places in plant.things.items():
         wanted |= {place: plant.start[thing] == value for value, place in places.items()}

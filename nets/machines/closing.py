@@ -198,7 +198,8 @@ class _Closing:
             (*((name, False) for name in transition.inputs), *((name, True) for name in transition.outputs)),
         )
         moments, ended = each(each([NOTHING], [own]), [self.applied(transition)]), list[Moment]()
-        for name in transition.outputs:
+        # In the order of the net, as the executor sends what one firing commands.
+        for name in sorted(transition.outputs, key=self.net.place_index.__getitem__):
             place = self.net.place(name)
             if place.command is None or name in self.unsent:
                 continue

@@ -238,6 +238,10 @@ def _inconsistencies(model: PlantModel) -> Iterator[tuple[tuple[str, ...], str, 
         path = ("machines", name)
         if name == "safe":
             yield path, "'safe' is the verdict on accidents, and no name for a machine", "rename the machine"
+        if name in stations:
+            yield path, "a station has this name, too", "rename one of them"
+        if whose := next((other for other in model.machines if name.startswith(f"{other}.")), None):
+            yield path, f"verdicts on '{whose}' have names like those on this machine", "rename it, without the dot"
         if machine.hand is not None and machine.hand not in machine.positions:
             yield (*path, "hand"), f"there is no position '{machine.hand}'", "see `positions` of the machine"
         for position, at in machine.positions.items():

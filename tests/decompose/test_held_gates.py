@@ -173,7 +173,7 @@ def test_a_command_that_overtakes_that_of_another_controller_is_found_though_at_
 
 def test_in_two_cells_a_robot_that_does_not_wait_meets_the_workpiece_that_a_late_conveyor_has_not_taken() -> None:
     text = catalogue_path("two_cells").with_name("two_cells.plant.yaml").read_text("utf-8")
-    impatient = text.replace("jitter_s: 0.2, when_full: wait}", "jitter_s: 0.2}")
+    impatient = text.replace("jitter_s: 0.2, when_full: wait, ", "jitter_s: 0.2, ")
     assert impatient != text
     found = []
     for plant, sending in ((text, Sending.LATE), (impatient, Sending.AT_ONCE), (impatient, Sending.LATE)):

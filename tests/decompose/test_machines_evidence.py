@@ -1,4 +1,4 @@
-"""O4 in a bundle: what shows that the machines keep what votes rely on, and that nothing else is taken for it."""
+"""The machines of a cell in a bundle: what shows of the four loops what is said of them, and nothing else does."""
 
 from dataclasses import replace
 from functools import cache
@@ -8,7 +8,11 @@ import pytest
 from support.bundle_mutants import evidence_mutants, verdict_mutants
 
 from firable.analysis.check import check
+from firable.analysis.evidence.document import Document, Record, document_from_text
+from firable.analysis.goal import Limits
 from firable.decompose.bundling import make_bundle
+from firable.decompose.proofs.closed_loops import sealed_loops
+from firable.decompose.splitting.cut import split
 from firable.decompose.verification import machines
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.checking import check_bundle
@@ -40,8 +44,12 @@ TIMEOUT_MS = 10_000
 FILES = {PLANT, O4, LOOP, FAILING, REPAIRED}
 
 
+def plant_of(name: str) -> str:
+    return catalogue_path(name).with_name(f"{name}.plant.yaml").read_text("utf-8")
+
+
 def plant() -> str:
-    return catalogue_path("one_robot").with_name("one_robot.plant.yaml").read_text("utf-8")
+    return plant_of("one_robot")
 
 
 @cache
@@ -184,6 +192,55 @@ def test_the_machines_of_another_cell_are_refused() -> None:
     other = catalogue_path("two_robots_shared").with_name("two_robots_shared.plant.yaml").read_text("utf-8")
     with pytest.raises(InputError, match=r"'plant\.yaml' closes no loop with the net"):
         check_bundle(resealed(bundled(), other))
+
+
+@pytest.mark.usefixtures("remembering", "unchanged")
+def test_faults_are_asked_of_every_transition_that_is_not_shown_to_be_lost_without_them() -> None:
+    """A loss that is claimed, and shown by nothing, would take the questions on faults away, which it is asked for."""
+    bundle = bundled()
+    loop, failing = (document_from_text(bundle.evidence[file]) for file in (LOOP, FAILING))
+    records = [
+        Record(record.name, False, (), "the time was over") if ".loop.live." in record.name else record
+        for record in loop.records
+    ]
+    accident = next(prop for prop in failing.net.properties if prop.name == "fault.accident")
+    alone = Document(
+        replace(failing.net, properties=(accident,)),
+        failing.discipline,
+        tuple(r for r in failing.records if r.name == "property.fault.accident"),
+    )
+    verdicts = [v for v in bundle.verdicts if not v.name.startswith("fault.") or v.name == "fault.safe"]
+    every = tuple(t.name for t in bundle.net.transitions)
+    verdicts = [
+        replace(v, status=Status.VIOLATED, evidence=(), subjects=every) if v.name == "loop.live" else v
+        for v in verdicts
+    ]
+    evidence = {file: text for file, text in bundle.evidence.items() if file != REPAIRED}
+    evidence |= {LOOP: replace(loop, records=tuple(records)).to_text(), FAILING: alone.to_text()}
+    with pytest.raises(InputError, match=r"'loop\.failing\.evidence\.json' is about another net"):
+        check_bundle(replace(bundle, verdicts=tuple(verdicts), evidence=evidence))
+
+
+@pytest.mark.usefixtures("remembering", "unchanged")
+def test_what_rests_on_a_loss_that_could_not_be_checked_in_time_is_only_claimed() -> None:
+    net, text = replace(catalogue_net("one_robot_mc_late"), properties=()), plant_of("one_robot_mc_late")
+    cut, decomposition = Cut(net), split(net)
+    verdicts, files = sealed_loops(decomposition, text, Limits)
+    assert {v.status for v in verdicts if v.name == "loop.live"} == {Status.VIOLATED}
+    examination = Examination(Bundle(decomposition, verdicts, files))
+    key = files[LOOP], net_digest(document_from_text(files[LOOP]).net)
+    check_machines(examination, cut, by_cvc5, TIMEOUT_MS)
+    assert all(one.shown for one in examination.checked.values() if one.verdict.holds or one.verdict.evidence)
+    found = _KNOWN[key]
+    assert not isinstance(found, NotShownError)
+    _KNOWN[key] = [
+        one if one.record.proved else replace(one, shown=False, only_claimed="the time was over") for one in found
+    ]
+    examination = Examination(examination.bundle)
+    check_machines(examination, cut, by_cvc5, TIMEOUT_MS)
+    of_faults = [one for name, one in examination.checked.items() if name.startswith("fault.")]
+    assert of_faults
+    assert {one.only_claimed for one in of_faults} == {"it rests on 'loop.live', which is not shown"}
 
 
 def test_a_plant_that_no_verdict_names_is_refused() -> None:

@@ -38,8 +38,9 @@ from firable.analysis.evidence.read_off import eager_cycle, read_off
 from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE
+from firable.analysis.verdicts.properties import possibilities
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
-from firable.nets.net import Marking, Property, PropertyKind, TemporalProperty
+from firable.nets.net import Marking, Property, TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
 from firable.nets.temporal import Logic, Temporal, TemporalAnd, TemporalNot, TemporalOr
 from firable.nets.verdict import Status, Verdict, Witness
@@ -309,18 +310,12 @@ class _Verdicts:
         if isinstance(of, TemporalProperty):
             return self._temporal(of.logic, of.formula, verdict, proved)
         claim = property_claim(of, proved=proved)
-        if claim.kind is ClaimKind.ALWAYS_POSSIBLE and self._possibilities > 1:
+        if claim.kind is ClaimKind.ALWAYS_POSSIBLE and possibilities(self.net) > 1:
             try:
                 return iter(self._from_home(claim.state_goal))
             except LackingError:
                 pass  # there is no home marking, or it is not known
         return self._one(claim, verdict.witness)
-
-    @cached_property
-    def _possibilities(self) -> int:
-        """How many properties say that something is always possible: of several, labels for one home marking do."""
-        kinds = (of.kind for of in self.net.properties if isinstance(of, Property))
-        return sum(kind is PropertyKind.ALWAYS_POSSIBLE for kind in kinds)
 
     @cached_property
     def _home_shown(self) -> tuple[Claim, Certificate] | str:
