@@ -111,7 +111,7 @@ def test_a_claim_that_stood_before_names_its_certificate_and_one_that_did_not_is
     other = document_from_text(replace(document, records=(document.records[0],)).to_text()).records[0].shown[0][1]
     assert other is not found.certificate
     whole = replace(document, records=(document.records[0], Record("", True, ((found.claim, other),)))).to_text()
-    assert "before" not in whole  # it is another certificate
+    assert '{"kind":"before"}' not in whole  # it is another certificate
     data = json.loads(text)
     data["verdicts"].reverse()
     with pytest.raises(InputError, match="no verdict before has"):
