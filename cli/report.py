@@ -116,6 +116,8 @@ class Report:
             data["standing"] = [asdict(line) for line in self.standing]
         if self.outages:
             data["outages"] = [_outage_to_json(outage) for outage in self.outages]
+        if self.faults:
+            data["faults"] = [_fault_to_json(fault) for fault in self.faults]
         if self.notes:
             data["notes"] = [diagnostic_to_json(note) for note in self.notes]
         data["verdicts"] = [verdict.to_json() for verdict in self.verdicts]
@@ -129,6 +131,15 @@ def _row_to_json(row: Coordinated) -> dict[str, Any]:
         "description": row.description,
         **({} if row.at is None else {"at": row.at}),
     }
+
+
+def _fault_to_json(one: OneFault) -> dict[str, Any]:
+    keys = ("blocked_safely", "stands_still", "resumes")
+    data: dict[str, Any] = {"fault": one.fault}
+    for key, found in zip(keys, one.findings, strict=True):
+        shown = {} if found.status is None else {"status": found.status.value, "by": list(found.by)}
+        data[key] = {"says": found.says, **shown}
+    return data
 
 
 def _outage_to_json(outage: Outage) -> dict[str, Any]:

@@ -3,9 +3,11 @@
 import json
 import re
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 from time import sleep
 
+import jsonschema
 import pytest
 from support.free_parts import freed
 
@@ -19,6 +21,7 @@ from firable.decompose.splitting.cut import split
 from firable.nets import read_net
 from firable.nets.verdict import Status, Verdict
 
+SCHEMA = json.loads(resources.files("firable.cli").joinpath("report.schema.json").read_text(encoding="utf-8"))
 NET = """\
 firable: 1
 cell: shuttle
@@ -245,7 +248,12 @@ def test_what_one_fault_does_is_not_proved_where_its_verdicts_are_not(
 
 def test_json_says_what_stands_still_and_goes_on(capsys: pytest.CaptureFixture[str], net: str) -> None:
     assert main(["prove", net, "--faults", "--format", "json"]) == 0
-    report = json.loads(capsys.readouterr().out)["reports"][0]
+    data = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator(SCHEMA).validate(data)
+    report = data["reports"][0]
+    lost = next(one for one in report["faults"] if one["fault"] == "a message is lost")
+    assert (lost["resumes"]["status"], lost["resumes"]["by"]) == ("proved", ["faults.resumes"])
+    assert "status" not in lost["stands_still"]  # no verdict says so
     robot = {"at_once": ["fetch"], "at_last": ["hand_over", "unload"], "goes_on": [], "still": [], "running": []}
     assert report["outages"][0] == {"dead": "robot", **robot}
 
