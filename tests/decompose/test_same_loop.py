@@ -44,8 +44,13 @@ def closed(
     return net, model, close(net, model, faults, sending)
 
 
-@pytest.mark.parametrize("name", CELLS)
-@pytest.mark.parametrize(("sending", "faults"), KINDS)
+@pytest.mark.parametrize(
+    ("name", "sending", "faults"),
+    [
+        *(("one_robot_timed", *kind) for kind in KINDS),
+        *((name, *kind) for name in CELLS if name != "one_robot_timed" for kind in (KINDS[0], KINDS[-1])),
+    ],
+)
 def test_the_loop_of_every_cell_of_the_catalogue_is_what_its_plant_file_says(
     name: str, sending: Sending, faults: Faults
 ) -> None:
@@ -74,7 +79,7 @@ def other_plants(model: PlantModel, seed: int) -> PlantModel:
 
 def test_both_readings_agree_on_plants_of_every_kind() -> None:
     count = 0
-    for seed in range(30):
+    for seed in range(24):
         net = catalogue_net(CELLS[seed % len(CELLS)])
         model = other_plants(catalogue_plant(CELLS[seed % len(CELLS)]), seed)
         sending, faults = KINDS[seed % len(KINDS)]
@@ -84,7 +89,7 @@ def test_both_readings_agree_on_plants_of_every_kind() -> None:
             continue  # a net that the plant does not fit
         count += 1
         assert compare(Plant(net, model, sending, faults), loop) > 1000
-    assert count > 15
+    assert count > 10
 
 
 # --------------------------------------------------------------------------------------------------------------------
