@@ -56,6 +56,8 @@ class ClaimRecord(Data):
                 else:
                     known(atom.transition, net.transition_index)
         fires = tuple(known(name, net.transition_index) for name in self.fires)
+        if self.kind is ClaimKind.FIRES and len(set(fires)) < len(fires):
+            raise ValueError("a transition is named twice among those that fire")
         return Claim(self.kind, goal, then, self.fairness, fires)
 
 

@@ -34,7 +34,7 @@ from firable.decompose.verification.votes import PREFIX, question_of, votes
 from firable.decompose.verification.words import SENTENCES, sentence_of, weight_of_conflicts
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula as StateFormula
-from firable.nets.interchange import net_digest
+from firable.nets.interchange import net_to_json
 from firable.nets.net import Net
 from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.trace import Discipline
@@ -104,7 +104,7 @@ def checked_document(
         document = document_from_text(text, file)
         if document.to_text() != text:
             raise NotShownError(f"'{file}' is not as it was written", "evidence", file)
-        if net_digest(document.net) != net_digest(net):
+        if net_to_json(document.net) != net_to_json(net):  # with all words, which a digest leaves out
             raise NotShownError(f"'{file}' is about another net", "evidence", file)
         if document.discipline is not Discipline.INTERLEAVING:
             raise NotShownError(f"'{file}' is about another discipline", "evidence", file)

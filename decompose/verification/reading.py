@@ -7,9 +7,9 @@
     assertion   ::= (assert term)
     term   ::= |VARIABLE| | WORD | true | false | (not term) | (and term term+) | (or term term+) | (= term term)
 
-where no operand of an `and` or an `or` stands there twice or is a constant, and none of a `not` is one or a `not`.
-Variables are declared in the order in which they first stand in what is asserted, definitions written out; these are
-numbered from 1, in their order.
+where no operand of an `and` or an `or` stands there twice or is a constant, and none of a `not` is one or a `not`. Each
+command has a line, and a line within it the indentation of its depth. Variables are declared in the order in which they
+first stand in what is asserted, definitions written out; these are numbered from 1, in their order.
 
 What a solver is asked could be bent by a command in between: an option, an assertion outside of the blocks, a variable
 that is declared and then defined. So the reader knows no other command, a word is one that the block has defined
@@ -25,7 +25,7 @@ from typing import Final
 
 from firable.decompose.verification.formulas import FALSE, TRUE, Formula, Formulas
 
-_TOKEN: Final = re.compile(r"""\s+|(\(|\)|\|[^|\\]*\||"[^"]*"|;[^\n]*|[^\s()|";]+)""")
+_TOKEN: Final = re.compile(r"""(\s*)(\(|\)|\|[^|\\]*\||"[^"]*"|;[^\n]*|[^\s()|";]+)""")
 _WORD: Final = re.compile(r"shared_*([1-9][0-9]*)")
 
 
@@ -71,14 +71,17 @@ class _Reader:
 
     @staticmethod
     def _tokens(text: str) -> Iterator[str]:
-        position = 0
-        while position < len(text):
+        position, depth, before = 0, 0, ""
+        while position < len(text.removesuffix("\n")):
             found = _TOKEN.match(text, position)
-            if found is None:
+            if found is None or not _is_laid_out(before, found[1], found[2], depth):
                 raise ReadingError(f"nothing may be written as {text[position : position + 20]!r}")
-            if found[1] is not None:
-                yield found[1]
+            before = found[2]
+            depth += {"(": 1, ")": -1}.get(before, 0)
+            yield before
             position = found.end()
+        if position != len(text) - 1:
+            raise ReadingError("the last line has an end, and nothing is behind it")
 
     def next(self) -> str:
         token = self.tokens[self.position]
@@ -181,6 +184,17 @@ class _Reader:
             case "=", 2:
                 return self.formulas.equal(*operands)
         raise ReadingError(f"nobody writes '{operator}' of these {len(operands)} operands")
+
+
+def _is_laid_out(before: str, blank: str, token: str, depth: int) -> bool:
+    """Whether there is what has to be between two words: a blank, or a line with its indentation, and nothing else."""
+    if not before:
+        return not blank
+    if depth == 0:  # a line for each command, and an empty one before the sentence of a block
+        return blank == ("\n\n" if token.startswith(";") and not before.startswith(";") else "\n")
+    if before == "(" or token == ")":
+        return not blank
+    return blank == " " or blank == "\n" + "  " * (depth - 1)
 
 
 def _in_order(names: dict[str, list[str]]) -> list[str]:

@@ -270,6 +270,19 @@ def test_every_change_of_a_word_of_an_obligation_is_refused(family: str) -> None
             assert family_refused(bundle, file, mutant), (token[0], words, token.start())
 
 
+@pytest.mark.parametrize("family", ["eq7", "eq9-10", "persistence"])
+def test_every_blank_more_or_less_in_an_obligation_is_refused(family: str) -> None:
+    bundle, file = bundled("workshop-1"), f"{family}.smt2"
+    text = bundle.evidence[file]
+    part = "\n\n".join(text.split("\n\n")[:4])
+    for blank in re.finditer(r"\n+ *|(?<=[)|a-z=]) (?=[(|a-z])", part[part.index("(push 1)") :]):
+        at = part.index("(push 1)") + blank.start()
+        for words in (f"{text[at]}{text[at]}", ""):
+            assert family_refused(bundle, file, text[:at] + words + text[at + 1 :]), (at, words)
+    assert family_refused(bundle, file, text.removesuffix("\n"))
+    assert family_refused(bundle, file, f"{text}\n")
+
+
 def test_weaker_assertions_and_sly_commands_are_refused() -> None:
     bundle = bundled("workshop-1")
     text = bundle.evidence["eq7.smt2"]

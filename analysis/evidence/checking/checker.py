@@ -157,7 +157,7 @@ def _checked(checker: _Checker, document: Document, record: Record) -> CheckedRe
         enough = suffices(net, discipline, record.name, record.proved, claims, query, checker.deadline)
     except TimeIsOverError as error:
         return CheckedRecord(record, shown=False, methods=methods, only_claimed=str(error))
-    if enough:
+    if enough and not record.lacking:
         return CheckedRecord(
             record, shown=True, methods=methods or (_BY_DEFINITION.get(record.name, "read off the net"),)
         )

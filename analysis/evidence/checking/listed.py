@@ -134,15 +134,18 @@ class Listed(Part):
         return [judged(targets[after] for _, after in row) for row in self.edges]
 
     def least(self, label: Label, through: Column, end: Column, *, every: bool) -> Column:
-        """The markings with a rank: 0 in the end, and elsewhere more than a next one has, or than all have."""
+        """The markings with a rank: 0 in the end, elsewhere one more than the nearest next one has, or the farthest.
+
+        One that is larger would show the same; asked for is the one rank that there is, so that no edit goes unnoticed.
+        """
         ranks = self._ranks(label)
-        judged = all if every else any
         for i, rank in enumerate(ranks):
             if rank < 0 or (rank == 0 and end[i]):
                 continue
-            row = self.edges[i]
-            nearer = bool(row) and judged(0 <= ranks[after] < rank for _, after in row)
-            if rank == 0 or not through[i] or not nearer:
+            row = [ranks[after] for _, after in self.edges[i]]
+            ranked = [one for one in row if one >= 0]
+            nearest = (max(ranked) if len(ranked) == len(row) else -1) if every and row else min(ranked, default=-1)
+            if rank == 0 or not through[i] or nearest < 0 or rank != nearest + 1:
                 refuse(f"nothing leads nearer to the goal from {shown(self.net, self.markings[i])}")
         return [rank >= 0 for rank in ranks]
 
