@@ -91,6 +91,7 @@ def make_bundle(
     dead, last_rites = tuple[Verdict, ...](), dict[str, str]()
     if faults:
         dead, last_rites = sealed_outages(decomposition, lambda: _anew(limits, seconds), timeout_ms)
+        dead = tuple(replace(v, bound=UNDECIDED) if v.status is Status.UNKNOWN else v for v in dead)
     held, machines = tuple[Verdict, ...](), dict[str, str]()
     if plant:
         held, machines = sealed_loops(decomposition, plant, lambda: _anew(limits, seconds))

@@ -21,7 +21,7 @@ from firable.nets.net import Net, SignalKind, Transition
 def check_free_parts(examination: Examination, cut: Cut) -> None:
     """Refuse a bundle that says of a part that it is free of promise and does not show it; verdicts are judged before.
 
-    Where a part is, all are that may be: the table is one, as everything else in a bundle is.
+    All are that may be: the table is one, as everything else in a bundle is.
 
     Raises `NotShownError`. Takes time linear in the arcs of the controllers' transitions, for each of their parts.
     """
@@ -30,7 +30,7 @@ def check_free_parts(examination: Examination, cut: Cut) -> None:
     if list(free) != [pair for pair in every if pair in set(free)]:
         raise NotShownError("the parts that are free of promise are not parts of the table, in its order", "table")
     subnets = {subnet.name: subnet for subnet in cut.subnets}
-    for transition, controller in every if free else ():
+    for transition, controller in every:
         name = next(part.name for part in cut.parts[transition] if part.controller == controller)
         subnet = subnets[controller]
         against = next(_against(subnet, next(t for t in subnet.transitions if t.name == name)), "")

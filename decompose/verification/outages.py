@@ -15,7 +15,7 @@ from typing import Final
 
 from firable.decompose.verification.bereft import ALIVE, DEAD, DYING, EARLY, Wake
 from firable.decompose.verification.checked import Examination
-from firable.decompose.verification.documents import answers_in, checked_document
+from firable.decompose.verification.documents import UNDECIDED, answers_in, checked_document
 from firable.decompose.verification.explored import Found, answered, refuted
 from firable.decompose.verification.outage_obligations import FILE, OF_ONE, OutageObligations
 from firable.decompose.verification.recut import Cut
@@ -48,7 +48,7 @@ def check_outages(examination: Examination, cut: Cut, answers: Answers, timeout_
         verdict = examination.verdict(wake.name)
         sentence = _SAYS.format(wake.told)
         if verdict.status is Status.UNKNOWN:
-            undecided = Verdict(wake.name, Status.UNKNOWN, sentence, METHOD, Weight.INFORMATION, bound=verdict.bound)
+            undecided = Verdict(wake.name, Status.UNKNOWN, sentence, METHOD, Weight.INFORMATION, bound=UNDECIDED)
             if verdict != undecided:
                 raise NotShownError(
                     f"the verdict on '{wake.name}' says more than that it is open", "verdicts", wake.name

@@ -53,7 +53,7 @@ class ObligationFile:
 def read_file(text: str, formulas: Formulas) -> ObligationFile:
     """Read a file; raises `ReadingError` for whatever is none.
 
-    >>> text = "; so\\n(set-logic QF_UF)\\n; it is\\n(push 1)\\n(echo \\"a\\")\\n(declare-const |p| Bool)\\n"
+    >>> text = "; so\\n(set-logic QF_UF)\\n\\n; it is\\n(push 1)\\n(echo \\"a\\")\\n(declare-const |p| Bool)\\n"
     >>> text += "(assert (not |p|))\\n(check-sat)\\n(pop 1)\\n"
     >>> of = Formulas()
     >>> read_file(text, of).blocks == (Block("a", "it is", (of.literal("p", False),)),)

@@ -72,6 +72,11 @@ def test_verdicts_on_the_protocol_of_a_net_are_on_the_one_with_the_free_parts_of
             check_bundle(other, solver="z3")
 
 
+def test_a_bundle_that_takes_the_freedom_of_all_parts_away_is_refused() -> None:
+    with pytest.raises(InputError, match="is free of promise, and the table does not say so"):
+        check_bundle(saying(()))
+
+
 def others() -> list[tuple[str, str]]:
     """The parts that are not free."""
     rows = cell().decomposition.coordinated

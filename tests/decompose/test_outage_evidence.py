@@ -6,6 +6,7 @@ Evidence shows it, and nothing else passes for it.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache, partial
+from typing import Any
 
 import pytest
 from support.bundle_mutants import evidence_mutants, line_mutants, verdict_mutants
@@ -29,6 +30,7 @@ from firable.decompose.verification import documents
 from firable.decompose.verification import outages as checked_outages
 from firable.decompose.verification.bereft import PREFIX, Wake, wakes
 from firable.decompose.verification.checked import Examination
+from firable.decompose.verification.documents import UNDECIDED
 from firable.decompose.verification.explored import check_explored
 from firable.decompose.verification.outage_obligations import OutageObligations
 from firable.decompose.verification.outages import check_outages
@@ -511,7 +513,7 @@ def test_an_obligation_that_is_refuted_leaves_the_others_shown_where_the_bundle_
     with pytest.raises(NotShownError, match=r"'at-once\.dead\.a' of 'dead\.smt2' is refuted"):
         check_outages(Examination(bundle), Cut(bundle.net), refuting, TIMEOUT_MS)
     (said,) = (verdict for verdict in bundle.verdicts if verdict.name == f"{PREFIX}.a")
-    doubted = replace(said, status=Status.UNKNOWN, evidence=(), subjects=(), hint="", bound="z3 refutes it")
+    doubted = replace(said, status=Status.UNKNOWN, evidence=(), subjects=(), hint="", bound=UNDECIDED)
     verdicts = tuple(doubted if verdict is said else verdict for verdict in bundle.verdicts)
     honest = replace(
         bundle, verdicts=verdicts, evidence={f: t for f, t in bundle.evidence.items() if f != said.evidence[0]}
@@ -572,10 +574,15 @@ def test_a_verdict_on_who_is_dead_may_be_left_open_and_says_nothing_else() -> No
     i = next(i for i, verdict in enumerate(bundle.verdicts) if verdict.name.startswith(PREFIX))
     first, others = bundle.verdicts[i], (*bundle.verdicts[:i], *bundle.verdicts[i + 1 :])
     rest = {file: text for file, text in bundle.evidence.items() if file != first.evidence[0]}
-    doubted = replace(first, status=Status.UNKNOWN, evidence=(), subjects=(), hint="", bound="no time")
+    doubted = replace(first, status=Status.UNKNOWN, evidence=(), subjects=(), hint="", bound=UNDECIDED)
     checked = examined(replace(bundle, verdicts=(*others, doubted), evidence=rest)).checked
     assert [name for name, one in checked.items() if not one.shown] == [first.name]
-    for changed in (replace(doubted, hint="all goes on"), replace(doubted, subjects=first.subjects)):
+    edits: tuple[dict[str, Any], ...] = (
+        {"hint": "all goes on"},
+        {"subjects": first.subjects},
+        {"bound": "proved by hand"},
+    )
+    for changed in (replace(doubted, **edit) for edit in edits):
         mutant = replace(bundle, verdicts=(*others, changed), evidence=rest)
         assert refused(partial(replace, mutant))
 
