@@ -6,6 +6,7 @@ import asyncio
 from itertools import permutations
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from support.hosts import Cell, ended_within
@@ -47,8 +48,8 @@ class Frozen:
         self.heard: list[tuple[str, str, Message]] = []
         self.said: list[tuple[str, str, Message]] = []
         self.link.listener = self
-        # A link that stands still is one whose method is put aside: mypy allows no method to be assigned.
-        self.link.send = lambda *said: self.said.append(said)  # type: ignore[method-assign]
+        self.standing = patch.object(self.link, "send", lambda *said: self.said.append(said))
+        self.standing.start()
         asyncio.get_running_loop().call_later(lease_seconds, self.exchange.cut, self.link)
 
     def arrived(self, *heard: Any) -> None:
@@ -56,7 +57,8 @@ class Frozen:
 
     def thaw(self) -> None:
         """It goes on: with what it was about to say, and with what has come meanwhile."""
-        self.link.listener, self.link.send = self.listener, self.send  # type: ignore[method-assign]
+        self.link.listener = self.listener
+        self.standing.stop()
         self.exchange.mend(self.link)
         for said in self.said:
             self.send(*said)
