@@ -241,12 +241,14 @@ def _document(record: EvidenceRecord) -> Document:
             if not verdict.name.startswith("query."):
                 raise ValueError(f"'{verdict.name}' is no query, and comes with the text of one")
             parse_query(verdict.query)
-        shown = []
+        shown, claims = [], set[Claim]()
         for one in verdict.shown:
-            claim = one.claim.of(net)
-            of = one.certificate
+            claim, of = one.claim.of(net), one.certificate
+            if claim in claims:
+                raise ValueError(f"'{claim}' is shown twice for one verdict")
             certificate = before.certificate(claim) if isinstance(of, BeforeRecord) else of.of(net, sets)
             before.has(claim, certificate)
+            claims.add(claim)
             shown.append((claim, certificate))
         records.append(Record(verdict.name, verdict.status == "proved", tuple(shown), verdict.lacking, verdict.query))
     return Document(net, Discipline(record.discipline), tuple(records))

@@ -210,6 +210,24 @@ def test_an_edited_certificate_that_is_sealed_anew_is_refused_or_a_proof_all_the
     assert refused
 
 
+@pytest.mark.parametrize("example", ["distances", "labels", "weak", "strong"], indirect=True)
+def test_no_edit_of_ranks_shows_the_same(example: Evidence) -> None:
+    data = json.loads(text_of(example))
+    shown = data["verdicts"][0]["shown"][0]
+    edits = list(_edits(shown["certificate"]))
+    assert edits
+    for edited in edits:
+        shown["certificate"] = edited
+        assert refuses(sealed(data)), edited
+
+
+def test_a_claim_that_is_shown_twice_is_refused(example: Evidence) -> None:
+    data = json.loads(text_of(example))
+    verdict = data["verdicts"][0]
+    verdict["shown"] += verdict["shown"]
+    assert refuses(sealed(data))
+
+
 def test_every_obligation_is_discharged_by_a_second_solver(example: Evidence) -> None:
     texts = [obligation.text(example) for obligation in obligations(example)]
     assert {by_cvc5(text) for text in [*texts, *filter(None, [sums_text(example)])]} <= {"unsat"}

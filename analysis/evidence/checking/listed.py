@@ -136,27 +136,34 @@ class Listed(Part):
     def least(self, label: Label, through: Column, end: Column, *, every: bool) -> Column:
         """The markings with a rank: 0 in the end, elsewhere one more than the nearest next one has, or the farthest.
 
-        One that is larger would show the same; asked for is the one rank that there is, so that no edit goes unnoticed.
+        Larger ones would show the same, and so would fewer. Asked for is the one rank that each marking can have from
+        those after it, none where it can have none, so that no edit of a rank goes unnoticed.
         """
         ranks = self._ranks(label)
         for i, rank in enumerate(ranks):
-            if rank < 0 or (rank == 0 and end[i]):
-                continue
-            row = [ranks[after] for _, after in self.edges[i]]
-            ranked = [one for one in row if one >= 0]
-            nearest = (max(ranked) if len(ranked) == len(row) else -1) if every and row else min(ranked, default=-1)
-            if rank == 0 or not through[i] or nearest < 0 or rank != nearest + 1:
-                refuse(f"nothing leads nearer to the goal from {shown(self.net, self.markings[i])}")
+            if rank != (0 if end[i] else self._above(ranks, i, every=every) if through[i] else -1):
+                refuse(f"{shown(self.net, self.markings[i])} has not the rank that follows from the ranks after it")
         return [rank >= 0 for rank in ranks]
 
+    def _above(self, ranks: Sequence[int], at: int, *, every: bool) -> int:
+        """The rank that a marking has from those after it: -1 where they have none."""
+        after = [ranks[one] for _, one in self.edges[at]]
+        ranked = [one for one in after if one >= 0]
+        if not ranked or (every and len(ranked) < len(after)):
+            return -1
+        return 1 + (max(ranked) if every else min(ranked))
+
     def greatest(self, label: Label, end: Column, through: Column, *, every: bool) -> Column:
-        """The markings with a rank: `through` holds there, and with it the end, or a next one has a rank, or all."""
+        """The markings with rank 0: `through` holds there, and with it the end, or a next one has a rank, or all.
+
+        The others have -1, and none of them could have a rank because those after it have.
+        """
         ranks = [0] * len(self.markings) if isinstance(label, Whole) else self._ranks(label)
         judged = all if every else any
         for i, rank in enumerate(ranks):
             row = self.edges[i]
             stays = end[i] or not row or judged(ranks[after] >= 0 for _, after in row)
-            if rank >= 0 and not (through[i] and stays):
+            if rank != (0 if through[i] and stays else -1):
                 refuse(f"what is to hold always ends in {shown(self.net, self.markings[i])}")
         return [rank >= 0 for rank in ranks]
 
