@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -86,6 +87,8 @@ class MarkingsRecord(Data):
         markings = tuple(int(marking, 16) for marking in self.markings)
         if any(marking >> len(net.places) for marking in markings):
             raise ValueError("a marking holds a place that the net does not have")
+        if any(one >= after for one, after in pairwise(markings)):
+            raise ValueError("the markings of a set are not in order, the smallest first")
         return Markings(markings)
 
 

@@ -32,6 +32,7 @@ import json
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -62,7 +63,8 @@ _GZIP: Final = b"\x1f\x8b"
 class Record:
     """What is shown for one verdict: claims with their certificates, or why there are none.
 
-    A record without a name is that of claims that belong to no verdict. `query` is the text of a query's own.
+    The claims are in order (`order_of`), each once. A record without a name is that of claims that belong to no
+    verdict. `query` is the text of a query's own.
     """
 
     name: str
@@ -135,6 +137,11 @@ class _Before:
         if claim not in self.known:
             raise ValueError(f"no verdict before has '{claim}'")
         return self.known[claim]
+
+
+def order_of(claim: Claim) -> bytes:
+    """By what the claims of a record are put in order."""
+    return canonical_json(claim_to_json(claim))
 
 
 def _laid_out(data: Mapping[str, Any]) -> str:
@@ -241,14 +248,13 @@ def _document(record: EvidenceRecord) -> Document:
             if not verdict.name.startswith("query."):
                 raise ValueError(f"'{verdict.name}' is no query, and comes with the text of one")
             parse_query(verdict.query)
-        shown, claims = [], set[Claim]()
+        shown = []
         for one in verdict.shown:
             claim, of = one.claim.of(net), one.certificate
-            if claim in claims:
-                raise ValueError(f"'{claim}' is shown twice for one verdict")
             certificate = before.certificate(claim) if isinstance(of, BeforeRecord) else of.of(net, sets)
             before.has(claim, certificate)
-            claims.add(claim)
             shown.append((claim, certificate))
+        if any(one >= after for one, after in pairwise(order_of(claim) for claim, _ in shown)):
+            raise ValueError(f"the claims of '{verdict.name}' are not in order, each once")
         records.append(Record(verdict.name, verdict.status == "proved", tuple(shown), verdict.lacking, verdict.query))
     return Document(net, Discipline(record.discipline), tuple(records))

@@ -129,6 +129,11 @@ class ReachabilityGraph(Derived["Column"]):
         return engine_limits(self.deadline)
 
     @cached_property
+    def ascending(self) -> list[int]:
+        """The numbers of all markings, smallest marking first: the order in which a list of them is written."""
+        return sorted(range(self.n_markings), key=self.marking)
+
+    @cached_property
     def witnesses(self) -> Witnesses:
         """What replays every witness."""
         return Witnesses(self.net, self.discipline)

@@ -53,16 +53,28 @@ ShownRecord: TypeAlias = CheckedRecord
 class _Shown:
     """What the documents show: the record of each name with its file, and the answers to each question.
 
-    Two parts may ask the same, where two transitions read one place: then there are two answers.
+    Two parts may ask the same, where two transitions read one place: then there are two answers. `order` holds the
+    records of each file that no verdict has taken so far: they stand there in the order of the verdicts.
     """
 
     records: dict[str, tuple[CheckedRecord, str]] = field(default_factory=dict)
     questions: dict[tuple[ClaimKind, Formula], list[tuple[CheckedRecord, str]]] = field(default_factory=dict)
+    order: dict[str, list[CheckedRecord]] = field(default_factory=dict)
 
     def answer(self, kind: ClaimKind, question: Formula) -> tuple[CheckedRecord, str] | None:
         """The next answer of this kind to a question, which is no other verdict's then."""
         waiting = self.questions.get((kind, question))
-        return waiting.pop(0) if waiting else None
+        return self._taken(waiting.pop(0)) if waiting else None
+
+    def record(self, name: str) -> tuple[CheckedRecord, str] | None:
+        """The record on a verdict of this name, which is no other verdict's then."""
+        return self._taken(self.records.pop(name)) if name in self.records else None
+
+    def _taken(self, found: tuple[CheckedRecord, str]) -> tuple[CheckedRecord, str]:
+        record, file = found
+        if record is not self.order[file].pop(0):
+            raise NotShownError(f"the records of '{file}' are in another order than the verdicts", "evidence", file)
+        return found
 
 
 def check_verdicts_on_the_net(examination: Examination, answers: Answers, timeout_ms: int) -> None:
@@ -118,7 +130,8 @@ def checked_document(
 def _read(
     examination: Examination, file: str, answers: Answers, timeout_ms: int, formulas: Formulas, shown: _Shown
 ) -> None:
-    for one in checked_document(examination, file, examination.bundle.net, answers, timeout_ms):
+    shown.order[file] = checked_document(examination, file, examination.bundle.net, answers, timeout_ms)
+    for one in shown.order[file]:
         record = one.record
         if record.name:
             if record.name in shown.records or record.query:
@@ -179,7 +192,7 @@ def _judge_votes(examination: Examination, formulas: Formulas, shown: _Shown) ->
 
 def _judge_on_the_net(examination: Examination, verdict: Verdict, words: Words, shown: _Shown) -> None:
     sentence, weights = words
-    found = shown.records.pop(verdict.name, None)
+    found = shown.record(verdict.name)
     proved = found is not None and found[0].record.proved
     weight = min(weights) if len(weights) == 1 else weight_of_conflicts(examination.bundle.net, proved=verdict.holds)
     _judge(examination, verdict, sentence, weight, found, proved=proved)

@@ -8,8 +8,9 @@
     term   ::= |VARIABLE| | WORD | true | false | (not term) | (and term term+) | (or term term+) | (= term term)
 
 where no operand of an `and` or an `or` stands there twice or is a constant, and none of a `not` is one or a `not`. Each
-command has a line, and a line within it the indentation of its depth. Variables are declared in the order in which they
-first stand in what is asserted, definitions written out; these are numbered from 1, in their order.
+command has a line; a term that is longer than a line, or holds one that is, has a line for each operand, indented by
+its depth. Variables are declared in the order in which they first stand in what is asserted, definitions written out;
+these are numbered from 1, in their order.
 
 What a solver is asked could be bent by a command in between: an option, an assertion outside of the blocks, a variable
 that is declared and then defined. So the reader knows no other command, a word is one that the block has defined
@@ -26,6 +27,8 @@ from typing import Final
 from firable.decompose.verification.formulas import FALSE, TRUE, Formula, Formulas
 
 _TOKEN: Final = re.compile(r"""(\s*)(\(|\)|\|[^|\\]*\||"[^"]*"|;[^\n]*|[^\s()|";]+)""")
+_LINE_MAX: Final = 110
+"""The characters of a term on one line."""
 _WORD: Final = re.compile(r"shared_*([1-9][0-9]*)")
 
 
@@ -62,20 +65,46 @@ def read_file(text: str, formulas: Formulas) -> ObligationFile:
     return _Reader(text, formulas).file()
 
 
+class _Term:
+    """A term that is being read, and how it stands there: on one line, or with a line for each operand."""
+
+    def __init__(self, operator: str, begins_line: bool) -> None:
+        self.operator, self.begins_line = operator, begins_line
+        self.operands: list[Formula] = []
+        self.length = len("(") + len(operator)  # on one line
+        self.has_long = False
+        self.breaks: set[bool] = set()  # whether operands begin a line
+
+    def take(self, value: Formula, length: int, *, begins_line: bool, is_long: bool) -> None:
+        self.operands.append(value)
+        self.length += len(" ") + length
+        self.has_long |= is_long
+        self.breaks.add(begins_line)
+
+    def laid_out(self) -> bool:
+        """Whether it has more than one line; raises `ReadingError` where it has and needs not, or needs and has not."""
+        is_long = self.has_long or self.length + len(")") > _LINE_MAX
+        if self.breaks != {is_long}:
+            raise ReadingError(f"the lines of '{self.operator}' are not as they are written")
+        return is_long
+
+
 class _Reader:
     def __init__(self, text: str, formulas: Formulas) -> None:
         self.formulas = formulas
+        self.broken: list[bool] = []  # whether each token begins a line
         self.tokens = list(self._tokens(text))
         self.tokens.append("")  # behind the last
+        self.broken.append(False)
         self.position = 0
 
-    @staticmethod
-    def _tokens(text: str) -> Iterator[str]:
+    def _tokens(self, text: str) -> Iterator[str]:
         position, depth, before = 0, 0, ""
         while position < len(text.removesuffix("\n")):
             found = _TOKEN.match(text, position)
             if found is None or not _is_laid_out(before, found[1], found[2], depth):
                 raise ReadingError(f"nothing may be written as {text[position : position + 20]!r}")
+            self.broken.append(found[1].startswith("\n"))
             before = found[2]
             depth += {"(": 1, ")": -1}.get(before, 0)
             yield before
@@ -153,14 +182,17 @@ class _Reader:
         return Block(name[1:-1], sentences[0], tuple(asserted))
 
     def term(self, declared: dict[str, Formula], defined: dict[str, Formula], names: list[str]) -> Formula:
-        stack: list[tuple[str, list[Formula]]] = []
+        stack: list[_Term] = []
         while True:
-            token = self.next()
+            begins_line, token = self.broken[self.position], self.next()
             if token == "(":
-                stack.append((self.next(), []))
+                stack.append(_Term(self.next(), begins_line))
                 continue
+            length, is_long = len(token), False
             if token == ")" and stack:
-                value = self._applied(*stack.pop())
+                ended = stack.pop()
+                value, begins_line = self._applied(ended.operator, ended.operands), ended.begins_line
+                length, is_long = ended.length + 1, ended.laid_out()
             elif token in declared:
                 names.append(token)
                 value = declared[token]
@@ -173,7 +205,7 @@ class _Reader:
                 raise ReadingError(f"{token!r} is nothing that was declared")
             if not stack:
                 return value
-            stack[-1][1].append(value)
+            stack[-1].take(value, length, begins_line=begins_line, is_long=is_long)
 
     def _applied(self, operator: str, operands: list[Formula]) -> Formula:
         match operator, len(operands):
@@ -194,7 +226,7 @@ def _is_laid_out(before: str, blank: str, token: str, depth: int) -> bool:
         return blank == ("\n\n" if token.startswith(";") and not before.startswith(";") else "\n")
     if before == "(" or token == ")":
         return not blank
-    return blank == " " or blank == "\n" + "  " * (depth - 1)
+    return blank == " " or (depth > 1 and blank == "\n" + "  " * (depth - 1))
 
 
 def _in_order(names: dict[str, list[str]]) -> list[str]:

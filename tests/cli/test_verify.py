@@ -123,7 +123,7 @@ def test_the_evidence_of_a_deadlock_is_the_way_into_it(tmp_path: Path) -> None:
 def test_a_net_too_large_to_list_has_an_invariant_as_evidence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["catalogue:token_ring-40", "--max-seconds", "5", "--evidence", str(tmp_path), "--no-cache"]
+    arguments = ["catalogue:token_ring-40", "--max-seconds", "60", "--evidence", str(tmp_path), "--no-cache"]
     main(["check", *arguments, "--method", "k-induction"])
     (path,) = tmp_path.iterdir()
     record = next(v for v in json.loads(path.read_text())["verdicts"] if v["name"] == "deadlock-free")

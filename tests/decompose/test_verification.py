@@ -283,6 +283,21 @@ def test_every_blank_more_or_less_in_an_obligation_is_refused(family: str) -> No
     assert family_refused(bundle, file, f"{text}\n")
 
 
+@pytest.mark.parametrize("family", ["eq7", "eq9-10", "persistence"])
+def test_every_other_division_into_lines_is_refused(family: str) -> None:
+    bundle, file = bundled("workshop-1"), f"{family}.smt2"
+    text = bundle.evidence[file]
+    part = "\n\n".join(text.split("\n\n")[:4])
+    inside = re.finditer(r"(?<=[)|a-z=]) (?=[(|a-z])|\n +", part[part.index("(push 1)") :])
+    ends = [(part.index("(push 1)") + blank.start(), part.index("(push 1)") + blank.end()) for blank in inside]
+    assert ends
+    for start, end in ends:
+        before = text[text.rfind("\n(", 0, start) : start]
+        indented = "\n" + "  " * (before.count("(") - before.count(")") - 1)
+        words = " " if text[start] == "\n" else indented
+        assert family_refused(bundle, file, text[:start] + words + text[end:]), (start, words)
+
+
 def test_weaker_assertions_and_sly_commands_are_refused() -> None:
     bundle = bundled("workshop-1")
     text = bundle.evidence["eq7.smt2"]
@@ -356,6 +371,22 @@ def without_evidence_on(bundle: Bundle, *names: str) -> Bundle:
     text = replace(document, records=records).to_text()
     verdicts = tuple(replace(v, evidence=()) if v.name in names else v for v in bundle.verdicts)
     return replace(bundle, verdicts=verdicts, evidence={**bundle.evidence, file: text})
+
+
+@pytest.mark.usefixtures("remembering")
+def test_records_and_claims_of_a_document_in_another_order_are_refused() -> None:
+    bundle, file = bundled("one_robot"), "check.evidence.json"
+    document = document_from_text(bundle.evidence[file], file)
+    first, second, *others = document.records
+    of_many = next(record for record in document.records if len(record.shown) > 1)
+    turned = replace(of_many, shown=of_many.shown[::-1])
+    for records in (
+        (second, first, *others),
+        tuple(turned if record is of_many else record for record in document.records),
+    ):
+        text = replace(document, records=records).to_text()
+        with pytest.raises(InputError, match="order"):
+            check_bundle(replace(bundle, evidence={**bundle.evidence, file: text}))
 
 
 @pytest.mark.usefixtures("remembering")

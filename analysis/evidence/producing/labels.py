@@ -46,7 +46,7 @@ class TooLargeError(Exception):
 
 def listed(graph: ReachabilityGraph) -> Markings:
     """The markings of a complete graph."""
-    return Markings(tuple(graph.marking(i) for i in range(graph.n_markings)))
+    return Markings(tuple(map(graph.marking, graph.ascending)))
 
 
 def drawn(space: SymbolicSpace, sets: Sequence[Any] = ()) -> Diagram:
@@ -64,7 +64,7 @@ def labelling(space: StateSpace[Any], whole: Markings | Diagram, formula: Tempor
     Raises `TooLargeError`, `BudgetExceeded`.
     """
     root = normal(formula)
-    made = _Labels(space)
+    made = _Labels(space, space.ascending if isinstance(space, ReachabilityGraph) else [])
     if not space.contains(made.of(root), space.net.initial_marking):
         return None
     labels = tuple(made.labels[one] for one in fixpoints(root))
@@ -78,6 +78,7 @@ class _Labels:
     """The markings in which each part of a formula holds, and the label of each fixpoint."""
 
     space: StateSpace[Any]
+    order: list[int]  # in which the markings are listed, where they are
     known: dict[Node, Any] = field(default_factory=dict)
     labels: dict[Node, Label] = field(default_factory=dict)
     roots: list[Any] = field(default_factory=list)
@@ -131,7 +132,7 @@ class _Labels:
             ranks = np.full(space.n_markings, -1, dtype=np.int64)
             for rank, column in reversed(list(enumerate(rounds))):
                 ranks[np.asarray(column)] = rank
-            self.labels[node] = Ranks(tuple(ranks.tolist()))
+            self.labels[node] = Ranks(tuple(ranks[self.order].tolist()))
         return found
 
     def _back(self, space: SymbolicSpace, node: Node, through: Any, end: Any) -> Any:
@@ -176,5 +177,5 @@ class _Labels:
             self.roots.append(found)
             self.labels[node] = Root(len(self.roots))
         else:
-            self.labels[node] = Ranks(tuple(np.where(np.asarray(found), 0, -1).tolist()))
+            self.labels[node] = Ranks(tuple(np.where(np.asarray(found), 0, -1)[self.order].tolist()))
         return found

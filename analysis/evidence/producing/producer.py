@@ -17,7 +17,7 @@ from firable.analysis.evidence.certificate import Certificate, FiringSequence
 from firable.analysis.evidence.checking.obligations import played
 from firable.analysis.evidence.checking.runs import holds
 from firable.analysis.evidence.claims import TRUE, Claim, ClaimKind, is_marking, temporal_claim, tidy
-from firable.analysis.evidence.document import Document, Record
+from firable.analysis.evidence.document import Document, Record, order_of
 from firable.analysis.evidence.meaning import (
     commands,
     commands_clash,
@@ -98,6 +98,7 @@ class _Verdicts:
         claims = [claim for claim, _ in shown]
         if not lacking and not suffices(net, discipline, verdict.name, proved, claims, query):
             lacking = "no certificate is known for this verdict"
+        shown.sort(key=lambda one: order_of(one[0]))
         return Record(verdict.name, proved, tuple(shown), lacking, "" if query is None else format_query(query))
 
     def _one(self, claim: Claim, witness: Witness | None = None) -> Iterator[tuple[Claim, Certificate]]:

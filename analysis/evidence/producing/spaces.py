@@ -88,7 +88,7 @@ class Spaces:
             if i % _CLOCK_EVERY == 0 and self.limits.deadline.over:
                 return None
             found.append(graph.marking(i))
-        return Markings(tuple(found))
+        return Markings(tuple(sorted(found)))
 
     @cached_property
     def symbolic(self) -> SymbolicSpace | None:

@@ -50,5 +50,6 @@ def _written(net: Net, search: Search) -> StubbornSets | None:
     digits = search.n_markings * -(-len(net.places) // 4) + len(sets) * -(-len(net.transitions) // 4)
     if digits > DIGITS_MAX:
         return None
-    markings = Markings(tuple(search.marking(i) for i in range(search.n_markings)))
-    return StubbornSets(markings, tuple(sum(1 << t for t in one) for one in sets), tuple(chosen))
+    listed = sorted((search.marking(i), chosen[i]) for i in range(search.n_markings))
+    of_each = tuple(sum(1 << t for t in one) for one in sets)
+    return StubbornSets(Markings(tuple(m for m, _ in listed)), of_each, tuple(of for _, of in listed))

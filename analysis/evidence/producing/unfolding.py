@@ -35,7 +35,7 @@ def unfolded_markings(net: Net, formula: Temporal, most: int, deadline: Deadline
         return None
     except TimeIsOverError:
         raise BudgetExceeded("the time was over") from None
-    return Markings(tuple(growing.markings[at] for at in growing.asked))
+    return Markings(tuple(sorted(growing.markings[at] for at in growing.asked)))
 
 
 class Growing:
