@@ -57,8 +57,9 @@ class ClaimRecord(Data):
                 else:
                     known(atom.transition, net.transition_index)
         fires = tuple(known(name, net.transition_index) for name in self.fires)
-        if self.kind is ClaimKind.FIRES and len(set(fires)) < len(fires):
-            raise ValueError("a transition is named twice among those that fire")
+        turns = [net.transition_index[name] for name in fires]
+        if self.kind is ClaimKind.FIRES and turns != sorted(set(turns)):
+            raise ValueError("the transitions that fire are not in the order of the net, each once")
         return Claim(self.kind, goal, then, self.fairness, fires)
 
 

@@ -228,6 +228,14 @@ def test_a_claim_that_is_shown_twice_is_refused(example: Evidence) -> None:
     assert refuses(sealed(data))
 
 
+@pytest.mark.parametrize("example", ["fires"], indirect=True)
+@pytest.mark.parametrize("fires", [["go", "tock"], ["tock", "tock", "go"]])
+def test_transitions_that_fire_are_in_order_each_once(example: Evidence, fires: list[str]) -> None:
+    data = json.loads(text_of(example))
+    data["verdicts"][0]["shown"][0]["claim"]["fires"] = fires
+    assert refuses(sealed(data))
+
+
 def test_every_obligation_is_discharged_by_a_second_solver(example: Evidence) -> None:
     texts = [obligation.text(example) for obligation in obligations(example)]
     assert {by_cvc5(text) for text in [*texts, *filter(None, [sums_text(example)])]} <= {"unsat"}

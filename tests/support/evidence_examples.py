@@ -167,7 +167,7 @@ EXAMPLES: dict[str, Callable[[], Evidence | None]] = {
     "reduced to a part": lambda: reduced(family_net("philosophers-3"), BOTH_EAT),
     "continuation": lambda: certified(family_net("philosophers-3"), Claim(ClaimKind.LOST, Start())),
     "fires": lambda: _invented(
-        TURNS, Claim(ClaimKind.FIRES, Holds("b"), fires=("go", "tock")), "tick tock tick go tock"
+        TURNS, Claim(ClaimKind.FIRES, Holds("b"), fires=("tock", "go")), "tick tock tick go tock"
     ),
     "in order": lambda: _invented(
         TURNS, Claim(ClaimKind.IN_ORDER, Holds("b"), fires=("tock", "go", "tock")), "tick tock go tick tock"

@@ -221,7 +221,8 @@ class _Verdicts:
         for run in runs:
             markings = played(self.net, self.certifier.discipline, run.firings)
             begin = next(i for i, marking in enumerate(markings) if holds(self.net, goal, marking))
-            fires = tuple(dict.fromkeys(name for fired in run.firings[begin:] for name in fired))
+            fired = {name for names in run.firings[begin:] for name in names}
+            fires = tuple(sorted(fired, key=self.net.transition_index.__getitem__))
             shown.append((Claim(ClaimKind.FIRES, goal, fires=fires), run))
         return shown
 
