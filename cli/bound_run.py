@@ -40,22 +40,24 @@ def run_bound_of(
 ) -> Report:
     """Run until the operator stops it or nothing can go on, and report how it ended."""
     from firable.executor.drivers.binding import read_binding
+    from firable.executor.operating.aside import aside
     from firable.executor.operating.running import run_bound
 
-    report = run_bound(
-        bundle,
-        read_binding(bind),
-        trace_path=trace,
-        operator=operator,
-        tell=_told,
-        journal_path=journal,
-        resume=resume,
-        said=said,
-        plant=plant,
-        watch=watch,
-        service=service,
-        log=log,
-    )
+    with aside(_told) as tell:
+        report = run_bound(
+            bundle,
+            read_binding(bind),
+            trace_path=trace,
+            operator=operator,
+            tell=tell,
+            journal_path=journal,
+            resume=resume,
+            said=said,
+            plant=plant,
+            watch=watch,
+            service=service,
+            log=log,
+        )
     known = report.to_json()
     kept = ("state", "message", "marking", "blocked", "firings", "commands", "messages", "divergence")
     return Report(

@@ -158,6 +158,7 @@ def run_host_of(
     watch: Watch,
 ) -> Report:
     """Run this host until it is stopped or fails, and report how it ended."""
+    from firable.executor.operating.aside import aside
     from firable.executor.operating.hosting import machines_of, run_host
 
     machines = machines_of(bundle.net, options.controller, coordinator=options.coordinator)
@@ -165,22 +166,23 @@ def run_host_of(
     link, warnings = _link(bundle, machines, options)
     for warning in warnings:
         text.show_diagnostic(warning)
-    report = run_host(
-        bundle,
-        machines,
-        driver(latched=False),
-        link,
-        trace_path=trace,
-        journal_path=options.journal,
-        resume=options.resume,
-        said=said,
-        tell=_told,
-        service=service,
-        log=log,
-        plant=plant,
-        watch=watch,
-        latched=partial(driver, latched=True),
-    )
+    with aside(_told) as tell:
+        report = run_host(
+            bundle,
+            machines,
+            driver(latched=False),
+            link,
+            trace_path=trace,
+            journal_path=options.journal,
+            resume=options.resume,
+            said=said,
+            tell=tell,
+            service=service,
+            log=log,
+            plant=plant,
+            watch=watch,
+            latched=partial(driver, latched=True),
+        )
     return Report(
         "run",
         path,

@@ -7,13 +7,14 @@ import logging
 import logging.handlers
 import os
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from firable.executor.operating.log import Log
 
@@ -29,19 +30,30 @@ def log_option(command: F) -> F:
     )(command)
 
 
-def log_to(path: str | None) -> Log | None:
-    """The log that the option names; raises `InputError` F1017 where it cannot be written."""
+@contextmanager
+def log_to(path: str | None) -> Iterator[Log | None]:
+    """The log that the option names, on a thread of its own; raises `InputError` F1017 where it cannot be written."""
     if path is None:
-        return None
-    from firable.executor.operating.log import Log, logger_to
+        yield None
+        return
+    from firable.executor.operating.aside import aside
+    from firable.executor.operating.log import JsonLines, Log, logger_to
+
+    handler = _handler(path)
+    handler.setFormatter(JsonLines())
+    with aside(handler.handle) as tell:
+        yield Log(logger_to(_Aside(tell)))
+
+
+def _handler(path: str) -> logging.Handler:
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable
 
     if path == "-":
-        return Log(logger_to(logging.StreamHandler(sys.stderr)))
+        return logging.StreamHandler(sys.stderr)
     try:
         _demand_writable(path)
-        return Log(logger_to(_InFile(path, encoding="utf-8", delay=True)))
+        return _InFile(path, encoding="utf-8", delay=True)
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         message = f"{printable(path)}: the log cannot be written: {reason}"
@@ -56,6 +68,18 @@ def _demand_writable(path: str) -> None:
     file.parent.stat()
     if not os.access(file.parent, os.W_OK | os.X_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
+class _Aside(logging.Handler):
+    """Hands each record to what says it elsewhere."""
+
+    def __init__(self, tell: Callable[[logging.LogRecord], None]) -> None:
+        super().__init__()
+        self.tell = tell
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Have it said."""
+        self.tell(record)
 
 
 class _InFile(logging.handlers.WatchedFileHandler):

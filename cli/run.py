@@ -136,6 +136,7 @@ def run(
         from firable.cli.stepping import stepping
         from firable.executor import Watch, load, read_plant
         from firable.executor import run as run_bundle
+        from firable.executor.operating.aside import aside
 
         loaded = load(bundle, trust)
         plant_file = None
@@ -146,42 +147,44 @@ def run(
         _refuse_to_overwrite(trace, log, *read, *_files_beside(options.journal))
         model = None if plant_file is None else read_plant(plant_file)
         service = served.service(bundle, model)
-        if options.is_one_of_several:
-            said = _said(loaded.net, say, options.journal)
-            return run_host_of(
-                bundle, loaded, options, trace, said, service, log_to(log), plant=model, watch=Watch(watch)
-            )
-        if options.bind is not None:
-            return run_bound_of(
-                bundle,
-                loaded,
-                options.bind,
-                trace,
-                stepping(1.0, to_stderr=format_ == "json") if step else None,
-                options.journal,
-                _said(loaded.net, say, options.journal),
-                resume=options.resume,
-                plant=model,
-                watch=Watch(watch),
-                service=service,
-                log=log_to(log),
-            )
-        report = run_bundle(
-            loaded,
-            model or read_plant(_plant_file(loaded, plant)),
-            workpieces=workpieces,
-            seed=seed,
-            speed=_SPEEDS[speed],
-            trace_path=trace,
-            journal_path=options.journal,
-            resume=options.resume,
-            said=_said(loaded.net, say, options.journal),
-            watch=Watch(watch),
-            service=service,
-            log=log_to(log),
-            tell=_told,
-            operator=stepping(_SPEEDS[speed], to_stderr=format_ == "json") if step else None,
-        )
+        with log_to(log) as told_to:
+            if options.is_one_of_several:
+                said = _said(loaded.net, say, options.journal)
+                return run_host_of(
+                    bundle, loaded, options, trace, said, service, told_to, plant=model, watch=Watch(watch)
+                )
+            if options.bind is not None:
+                return run_bound_of(
+                    bundle,
+                    loaded,
+                    options.bind,
+                    trace,
+                    stepping(1.0, to_stderr=format_ == "json") if step else None,
+                    options.journal,
+                    _said(loaded.net, say, options.journal),
+                    resume=options.resume,
+                    plant=model,
+                    watch=Watch(watch),
+                    service=service,
+                    log=told_to,
+                )
+            with aside(_told) as tell:
+                report = run_bundle(
+                    loaded,
+                    model or read_plant(_plant_file(loaded, plant)),
+                    workpieces=workpieces,
+                    seed=seed,
+                    speed=_SPEEDS[speed],
+                    trace_path=trace,
+                    journal_path=options.journal,
+                    resume=options.resume,
+                    said=_said(loaded.net, say, options.journal),
+                    watch=Watch(watch),
+                    service=service,
+                    log=told_to,
+                    tell=tell,
+                    operator=stepping(_SPEEDS[speed], to_stderr=format_ == "json") if step else None,
+                )
         return Report(
             "run",
             bundle,

@@ -2,8 +2,8 @@
 
 Machines are pure: a message, a signal, or their turn to fire goes in, effects come out. What a machine says to another
 one of the same host is that one's next act, since a crash loses both or none. All acts of one turn of the event loop
-are one *group*; at its end begins the one sync of the journal, behind it are written the lines of the trace, and then
-the caller lets go of what leaves the host, commands and messages, in the order of the acts. So a signal and the command
+are one *group*; at its end begin the one sync of the journal and, behind it, the writing of the trace, and then the
+caller lets go of what leaves the host, commands and messages, in the order of the acts. So a signal and the command
 that follows from it, whatever controllers and coordinators say about it in between, are one callback and one sync
 (`journal.py` says why messages need not wait for the sync within a host).
 
@@ -98,8 +98,8 @@ class Acts:
         """What the machines here are given next."""
         self.outbox = Outbox[Sending | Message]()
         """What leaves the host when it is durable."""
-        self.lines = 0
-        """Of the trace, those that wait for the sync that is under way."""
+        self.stored_in = ""
+        """What is being written, in words."""
         self.unsynced = False
         self.in_group = False
         """Whether a group is being done: then nobody has to be woken for what is posted."""
@@ -375,27 +375,34 @@ class Acts:
         """Whether so much waits for the disk that nothing more is done before it has answered."""
         return self.outbox.is_under_way and len(self.outbox) + len(self.recorder.unwritten) > AHEAD_MAX
 
-    def commit(self) -> Storing | None:
-        """Begin the sync of all acts until now; returns what stores them, None where they are durable.
+    def commit(self) -> list[Storing]:
+        """Begin the sync of all acts until now; returns what stores them, in this order, which may wait for a disk.
 
-        `let_go` follows when that is done. Raises `InputError` where the journal cannot be written; then, or where what
-        is returned raises it, the process must end.
+        `stored` and `let_go` follow when that is done. Raises `InputError` where the journal cannot be written; then,
+        or where what is returned raises it, the process must end.
         """
         self.outbox.begin()
-        self.lines = len(self.recorder.unwritten)
-        if not self.unsynced:
-            return None
-        self.unsynced = False
-        self.journal.write(TRACE, self.recorder.keep())
-        return self.journal.sync()
+        sync = None
+        if self.unsynced:
+            self.unsynced = False
+            self.journal.write(TRACE, self.recorder.keep())
+            sync = self.journal.sync()
+        writing = self.recorder.writing()
+        if sync is None or writing is None:
+            self.stored_in = "the trace" if sync is None else "the journal"
+            return [one for one in (sync, writing) if one is not None]
+        self.stored_in = "the journal and the trace"
+        return [sync, writing]
+
+    def stored(self) -> None:
+        """What was begun is durable, and the trace tells it.
+
+        Raises `InputError` where a trace that is no file cannot be written; then the process must end.
+        """
+        self.recorder.written()
 
     def let_go(self) -> list[Sending | Message]:
-        """What was begun is durable: have the trace tell it, and return what leaves the host now, or is never sent.
-
-        Raises `InputError` where the trace cannot be written; then the process must end.
-        """
-        if self.lines:
-            self.recorder.flush(self.lines)
+        """What leaves the host now that its cause is stored, or is never sent."""
         return self.outbox.over()
 
     # What is open

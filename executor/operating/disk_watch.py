@@ -1,4 +1,4 @@
-"""The disk of the journal, watched while it stores: one that stands still is told of while it does, and not afterwards.
+"""The disk of journal and trace, watched while it stores: one that stands still is told of while it does.
 
 Nothing leaves before the journal has it (`groups.py`). So a disk that stands still stops a cell that nobody has
 stopped: no command is sent, no vote is given, and whoever looks sees machines at rest and transitions that have fired.
@@ -50,7 +50,7 @@ class DiskWatch:
         seconds, self.since = self._seconds(), None
         if self.is_told:
             self.is_told = False
-            self._tell(ANSWERS, f"the disk of the journal has answered after {seconds:.1f} s")
+            self._tell(ANSWERS, f"the disk of {self.run.acts.stored_in} has answered after {seconds:.1f} s")
 
     def end(self) -> None:
         """Tell nothing any more."""
@@ -61,7 +61,8 @@ class DiskWatch:
         """What there is to say of it now; empty where it has its time."""
         if not self.is_told:
             return ""
-        return f"the disk of the journal has not answered for {self._seconds():.1f} s: nothing leaves until it does"
+        disk = f"the disk of {self.run.acts.stored_in}"
+        return f"{disk} has not answered for {self._seconds():.1f} s: nothing leaves until it does"
 
     def _seconds(self) -> float:
         return 0.0 if self.since is None else asyncio.get_running_loop().time() - self.since

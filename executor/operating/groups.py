@@ -1,9 +1,9 @@
 """When groups of acts are done, made durable, and let go: by callbacks of the event loop that have no caller.
 
-A callback does one group (`acts.py`) and begins its sync. Where the journal is in memory that is all, and what leaves
-is let go at once. A file is synced on a thread, and the loop goes on: signals, messages and the operator are heard,
-further groups are done, and what they let out waits for the next sync, which begins when this one is over
-(`outbox.py`). A stop waits for no disk: it goes to the driver in the call that asks for it.
+A callback does one group (`acts.py`) and begins its sync. Where the journal is in memory and no trace is on a disk that
+is all, and what leaves is let go at once. Files are written on a thread, and the loop goes on: signals, messages and
+the operator are heard, further groups are done, and what they let out waits for the next sync, which begins when this
+one is over (`outbox.py`). A stop waits for no disk: it goes to the driver in the call that asks for it.
 
 A driver that has told all that came together has the group done in that call (`do_due`), and a link has, too: a turn of
 the loop asks the kernel what else there is.
@@ -25,6 +25,7 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING, Final
 
+from firable.executor.journal.journal import Storing
 from firable.executor.operating.disk_watch import DiskWatch
 from firable.executor.operating.uncut import Patience, uncut
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -34,6 +35,11 @@ if TYPE_CHECKING:
 
 FIRINGS_AT_ONCE_MAX: Final = 100_000
 """More firings at one instant, or without anything from outside, are a net that runs in circles without its cell."""
+
+
+def _store(storing: list[Storing]) -> None:
+    for one in storing:
+        one()
 
 
 class Groups:
@@ -79,14 +85,15 @@ class Groups:
         """Let go of what leaves once it is durable, unless a sync is under way: then all that was done waits for it."""
         if self.storing is not None:
             return
-        if (storing := self.run.acts.commit()) is not None:
-            future = asyncio.get_running_loop().run_in_executor(None, storing)
+        if storing := self.run.acts.commit():
+            future = asyncio.get_running_loop().run_in_executor(None, _store, storing)
             if not future.done():
                 self.storing = future
                 self.disk.asked()
                 future.add_done_callback(self._stored)
                 return
             future.result()
+        self.run.acts.stored()
         self.run.leave(self.run.acts.let_go())
 
     async def end(self, patience: Patience) -> list[str]:
@@ -97,13 +104,13 @@ class Groups:
         if self.storing is None:
             return []
         hangs = self.is_given_up or await uncut([self.storing], patience)
-        return ["the journal"] if hangs else []
+        return [self.run.acts.stored_in] if hangs else []
 
     def give_up(self) -> None:
         """Somebody has wanted the run to end, and has waited long enough for the disk."""
         if self.storing is not None and not self.is_given_up:
             self.is_given_up = True
-            message = "the journal cannot be written: its disk does not answer"
+            message = f"{self.run.acts.stored_in} cannot be written: the disk does not answer"
             hint = "look at the machines, then at the disk; what the journal holds, the same command takes up"
             self.run.told("fault", f"{message}; {hint}")
             self.run.broken(InputError([Diagnostic("F5034", message, hint)]))
@@ -150,6 +157,8 @@ class Groups:
         self.storing = None
         try:
             storing.result()
+            if not self.is_given_up:
+                self.run.acts.stored()
             if self.run.outcome is None or self.run.outcome.done():
                 return  # ended by an error: nothing leaves any more
             self.run.leave(self.run.acts.let_go())

@@ -93,7 +93,8 @@ class Metrics:
         self.faults = Counter(
             "firable_faults", "Faults, divergences and emergency stops told", ["kind"], registry=registry
         )
-        self.hangs = Gauge("firable_disk_hangs", "1 while the disk of the journal does not answer", registry=registry)
+        hangs = "1 while the disk of journal or trace does not answer"
+        self.hangs = Gauge("firable_disk_hangs", hangs, registry=registry)
         self.latched = Gauge("firable_latched", "1 after an emergency stop, until it is reset", registry=registry)
         self.since: dict[str, float] = {}
         self.fired_at: dict[str, float] = {}

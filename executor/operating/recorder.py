@@ -6,7 +6,8 @@ the coordinator's decision, a local one where it occurs. Of a whole run that ord
 among others it is what the machines there did, with the rounds by which the traces of all hosts join
 (`firable.semantics.joining`).
 
-A line is written to its file only once what it tells is durable, or a trace could show what a restart has forgotten.
+A file is written on the thread that stores (`groups.py`): a disk that stands still must not keep a stop from the
+machines. A line is written only once what it tells is durable, or a trace could show what a restart has forgotten.
 Then a process that is killed between the two leaves a trace without its last lines. So the journal keeps, with each
 group of acts, the lines of that group and where in the file they begin: a restart cuts the file there and writes them
 again, and the trace goes on as if nothing had happened. What is told beside what is kept, a sensor that opened no gate,
@@ -20,6 +21,7 @@ import json
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -50,32 +52,37 @@ class TraceFile:
 
     def __init__(self, path: Path | str, size_bytes: int = 0) -> None:
         self.path = path
+        self.is_writing = False
         with self._failures():
-            self.stream = Path(path).open("r+" if size_bytes else "w", encoding="utf-8")  # noqa: SIM115 - as long as this object
+            # As long as this object, and without a buffer, whose lock a write that hangs would hold.
+            self.file = Path(path).open("r+b" if size_bytes else "wb", buffering=0)  # noqa: SIM115
             if size_bytes:
                 self._cut(size_bytes)
 
     def _cut(self, size_bytes: int) -> None:
-        if self.stream.seek(0, os.SEEK_END) < size_bytes:
-            self.stream.close()
+        if self.file.seek(0, os.SEEK_END) < size_bytes:
+            self.file.close()
             raise ValueError("it is shorter than its journal says; was it changed, or the power cut?")
-        self.stream.truncate(size_bytes)
-        self.stream.seek(size_bytes)
+        self.file.truncate(size_bytes)
+        self.file.seek(size_bytes)
 
-    def write(self, line: str, /) -> None:
-        """Write a line with its end."""
+    def write(self, lines: str, /) -> None:
+        """Write lines with their ends, whole; on any thread."""
+        self.is_writing = True
         with self._failures():
-            self.stream.write(line)
+            rest = memoryview(lines.encode())
+            while rest:
+                rest = rest[self.file.write(rest) or 0 :]
+        self.is_writing = False
 
     def flush(self) -> None:
-        """Hand over what is still buffered."""
-        with self._failures():
-            self.stream.flush()
+        """Nothing is buffered."""
 
     def close(self) -> None:
-        """Close the file; again, it does nothing."""
-        with self._failures():
-            self.stream.close()
+        """Close the file; again, or where a write hangs, it does nothing."""
+        if not self.is_writing:
+            with self._failures():
+                self.file.close()
 
     @contextmanager
     def _failures(self) -> Iterator[None]:
@@ -123,6 +130,8 @@ class Recorder:
         """Of the stream without the lines that are not written yet."""
         self.at_seconds = 0.0
         self.unwritten: list[str] = []
+        self.begun = 0
+        """How many of them are being written."""
         self.is_ended = False
         self.observers: list[Callable[[Event], None]] = []
         """Who is shown each event as it is recorded."""
@@ -206,14 +215,33 @@ class Recorder:
         self.flush()  # not kept: a run that is taken up again goes on before it
         self.is_ended = True
 
-    def flush(self, lines: int | None = None) -> None:
-        """Write the lines so far, or the first so many, and hand them over to who follows the file."""
-        if self.stream is not None and self.unwritten:
-            for line in self.unwritten[:lines]:
+    def writing(self) -> Callable[[], None] | None:
+        """Begin to write the lines so far: what writes them to a file, on any thread; None where nothing does.
+
+        `written` follows when it is done. Raises `InputError` F1017 where the file cannot be written.
+        """
+        self.begun = len(self.unwritten)
+        if self.begun == 0 or not isinstance(self.stream, TraceFile):
+            return None
+        return partial(self.stream.write, "".join(self.unwritten))  # others come while they are written
+
+    def written(self) -> None:
+        """What was begun is written, or will be now where the stream is no file."""
+        lines, self.begun = self.unwritten[: self.begun], 0
+        if self.stream is None or not lines:
+            return
+        if not isinstance(self.stream, TraceFile):
+            for line in lines:
                 self.stream.write(line)
-                self.size_bytes += len(line)
-            del self.unwritten[:lines]
             self.stream.flush()
+        self.size_bytes += sum(map(len, lines))
+        del self.unwritten[: len(lines)]
+
+    def flush(self) -> None:
+        """Write the lines so far, and wait for that."""
+        if (writing := self.writing()) is not None:
+            writing()
+        self.written()
 
     def _is_told(self, at_seconds: float) -> bool:
         """Whether anybody is shown what happens now: an event that nobody is shown is not made."""

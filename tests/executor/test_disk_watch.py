@@ -46,7 +46,8 @@ class DisksLoop(VirtualTimeLoop):
     """A loop in virtual time on which a disk takes as long as it says."""
 
     def run_in_executor(self, executor: Executor | None, func: Callable[[*Ts], T], *args: *Ts) -> asyncio.Future[T]:
-        disk = getattr(func, "__self__", None)
+        storing = [one for listed in args if isinstance(listed, list) for one in listed]
+        disk = next((getattr(one, "__self__", None) for one in storing), None)
         seconds = max(disk.answers_at - self.time(), disk.takes_seconds) if isinstance(disk, Disk) else 0.0
         done = super().run_in_executor(executor, func, *args)
         if seconds <= 0:
@@ -128,7 +129,7 @@ def test_a_disk_that_stands_still_is_told_within_its_time_and_the_cell_goes_on_w
         await asyncio.sleep(0.04)
         sent = cell.machine.sent
         assert (cell.said(), cell.logged(), cell.hangs()) == ([HANGS], [("error", HANGS)], 1.0)
-        assert "the disk of the journal has not answered for 1.0 s" in cell.robot.situation().message
+        assert "the disk of the journal and the trace has not answered for 1.0 s" in cell.robot.situation().message
         await asyncio.sleep(20 - asyncio.get_running_loop().time())
         stood = cell.firings()
         assert cell.machine.sent == sent, "a command leaves that the disk may still lose"

@@ -98,7 +98,8 @@ class OneHost:
 
     def leaving(self) -> list[object]:
         self.acts.group()
-        assert self.acts.commit() is None  # it is kept in memory
+        assert self.acts.commit() == []  # it is kept in memory
+        self.acts.stored()
         return list(self.acts.let_go())
 
     def order(self, number: int, transition: str) -> None:

@@ -23,7 +23,7 @@ from firable.executor.journal.outbox import Outbox
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.operating import acts, stopping
 from firable.executor.operating.host import Host
-from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.recorder import Recorder, TraceFile
 from firable.executor.operating.situation import Situation, State
 from firable.executor.operating.uncut import Patience
 from firable.executor.protocol.messages import Keep, Stored
@@ -88,10 +88,24 @@ class Slow(MemoryJournal):
         return None
 
 
+class Waiting(TraceFile):
+    """A trace on a disk that takes lines when it is let."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.answers = Semaphore(0)
+        self.is_slow = False
+
+    def write(self, lines: str, /) -> None:
+        if self.is_slow:
+            assert self.answers.acquire(timeout=PATIENCE_S)
+        super().write(lines)
+
+
 class Rig:
     """A host of the cell with such a disk."""
 
-    def __init__(self, cell: str = CELL) -> None:
+    def __init__(self, cell: str = CELL, trace: TraceFile | None = None) -> None:
         net = parse_net(cell)
         decomposition = split(net)
         self.journal = Slow()
@@ -102,7 +116,7 @@ class Rig:
         async def present(_: Host) -> None:
             await asyncio.get_running_loop().create_future()
 
-        recorder = Recorder(net, net_digest(net), self.stream)
+        recorder = Recorder(net, net_digest(net), trace or self.stream)
         self.host = Host(decomposition, self.machines, recorder, journal=self.journal, operator=present)
 
     @asynccontextmanager
@@ -254,7 +268,7 @@ def test_a_disk_that_never_answers_ends_a_stop_as_an_error_and_what_it_was_given
             storing = rig.host.groups.storing
             assert storing is not None
             end(rig.host)
-            with pytest.raises(InputError, match="its disk does not answer"):
+            with pytest.raises(InputError, match="the journal cannot be written: the disk does not answer"):
                 await ended_within(ending, PATIENCE_S)
             assert rig.machines.is_stopped
             rig.journal.answers.release()  # after all
@@ -410,3 +424,46 @@ def test_the_outbox_lets_go_in_the_order_of_the_acts_and_of_one_sync_at_a_time()
     outbox.remove(7)
     assert outbox.over() == [6, 8, 9]
     assert len(outbox) == 0
+
+
+def test_a_trace_on_a_disk_that_stands_still_keeps_no_stop_from_the_machines(tmp_path: Path) -> None:
+    async def main() -> None:
+        rig = Rig(trace=(trace := Waiting(tmp_path / "trace.jsonl")))
+        async with rig.running() as ending:
+            trace.is_slow = True
+            rig.host.signal("a.s", value=True, entry=None)
+            await turns()
+            assert rig.host.acts.stored_in == "the trace"
+            rig.host.signal("b.key", value=True, entry=None)  # what is told meanwhile is written next
+            await turns()
+            assert rig.machines.sent == []
+            rig.host.stop()
+            await turns()
+            assert rig.machines.is_stopped
+            assert not ending.done()
+            trace.answers.release(1000)
+            assert (await ended_within(ending, PATIENCE_S)).state is State.STOPPED
+        lines = (tmp_path / "trace.jsonl").read_text("utf-8").splitlines()
+        assert [name for line in lines for name in json.loads(line).get("fired", ())] == ["up", "begin"]
+        assert "end" in json.loads(lines[-1])
+
+    asyncio.run(main())
+
+
+def test_a_trace_whose_disk_never_answers_ends_a_stop_as_an_error(tmp_path: Path) -> None:
+    async def main() -> None:
+        rig = Rig(trace=(trace := Waiting(tmp_path / "trace.jsonl")))
+        rig.host.patience = Patience(0.1)
+        async with rig.running() as ending:
+            trace.is_slow = True
+            rig.host.signal("a.s", value=True, entry=None)
+            await turns()
+            rig.host.stop()
+            with pytest.raises(InputError, match="the trace cannot be written: the disk does not answer"):
+                await ended_within(ending, PATIENCE_S)
+            assert rig.machines.is_stopped
+            assert rig.machines.sent == []
+            trace.close()  # which does not wait either
+            trace.answers.release(1000)
+
+    asyncio.run(main())

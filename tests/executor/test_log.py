@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import logging
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from firable.cli.log import log_to
 from firable.cli.main import main
 from firable.executor import State, Watch, execute
 from firable.executor.cell.disturbances import NeverCompletes
+from firable.executor.drivers.bench import PATIENCE_S
 from firable.executor.operating.log import Log, logger_to
 from firable.executor.operating.situation import Situation
 from firable.nets.diagnostics import InputError
@@ -57,32 +59,42 @@ def test_logs_of_two_runs_do_not_write_into_each_other() -> None:
     assert not streams[1].getvalue()
 
 
+def wait_for_line(path: Path) -> None:
+    """Wait until the thread that writes has written a line."""
+    end = time.monotonic() + PATIENCE_S
+    while not (path.exists() and path.read_text().endswith("\n")):
+        assert time.monotonic() < end, "nothing is written"
+        time.sleep(0.01)
+
+
 def test_a_log_that_is_rotated_goes_on_in_a_new_file(tmp_path: Path) -> None:
     path = tmp_path / "run.log"
-    log = log_to(str(path))
-    assert log is not None
-    log.began("cell", ["robot"])
-    path.rename(tmp_path / "run.log.1")
-    log.ended(Situation(State.STOPPED, ("robot.free",)))
+    with log_to(str(path)) as log:
+        assert log is not None
+        log.began("cell", ["robot"])
+        wait_for_line(path)
+        path.rename(tmp_path / "run.log.1")
+        log.ended(Situation(State.STOPPED, ("robot.free",)))
     assert [line["event"] for line in lines(path.read_text())] == ["ended"]
 
 
 def test_a_log_that_breaks_is_told_once_and_ends_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "logs"
     folder.mkdir()
-    log = log_to(str(folder / "run.log"))
-    assert log is not None
-    log.began("cell", ["robot"])
-    (folder / "run.log").unlink()
-    folder.rmdir()
-    for _ in range(3):
-        log.ended(Situation(State.STOPPED, ()))
+    with log_to(str(folder / "run.log")) as log:
+        assert log is not None
+        log.began("cell", ["robot"])
+        wait_for_line(folder / "run.log")
+        (folder / "run.log").unlink()
+        folder.rmdir()
+        for _ in range(3):
+            log.ended(Situation(State.STOPPED, ()))
     assert capsys.readouterr().err.count("cannot be written any more") == 1
 
 
 def test_a_log_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
-    with pytest.raises(InputError) as caught:
-        log_to(str(tmp_path / "none" / "run.log"))
+    with pytest.raises(InputError) as caught, log_to(str(tmp_path / "none" / "run.log")):
+        pass
     assert caught.value.diagnostics[0].code == "F1017"
 
 
@@ -112,8 +124,10 @@ def test_a_run_that_an_error_ends_says_so_in_its_log() -> None:
 
 def test_a_run_that_is_refused_before_it_begins_leaves_no_log(tmp_path: Path) -> None:
     path = tmp_path / "run.log"
-    log = log_to(str(path))
-    assert log is not None
+    with log_to(str(path)):
+        pass
     assert not path.exists(), "it is opened when there is something to tell"
-    log.ended(Situation(State.STOPPED, ()))
+    with log_to(str(path)) as log:
+        assert log is not None
+        log.ended(Situation(State.STOPPED, ()))
     assert lines(path.read_text())[0]["event"] == "ended"

@@ -83,7 +83,8 @@ def live(folder: Path, cell: str, workpieces: int, seed: int, last: int) -> None
         (Acts, "act"),
         (SqliteJournal, "sync"),
         (SqliteJournal, "_bear_witness"),
-        (Recorder, "flush"),
+        (Recorder, "writing"),
+        (Recorder, "written"),
         (SimulatedDriver, "_input"),
     ):
         moments.around(owner, name)
