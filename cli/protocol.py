@@ -57,8 +57,8 @@ class Answered:
     outages: tuple[Outage, ...] = ()
     faults: tuple[OneFault, ...] = ()
     refutations: tuple[Refutation, ...] = ()
-    free: int = 0
-    """How many parts need no promise in the protocol that was explored."""
+    free: tuple[tuple[str, str], ...] | None = None
+    """The parts that need no promise in the protocol that was explored, by transition and controller; None unasked."""
 
 
 def protocol_options(command: F) -> F:
@@ -103,7 +103,7 @@ def ask(
         return Limits(Deadline.after(seconds))
 
     verdicts: tuple[Verdict, ...] = ()
-    free = 0
+    free: tuple[tuple[str, str], ...] | None = None
     protocols: dict[str, ProtocolNet] = {}
     files: dict[str, str | bytes] = {}
     dead: list[tuple[Outage, Verdict]] = []
@@ -115,11 +115,11 @@ def ask(
             begins("asking which parts need no promise")
             votes = persistence(decomposition)
             voted, shown_votes = votes.with_evidence()
-            running = replace(decomposition, free=votes.free_as_shown(voted))
+            verdicts, free = voted, votes.free_as_shown(voted)
+            running = replace(decomposition, free=free)
             begins("exploring the protocol" + " with and without faults" * asked.faults)
             found = protocol_verdicts(running, limits, faults=asked.faults, timeout_ms=timeout_ms)
-            free = len(running.free)
-            verdicts, protocols = found.verdicts, found.protocols
+            verdicts, protocols = (*voted, *found.verdicts), found.protocols
             begins("writing the evidence of it")
             files = {**shown_votes, **found.evidence()} if evidence else {}
         if asked.faults:
@@ -165,7 +165,8 @@ def show(answered: Answered) -> None:
             click.echo(text.verdict_line(verdict, width, fold=True))
         cost = shown[0].cost
         if cost.markings is not None:
-            told = f"; {text.counted(answered.free, 'part')} without a promise" if answered.free else ""
+            free = len(answered.free or ())
+            told = f"; {text.counted(free, 'part')} without a promise" if free else ""
             click.echo(f"  {text.counted(cost.markings, 'configuration')} of the protocol ({shown[0].method}){told}")
     if answered.faults:
         _show_faults(answered.faults)

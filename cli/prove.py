@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from textwrap import indent
 from typing import TYPE_CHECKING, Final
 
@@ -14,6 +15,7 @@ from firable.cli.progress import stages
 from firable.cli.protocol import Answered, Asked, ask, protocol_options
 from firable.cli.protocol import show as show_protocol
 from firable.cli.report import Report
+from firable.cli.votes import Votes, is_vote, votes_told
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -123,7 +125,7 @@ def _report(
         table=decomposition.table,
         assumptions=tuple(map(str, assumptions(decomposition))),
         standing=tuple(standing(decomposition, verdicts)),
-        decomposition=decomposition,
+        decomposition=replace(decomposition, free=told.free or ()),
         loop_net=None if loop is None else loop.net,
         positions=loaded.positions,
         protocols=told.protocols,
@@ -146,7 +148,7 @@ def _show(report: Report, answered: Sequence[Answered]) -> None:
         click.echo("  no transition has more than one participant")
     click.echo(f"\n{click.style('obligations', bold=True)}")
     show_obligations(report.verdicts)
-    _show_open_votes(report)
+    _show_votes(report, next((one.free for one in answered), None))
     click.echo(f"\n{click.style('what the running system needs', bold=True)}")
     for line in report.standing:
         click.echo(f"  {line.name}  {line.says}")
@@ -156,7 +158,8 @@ def _show(report: Report, answered: Sequence[Answered]) -> None:
     for one in answered:
         show_protocol(one)
     refuted = [verdict for verdict in report.verdicts if not verdict.holds]
-    refuted = [verdict for verdict in refuted if not verdict.name.startswith("wrong.")]  # told above, by their events
+    told = [verdict for verdict in refuted if is_vote(verdict) or verdict.name.startswith("wrong.")]  # above
+    refuted = [verdict for verdict in refuted if verdict not in told]
     nets = {id(of.net): of.net for of in report.protocols.values()}
     for net in (report.net, report.loop_net, *nets.values()):
         if net is not None and (some := [verdict for verdict in refuted if report.net_of(verdict) is net]):
@@ -171,15 +174,12 @@ def _show(report: Report, answered: Sequence[Answered]) -> None:
             click.echo(f"  evidence: firable verify {file}")
 
 
-def _show_open_votes(report: Report) -> None:
-    """How many votes no obligation is on, since they may fall: a question on markings."""
-    assert report.decomposition is not None
-    votes = sum(len(row.parts) for row in report.decomposition.coordinated)
-    if left := votes - sum(verdict.name.startswith("persistent.") for verdict in report.verdicts):
-        which = "is left to the markings: `firable split` tells whether it stands"
-        if left > 1:
-            which = "are left to the markings: `firable split` tells whether they stand"
-        click.echo(f"  {left:,} of {text.counted(votes, 'vote')} {which}")
+def _show_votes(report: Report, free: Sequence[tuple[str, str]] | None) -> None:
+    """Which votes stand, and how many of the parts are `free` of promise, where that was asked."""
+    if lines := list(votes_told(Votes.of(report), None if free is None else len(free))):
+        click.echo(f"\n{click.style('votes', bold=True)}")
+        for line in lines:
+            click.echo(f"  {line}")
 
 
 def _show_assumptions(report: Report) -> None:

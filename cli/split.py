@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import indent
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import click
 from firable.cli import text
 from firable.cli.options import answer, formats_option, load_net, net_argument, page_option, with_page, write_folder
 from firable.cli.report import Report
+from firable.cli.votes import Votes, votes_told
 
 if TYPE_CHECKING:
     from firable.decompose.splitting.persistence import Persistence
@@ -127,7 +128,7 @@ def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | 
         found.verdicts,
         notes=loaded.notes,
         table=decomposition.table,
-        decomposition=decomposition,
+        decomposition=replace(decomposition, free=found.free),
         files=files,
         split=split_json,
     )
@@ -253,26 +254,9 @@ def _top(report: Report) -> str:
 
 
 def _votes(report: Report) -> Iterator[str]:
-    """How many votes are persistent; of the others each, with what takes it back."""
-    persistent = sum(verdict.holds for verdict in report.verdicts)
-    promising = sum(len(one["promises"]) for one in report.split["controllers"])
-    if report.verdicts:
-        yield f"{persistent} of {len(report.verdicts)} are persistent: no other transition takes the yes back"
-        free = len(report.verdicts) - promising
-        need = "needs" if free == 1 else "need"
-        yield f"{free} of these {need} no promise, which locks places from the yes to the order: their firing takes"
-        yield "back no other yes at their controller, and no command sent meanwhile clears a gate that they read"
-    others = [verdict for verdict in report.verdicts if not verdict.holds]
-    for verdict in others[:_CONTROLLERS_MAX]:
-        part, names = verdict.name.removeprefix("persistent."), _listed(verdict.subjects)
-        if verdict.status.value == "unknown":
-            yield f"? {part}: not decided ({verdict.bound}){f'; {names} may take it back' if names else ''}"
-            continue
-        firings = verdict.witness.firings if verdict.witness else ()
-        way = ", ".join(name for fired in firings[-4:] for name in fired)
-        yield f"· {part}: taken back by {names}, as after {'… ' if len(firings) > 4 else ''}{way}"
-    if len(others) > _CONTROLLERS_MAX:
-        yield f"and {len(others) - _CONTROLLERS_MAX} more that are not; --format json has them all"
+    """How many votes are persistent, and may leave out the promise; of the others each, with what takes it back."""
+    assert report.decomposition is not None
+    return votes_told(Votes.of(report), len(report.decomposition.free))
 
 
 def _controllers(report: Report) -> Iterator[str]:

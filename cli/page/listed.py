@@ -18,7 +18,6 @@ from firable.nets.verdict import Status, Verdict, Weight
 LISTED_MAX: Final = 300
 """How many verdicts of one family are listed; of more, those that are not proved come first."""
 _SAYS: Final = {
-    "persistent": "votes of which no other transition takes the yes back",
     "opens": "a place is opened by a task as the theorem asks, and each resource adds up",
 }
 _OF_TASKS: Final = "exploration of the task, closed"

@@ -19,6 +19,7 @@ from firable.cli.page.pieces import ROWS_MAX, badge, classes, names, status_badg
 from firable.cli.page.protocol import is_of_protocol, lives_on, one_fault, while_dead
 from firable.cli.page.runs import strip
 from firable.cli.page.swimlanes import swimlanes
+from firable.cli.page.votes import is_of_votes, which_stand
 from firable.cli.report import Report
 from firable.cli.story import outcome_told, waits_told
 from firable.cli.text import counted, rule
@@ -113,7 +114,7 @@ def _assumptions(report: Report) -> Markup | None:
 def _others(report: Report) -> Markup | None:
     """The verdicts that no section above shows."""
     shown = _shown_above(report)
-    rest = [verdict for verdict in report.verdicts if id(verdict) not in shown and not is_of_protocol(verdict)]
+    rest = [verdict for verdict in report.verdicts if id(verdict) not in shown and not _told_apart(verdict)]
     parts: list[Markup] = []
     for weight, title in _HEADINGS.items():
         some = [verdict for verdict in rest if verdict.weight is weight]
@@ -121,6 +122,11 @@ def _others(report: Report) -> Markup | None:
             parts.append(tag("h3", title))
             parts.append(listed(some))
     return together(*parts) if parts else None
+
+
+def _told_apart(verdict: Verdict) -> bool:
+    """Whether a section of its own tells what the verdict says, with its run."""
+    return is_of_protocol(verdict) or is_of_votes(verdict)
 
 
 def _shown_above(report: Report) -> set[int]:
@@ -154,7 +160,7 @@ def _loop(report: Report) -> Markup | None:
 def refuted(report: Report) -> list[tuple[str, Verdict]]:
     """The verdicts whose counterexamples are drawn, each with its anchor; those that must hold come first."""
     some = [v for v in report.verdicts if v.status is Status.VIOLATED and v.witness is not None]
-    some = [v for v in some if not is_of_protocol(v)]
+    some = [v for v in some if not _told_apart(v)]
     some.sort(key=lambda verdict: list(_HEADINGS).index(verdict.weight))
     return [(f"run-{n}", verdict) for n, verdict in enumerate(some, start=1)]
 
@@ -345,6 +351,7 @@ def _knowledge(report: Report) -> Markup | None:
 SECTIONS: Final[tuple[Section, ...]] = (
     Section("needs", "What the running system needs", _standing),
     Section("obligations", "Obligations", _obligations),
+    Section("votes", "Which votes stand", which_stand),
     Section("assumptions", "Assumptions", _assumptions),
     Section("machines", "With its machines", _loop),
     Section("counterexamples", "Counterexamples", _counterexamples),
@@ -360,7 +367,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     Section("cell", "The cell", _picture),
 )
 """Every section, in the order of the page."""
-_ABOVE_IN_A_SPLIT: Final = ("coordinator", "table", "groups", "verdicts", "controllers")
+_ABOVE_IN_A_SPLIT: Final = ("coordinator", "table", "groups", "votes", "controllers")
 
 
 def sections(command: str) -> tuple[Section, ...]:

@@ -51,6 +51,12 @@ SIDE: Final = "protocol.side"
 
 _RUNS: Final = "whatever is lost or crashes, what runs is a run of the net"
 
+PERSISTENCE: Final = replace(
+    _static("persistence", "persistence", "a yes once given stays until its transition fires", persistent),
+    words=("persistent", "unit"),
+)
+"""The votes that arcs and units settle. No net needs one that stands, and markings decide others."""
+
 FAMILIES: Final[tuple[Family, ...]] = (
     _static("eq7", "Eq. (7)", "a transition is firable iff all its parts are", firability),
     _static("eq8", "Eq. (8)", "its external gates are open iff those of all its parts are", openness),
@@ -65,10 +71,7 @@ FAMILIES: Final[tuple[Family, ...]] = (
         "o8-apart", "O8 promises", "no coordinator's promise stands in the way of another coordinator", apart, "O8"
     ),
     _static("arbitration", "arbitration", "conflicts are decided as in the central net", arbitration, "O2"),
-    replace(
-        _static("persistence", "persistence", "a yes once given stays until its transition fires", persistent),
-        words=("persistent", "unit"),
-    ),
+    PERSISTENCE,
     Family(
         "protocol",
         "protocol",
@@ -89,5 +92,5 @@ SIDE_CONDITIONS: Final = Family(
 )
 """What connects the theorem on the protocol with one decomposition: told of it, and nothing that a bundle holds."""
 
-REPORTED: Final = (*FAMILIES, SIDE_CONDITIONS)
-"""Every family of which a report on a decomposition tells."""
+REPORTED: Final = (*(family for family in FAMILIES if family is not PERSISTENCE), SIDE_CONDITIONS)
+"""Every family that a report on a decomposition counts; it tells of all votes together, whatever decided them."""

@@ -119,6 +119,12 @@ class Persistence:
         may = set(undisturbing(self.decomposition))
         return tuple(part for part in persistent if part in may)
 
+    @property
+    def free(self) -> tuple[tuple[str, str], ...]:
+        """The same as a decomposition has them: each by its transition and its controller."""
+        may = set(self.free_of_promise)
+        return tuple((vote.transition, vote.controller) for vote in self.votes if vote.part in may)
+
     def free_as_shown(self, verdicts: Iterable[Verdict]) -> tuple[tuple[str, str], ...]:
         """The parts that may leave out the promise, as far as arcs and units settle it, or the evidence of verdicts."""
         may, shown = set(self.free_of_promise), {verdict.name for verdict in verdicts if verdict.evidence}

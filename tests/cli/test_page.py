@@ -296,7 +296,7 @@ def test_the_page_of_a_split_tells_first_who_decides_what(tmp_path: Path) -> Non
     assert main(["split", "catalogue:one_robot", "--report", str(path)]) == 0
     page = Reading(path.read_text("utf-8"))
     ids = [attributes["id"] for name, attributes in page.tags if name == "section"]
-    assert ids == ["coordinator", "table", "groups", "verdicts", "controllers", "counterexamples", "cell"]
+    assert ids == ["coordinator", "table", "groups", "votes", "controllers", "cell"]
     assert "by the order of the file system" in page.words, "as the terminal says it"
 
 
