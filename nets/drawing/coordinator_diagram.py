@@ -40,6 +40,8 @@ _BAR: Final = 34.0
 _ROW_GAP: Final = 20.0
 _BOX_HEIGHT: Final = 22.0
 _BRACKET: Final = 9.0
+_DECISIONS_START: Final = 12.0  # of the boxes in their lane, beside the brackets
+_LANE_TO_NAME: Final = 1.25  # how much wider the title of a lane is than a name
 
 _STYLE: Final = """
 .lane{font-size:15px;font-weight:700}
@@ -105,8 +107,7 @@ class _Writer:
         self.n_groups = self._brackets()
         self.widths = [self._lane_width(owner) for owner in self.owners]
         self.decision_width = max([70.0, *(width_of(row.name, NAME) + 18 for row in self.rows)])
-        decisions = len(self.deciders) * (self.decision_width + 16) + _BRACKET * self.n_groups + 16
-        self.decisions_width = max([decisions, *(width_of(f"{name} decides", NAME) + 24 for name in self.deciders)])
+        self.pitch, self.decisions_width = self._decisions()
         # What takes part elsewhere is told at the left, where there is more than one panel.
         wrapped_at = width_max - 2 * MARGIN - self.decisions_width - _GAP
         wraps = sum(self.widths) + _GAP * len(self.widths) > wrapped_at
@@ -171,7 +172,7 @@ class _Writer:
         return (
             max(
                 [
-                    width_of(owner, NAME) * 1.25,
+                    width_of(owner, NAME) * _LANE_TO_NAME,
                     width_of(self._owned(owner), NOTE),
                     *(_BAR + 6 + width for width in parts),
                 ]
@@ -186,6 +187,20 @@ class _Writer:
         votes = sum(controller == owner for _, controller in self.told)
         alone = len(subnet.transitions) - votes
         return f"{count(len(subnet.places), 'place')}, votes for {votes}, fires {alone} alone"
+
+    def _decisions(self) -> tuple[float, float]:
+        """How far apart the deciders stand, and how wide the lane is that they share: no title leaves it or another."""
+        several = len(self.deciders) > 1
+        widths = [width_of(self._decides(name), NAME) * (1 if several else _LANE_TO_NAME) for name in self.deciders]
+        # Titles stand in two rows by turns: over two columns there is room for one.
+        pitch = max([self.decision_width + 16, *((width + _PADDING) / 2 for width in widths * several)])
+        start = (_DECISIONS_START + _BRACKET * self.n_groups) if several else _PADDING
+        boxes = _BRACKET * self.n_groups + len(self.deciders) * pitch + 16
+        titles = (start + k * pitch + width + _PADDING for k, width in enumerate(widths))
+        return pitch, max([boxes, *titles])
+
+    def _decides(self, name: str) -> str:
+        return f"{name} decides" if name in self.net_controllers else "coordinator decides"
 
     def _panels(self, room: float) -> Iterator[_Panel]:
         number = {owner: i for i, owner in enumerate(self.owners)}
@@ -299,15 +314,14 @@ class _Writer:
         )
         several = len(self.deciders) > 1
         for k, name in enumerate(self.deciders):
-            said = f"{name} decides" if name in self.net_controllers else "coordinator decides"
             at_x = self._decision_x(name) if several else x + _PADDING
             at_y = y + 21 + (15 * (k % 2) if several else 0)
             css = "band" if several else "lane"
-            yield f'<text class="{css}" x="{px(at_x)}" y="{px(at_y)}">{esc(said)}</text>'
+            yield f'<text class="{css}" x="{px(at_x)}" y="{px(at_y)}">{esc(self._decides(name))}</text>'
 
     def _decision_x(self, decider: str) -> float:
         k = self.deciders.index(decider)
-        return self.decisions_x + 8 + _BRACKET * self.n_groups + 4 + k * (self.decision_width + 16)
+        return self.decisions_x + _DECISIONS_START + _BRACKET * self.n_groups + k * self.pitch
 
     def _row(self, row: Coordinated, panel: _Panel, y: float, number: int) -> Iterator[str]:
         lanes = {self.owners[i]: x for i, x, _ in panel.lanes}

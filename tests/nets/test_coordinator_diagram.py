@@ -66,6 +66,23 @@ def test_what_competes_is_joined_and_told() -> None:
     assert group.findtext(f"{SVG}title") == "by priority: G6, G2"
 
 
+@pytest.mark.parametrize("name", [*CELLS, "two_robots_shared"])
+def test_who_decides_stands_in_the_lane_of_the_decisions_and_not_on_another(name: str) -> None:
+    svg = drawn(name)
+    boxes = [one for one in svg.iter(f"{SVG}rect") if one.get("fill") == "#f7f8fa"]
+    right = {float(one.get("x", "")) + float(one.get("width", "")) for one in boxes}
+    px = {"lane": 9.4, "band": 8.2}  # as wide as bold letters are in a browser
+    spans: dict[str, list[tuple[float, float]]] = {}
+    for text in svg.iter(f"{SVG}text"):
+        if (said := text.text or "").endswith(" decides"):
+            x = float(text.get("x", ""))
+            spans.setdefault(text.get("y", ""), []).append((x, x + len(said) * px[text.get("class", "")]))
+    assert spans or name == "conceptual_one_robot"
+    for row in spans.values():
+        assert all(end <= min(right) for _, end in row)
+        assert all(a_end <= b for (_, a_end), (b, _) in zip(row, row[1:], strict=False))
+
+
 def test_layers_stand_above_those_that_they_coordinate() -> None:
     svg = drawn("two_cells", 4000)
 
