@@ -33,7 +33,7 @@ def page_of(report: Report) -> str:
     """The report as an HTML page, whole and by itself."""
     title = f"{report.net.name or 'the net'}: {_ASKED.get(report.command, report.command)}"
     made = [(section, markup) for section in sections(report.command) if (markup := section.make(report)) is not None]
-    links = [tag("li", tag("a", section.title, href=f"#{section.anchor}")) for section, _ in made]
+    links = [tag("li", tag("a", section.word, href=f"#{section.anchor}")) for section, _ in made]
     head = tag(
         "head",
         tag("meta", charset="utf-8"),

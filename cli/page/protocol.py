@@ -7,6 +7,7 @@ does no harm here gets no sign of approval either, since the next edit of the ne
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from firable.cli.page.markup import Content, Markup, tag, together
@@ -100,17 +101,21 @@ def wrong_told(report: Report) -> str:
 
 
 def _refutation(refutation: Refutation) -> Markup:
+    """A wrong protocol as a line that unfolds: what it leaves out, what comes of it, and the run that shows it."""
     wrong = refutation.wrong
     tone = {"violated": "bad", "unknown": "open"}.get(refutation.status.value)
-    return tag(
-        "div",
-        tag("h3", f"{wrong.name}: {wrong.says} ({wrong.obligation})"),
-        tag("p", tag("span", refutation.outcome, cls=classes(tone))),
+    said, *rest = re.split("[:,] ", refutation.outcome, maxsplit=1)
+    why = "".join(rest)
+    line = tag(
+        "span", tag("b", wrong.name), f": {wrong.says} ({wrong.obligation}) ", tag("span", said, cls=classes(tone))
+    )
+    inside = together(
+        tag("p", f"{why[:1].upper()}{why[1:]}.") if why else None,
         tag("p", f"reached: {refutation.bound}") if refutation.status.value == "unknown" else None,
         _run(refutation),
         _example(refutation.small),
-        cls="counter",
     )
+    return tag("details", tag("summary", line), tag("div", inside, cls="inside"))
 
 
 def _run(refutation: Refutation) -> Markup | None:

@@ -42,9 +42,10 @@ _HEADINGS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A section: its anchor, its title, and what makes it."""
+    """A section: its anchor, the word that leads to it, its title, and what makes it."""
 
     anchor: str
+    word: str
     title: str
     make: Callable[[Report], Markup | None]
 
@@ -349,24 +350,24 @@ def _knowledge(report: Report) -> Markup | None:
 
 
 SECTIONS: Final[tuple[Section, ...]] = (
-    Section("needs", "What the running system needs", _standing),
-    Section("obligations", "Obligations", _obligations),
-    Section("votes", "Which votes stand", which_stand),
-    Section("assumptions", "Assumptions", _assumptions),
-    Section("machines", "With its machines", _loop),
-    Section("counterexamples", "Counterexamples", _counterexamples),
-    Section("fault", "What one fault does", one_fault),
-    Section("dead", "What may stand still while somebody is dead", while_dead),
-    Section("lives-on", "What this cell lives on", lives_on),
-    Section("verdicts", "Verdicts", _others),
-    Section("course", "How it was found", _course),
-    Section("coordinator", "Who decides what over whom", _coordinator),
-    Section("table", "Coordinator table", _coordinator_table),
-    Section("groups", "Arbitration", _groups),
-    Section("controllers", "What each controller must know", _knowledge),
-    Section("cell", "The cell", _picture),
+    Section("table", "Table", "Coordinator table", _coordinator_table),
+    Section("needs", "Needs", "What the running system needs", _standing),
+    Section("obligations", "Obligations", "Obligations", _obligations),
+    Section("votes", "Votes", "Which votes stand", which_stand),
+    Section("assumptions", "Assumptions", "Assumptions", _assumptions),
+    Section("machines", "Machines", "With its machines", _loop),
+    Section("counterexamples", "Counterexamples", "Counterexamples", _counterexamples),
+    Section("verdicts", "Verdicts", "Verdicts", _others),
+    Section("fault", "One fault", "What one fault does", one_fault),
+    Section("dead", "Dead", "What may stand still while somebody is dead", while_dead),
+    Section("lives-on", "Wrong protocols", "What this cell lives on", lives_on),
+    Section("course", "Course", "How it was found", _course),
+    Section("coordinator", "Deciders", "Who decides what over whom", _coordinator),
+    Section("groups", "Arbitration", "Arbitration", _groups),
+    Section("controllers", "Controllers", "What each controller must know", _knowledge),
+    Section("cell", "Cell", "The cell", _picture),
 )
-"""Every section, in the order of the page."""
+"""Every section, in the order of the page: what is split, what is proved of it, what is told besides, pictures."""
 _ABOVE_IN_A_SPLIT: Final = ("coordinator", "table", "groups", "votes", "controllers")
 
 

@@ -18,7 +18,7 @@ STYLE: Final = """
 --open:#f0c46c;--open-ground:#3a2d10;--plain-ground:#273140;
 --link:#8ab8f5;--sends:#f0a563}}
 *{box-sizing:border-box}
-html{scroll-padding-top:3.5rem;-webkit-text-size-adjust:100%}
+html{scroll-padding-top:5.5rem;-webkit-text-size-adjust:100%}
 body{margin:0;background:var(--ground);color:var(--ink);
 font:16px/1.55 system-ui,-apple-system,'Segoe UI','Helvetica Neue',Arial,'DejaVu Sans',sans-serif}
 main,.masthead>div,nav>div,footer{max-width:var(--measure);margin:0 auto;padding:0 1.25rem}
@@ -33,9 +33,8 @@ a{color:var(--link)}
 .counts b{color:var(--ink);font-variant-numeric:tabular-nums}
 nav{position:sticky;top:0;z-index:2;background:var(--paper);border-bottom:1px solid var(--line);
 border-top:1px solid var(--line)}
-nav ul{display:flex;gap:1.4rem;margin:0;padding:0;list-style:none;overflow-x:auto;white-space:nowrap;
-scrollbar-width:none}
-nav a{display:block;padding:.65rem 0;color:var(--soft);text-decoration:none;font-size:.93rem}
+nav ul{display:flex;flex-wrap:wrap;gap:0 1.1rem;margin:0;padding:.3rem 0;list-style:none;white-space:nowrap}
+nav a{display:block;padding:.35rem 0;color:var(--soft);text-decoration:none;font-size:.93rem}
 nav a:hover{color:var(--ink);text-decoration:underline}
 section{background:var(--paper);border:1px solid var(--line);border-radius:10px;margin:1.4rem 0;padding:1.4rem 1.5rem}
 section>h2{margin:0 0 .2rem;font-size:1.25rem}
@@ -48,9 +47,10 @@ thead th{font-size:.82rem;font-weight:600;color:var(--soft);border-bottom:2px so
 tbody tr:last-child>*{border-bottom:0}
 tbody th{font-weight:600}
 th:first-child{padding-left:.1rem}
+td>p{margin:.3rem 0}td>p:first-child{margin-top:0}
 .strip td>.fact{font-size:.83rem;padding-left:1.1em;text-indent:-1.1em}
 .fact>span{font-size:.8em}
-.wide{overflow-x:auto;margin:0 -.3rem;padding:0 .3rem}
+.wide{position:relative;overflow-x:auto;margin:0 -.3rem;padding:0 .3rem}
 .code,.part-name,.part,.comes,.leaves,.held,.sends{font-family:ui-monospace,Menlo,Consolas,'DejaVu Sans Mono',monospace;
 font-size:.83rem}
 .code{overflow-wrap:anywhere}.part-name{white-space:nowrap}
@@ -80,7 +80,7 @@ border-bottom:1px solid var(--line)}
 .verdict .code{color:var(--soft)}
 .hint{color:var(--soft);border-left:3px solid var(--line);padding-left:.7rem}
 .outcome{font-weight:600;border-left:3px solid var(--bad);padding-left:.7rem;margin:.9rem 0}
-.counter{padding:.9rem 0 1.2rem;border-bottom:1px solid var(--line);scroll-margin-top:3.5rem}
+.counter{padding:.9rem 0 1.2rem;border-bottom:1px solid var(--line);scroll-margin-top:0}
 .counter:last-child{border-bottom:0}
 .counter h3{margin:0 0 .2rem;overflow-wrap:anywhere}
 .strip{font-size:.88rem}
@@ -119,6 +119,7 @@ footer{color:var(--soft);font-size:.86rem;padding-top:.4rem;padding-bottom:2.5re
 .failing li{margin:.25rem 0}
 .failing a{color:var(--ink);text-decoration-color:var(--bad)}
 @media (max-width:44rem){
+html{scroll-padding-top:.5rem}nav{position:static}
 body{font-size:15.5px}
 main,.masthead>div,nav>div,footer{padding-left:.9rem;padding-right:.9rem}
 .masthead{padding:1.4rem 0 1.1rem}.masthead h1{font-size:1.5rem}

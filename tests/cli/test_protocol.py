@@ -193,6 +193,15 @@ def test_page_tells_what_was_found(net: str, tmp_path: Path) -> None:
     assert "missing-vote" in page.read_text("utf-8")
 
 
+def test_page_tells_the_table_first_and_folds_what_comes_of_wrong_protocols(net: str, tmp_path: Path) -> None:
+    page = page_of(net, tmp_path, "--wrong")
+    assert re.findall('<section id="([^"]*)"', page)[0] == "table"
+    lives_on = section(page, "lives-on")
+    assert lives_on.count("<details>") >= lives_on.count("<summary><span><b>") > 10
+    assert "missing-vote</b>: a transition is decided though one vote is missing (Eq. (7)) <span" in lives_on
+    assert '>cannot go wrong here</span></span></summary><div class="inside"><p>Wrong all the same, but' in lives_on
+
+
 def page_of(net: str, tmp_path: Path, *options: str) -> str:
     page = tmp_path / "report.html"
     assert main(["prove", net, *options, "--report", str(page)]) == 0
@@ -262,7 +271,7 @@ def test_wrong_protocols_are_no_counterexamples_of_the_page(net: str, tmp_path: 
     page = page_of(net, tmp_path, "--wrong")
     assert "Counterexamples" not in page
     lives_on = section(page, "lives-on")
-    assert "missing-vote: a transition is decided though one vote is missing (Eq. (7))" in lives_on
+    assert "missing-vote</b>: a transition is decided though one vote is missing (Eq. (7))" in lives_on
     assert "this net does not need O3 yet" in lives_on
     assert "on a small example, doors, in its own names" in lives_on
     assert '<td data-of="guard"><span>guard fires open</span>' in lives_on

@@ -2,6 +2,7 @@
 
 import re
 import xml.etree.ElementTree as ET
+from itertools import pairwise
 
 import pytest
 
@@ -80,7 +81,7 @@ def test_who_decides_stands_in_the_lane_of_the_decisions_and_not_on_another(name
     assert spans or name == "conceptual_one_robot"
     for row in spans.values():
         assert all(end <= min(right) for _, end in row)
-        assert all(a_end <= b for (_, a_end), (b, _) in zip(row, row[1:], strict=False))
+        assert all(a_end <= b for (_, a_end), (b, _) in pairwise(row))
 
 
 def test_layers_stand_above_those_that_they_coordinate() -> None:
