@@ -43,9 +43,10 @@ class Report:
     """The verdicts of one command on one net, with what belongs to them; empty parts are left out of the JSON.
 
     `loop_net` is the net with its machines, of which some verdicts show runs (`net_of`), and `protocols` are others, by
-    the names of the verdicts on them; `outages`, `faults` and `refutations` are told beside those. `page` is the report
-    as a page for a person, where one was written. `again` says that the same was decided before, which a program need
-    not know; `positions` say where the parts of the net stand in its file.
+    the names of the verdicts on them; `outages`, `faults` and `refutations` are told beside those. `claims` are, where
+    the verdicts say whether evidence shows something, what it claims of each. `page` is the report as a page for a
+    person, where one was written. `again` says that the same was decided before, which a program need not know;
+    `positions` say where the parts of the net stand in its file.
     """
 
     command: str
@@ -69,6 +70,7 @@ class Report:
     outages: Sequence[Outage] = ()
     faults: Sequence[OneFault] = ()
     refutations: Sequence[Refutation] = ()
+    claims: Sequence[Verdict] = ()
     split: Mapping[str, Any] = field(default_factory=dict)
     page: str = ""
     again: bool = False

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 SIGNS: Mapping[str, str] = {"proved": "✓", "violated": "✗", "unknown": "?"}
 """The sign of each status."""
-WORDS: Mapping[str, str] = {"proved": "proved", "unknown": "unknown"}
-"""What is said of a verdict that is proved, and of one that is unknown."""
 _HEADINGS = {"required": "must hold", "warning": "warnings", "information": "for information"}
 
 
@@ -36,6 +34,7 @@ COLUMNS: Final = 120
 ALIKE_SHOWN: Final = 2
 """Of how many errors with one cause each is told in full; of more, the first is, and the others are counted."""
 _NAMES_SHOWN: Final = 4
+_ONE_OF: Final = re.compile(r"(?<![\d.,])1 (firing|marking|edge|node)s\b")
 _QUOTED: Final = re.compile(r"'[^']*'")
 
 
@@ -93,15 +92,22 @@ def counted(n: int, word: str) -> str:
     return f"{spelled(n)} {word}{'' if n == 1 else 's'}"
 
 
+def singular(told: str) -> str:
+    """What was counted by others, with each noun after a one as it should be.
+
+    >>> singular("21 firings played, and from there: 1 markings and 1 firings gone through")
+    '21 firings played, and from there: 1 marking and 1 firing gone through'
+    """
+    return _ONE_OF.sub("1 \\1", told)
+
+
 def rule(sequence: Sequence[str], by: str) -> str:
     """How the arbiter of a group chooses, in words; without a `sequence` given it is the order of the file."""
     words = {"priority": "by priority", "order": "in a given order", "rotation": "in rotation"}
     return words[by] if sequence else "by the order of the file"
 
 
-def show_verdicts(
-    net: Net, verdicts: Sequence[Verdict], *, verbose: bool = False, words: Mapping[str, str] = WORDS
-) -> None:
+def show_verdicts(net: Net, verdicts: Sequence[Verdict], *, verbose: bool = False) -> None:
     """Print all verdicts, those that must hold first, with the witnesses of what is violated.
 
     Method and cost, and the witnesses of warnings and of what is reachable and shall be, are told only if `verbose`.
@@ -113,14 +119,14 @@ def show_verdicts(
         if some:
             click.echo(f"\n{click.style(title, bold=True)}")
         for verdict in some:
-            click.echo(verdict_line(verdict, width, words))
+            click.echo(verdict_line(verdict, width))
             for line in reasons(net, verdict, told, verbose=verbose):
                 click.echo(f"      {line}")
 
 
-def verdict_line(verdict: Verdict, width: int = 0, words: Mapping[str, str] = WORDS, *, fold: bool = False) -> str:
+def verdict_line(verdict: Verdict, width: int = 0, *, fold: bool = False) -> str:
     """The line of a verdict: symbol, word, name, statement; with `fold` a long statement goes on under itself."""
-    symbol, word, colour = mark(verdict, words)
+    symbol, word, colour = mark(verdict)
     said = verdict.statement
     if fold:
         hang = len(f"  {symbol} {word:<8}  {verdict.name:<{width}}  ")
@@ -129,15 +135,15 @@ def verdict_line(verdict: Verdict, width: int = 0, words: Mapping[str, str] = WO
     return f"  {click.style(f'{symbol} {word:<8}', fg=colour)}  {verdict.name:<{width}}  {said}"
 
 
-def mark(verdict: Verdict, words: Mapping[str, str] = WORDS) -> tuple[str, str, str | None]:
+def mark(verdict: Verdict) -> tuple[str, str, str | None]:
     """How a verdict ended: a sign, a word, a colour."""
     weight, status = verdict.weight.value, verdict.status.value
     if verdict.expected is not None and status != "unknown":
         return ("=", "expected", None) if verdict.outcome.value == "proved" else ("✗", "changed", "red")
     if status == "proved":
-        return "✓", "yes" if weight == "information" else words["proved"], "green"
+        return "✓", "yes" if weight == "information" else "proved", "green"
     if status == "unknown":
-        return "?", words["unknown"], "yellow"
+        return "?", "unknown", "yellow"
     match weight:
         case "required":
             return "✗", "violated", "red"

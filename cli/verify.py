@@ -16,14 +16,14 @@ from firable.cli.options import answer_all, formats_option, load_net, refuse_a_n
 from firable.cli.progress import stages
 from firable.cli.report import Report
 from firable.cli.sign import trust_option
+from firable.cli.verified import show
 
 if TYPE_CHECKING:
     from firable.analysis.evidence.checking.checker import CheckedRecord
-    from firable.analysis.evidence.document import Document
+    from firable.analysis.evidence.document import Document, Record
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
-_WORDS = {"proved": "shown", "unknown": "claimed"}
 _CLAIMS_MAX = 3  # told of one verdict
 _CLAIM_MAX = 100  # characters told of one claim
 
@@ -77,7 +77,7 @@ def verify(
     if trust and not all(map(_is_bundle, evidence)):
         raise click.UsageError("--trust is for bundles: documents of evidence are not signed, and need not be")
     makers = [partial(_of_bundle if _is_bundle(file) else _report, file, asked) for file in evidence]
-    return answer_all("verify", format_, makers, _show)
+    return answer_all("verify", format_, makers, show)
 
 
 @dataclass(frozen=True)
@@ -126,9 +126,10 @@ def _of_bundle(file: str, asked: _Asked) -> Report:
     with _named(file), stages() as begins:
         checked = check_bundle(bundle, solver=asked.solver, timeout_ms=asked.timeout_ms, begins=begins)
     verdicts = [_told(one.verdict, one.method, one.only_claimed, shown=one.shown) for one in checked]
+    claims = [one.verdict for one in checked]
     files = asked.write(file, {name: text for name, text in bundle.evidence.items() if name.endswith(".smt2")})
     of = {"digest": bundle.digest, "solver": asked.solver, **({"signed_by": ", ".join(signers)} if signers else {})}
-    return Report("verify", file, bundle.net, verdicts, files=files, bundle=of)
+    return Report("verify", file, bundle.net, verdicts, files=files, bundle=of, claims=claims)
 
 
 def _report(file: str, asked: _Asked) -> Report:
@@ -140,29 +141,51 @@ def _report(file: str, asked: _Asked) -> Report:
         _refuse_another_net(file, document.net, asked.of)
     checked = list(check_document(document, timeout_ms=asked.timeout_ms))
     verdicts = [_verdict(document, one) for one in checked]
+    claims = [_claim(one) for one in checked]
     files = asked.write(file, dict(_obligations(document, asked.timeout_ms))) if asked.smt_dir is not None else ()
     discipline = document.discipline.value
-    return Report("verify", file, document.net, tuple(verdicts), discipline=discipline, files=files)
+    return Report("verify", file, document.net, tuple(verdicts), discipline=discipline, files=files, claims=claims)
 
 
 def _verdict(document: Document, checked: CheckedRecord) -> Verdict:
+    """What is said of a record: that it is shown, whether it says that something holds or that it is violated."""
     from firable.nets.verdict import Status, Verdict
 
     record = checked.record
-    claims = [_shortened(str(claim)) for claim, _ in record.shown]
-    more = f", and {len(claims) - _CLAIMS_MAX} more claims" if len(claims) > _CLAIMS_MAX else ""
-    words = f" ({record.query})" if record.query else ""
-    said = f"it {'holds' if record.proved else 'is violated'}{words}: " if record.name else ""
+    said = f"it {'holds' if record.proved else 'is violated'}{_of(record)}: " if record.name else ""
     late = checked.only_claimed and not checked.only_claimed.startswith("only claimed")
     return Verdict(
         record.name or "evidence",
         Status.PROVED if checked.shown else Status.UNKNOWN,
-        f"{said}{'; '.join(claims[:_CLAIMS_MAX])}{more}".removesuffix(": "),
-        "; ".join(checked.methods) or "nothing",
+        f"{said}{_claimed(record)}".removesuffix(": "),
+        text.singular("; ".join(checked.methods)) or "nothing",
         bound=checked.only_claimed,
         hint="allow more time" if late else "",
         discipline=document.discipline.value,
     )
+
+
+def _claim(checked: CheckedRecord) -> Verdict:
+    """The verdict that a record claims, with the weight of its name; what nobody knows by its name must hold."""
+    from firable.decompose.verification.words import SENTENCES
+    from firable.nets.verdict import Status, Verdict, Weight
+
+    record = checked.record
+    sentence, weights = SENTENCES.get(record.name, ("", {Weight.REQUIRED}))
+    weight = next(one for one in Weight if one in weights)
+    status = Status.PROVED if record.proved else Status.VIOLATED
+    return Verdict(record.name, status, f"{_claimed(record) or sentence}{_of(record)}", "claimed", weight)
+
+
+def _of(record: Record) -> str:
+    return f" ({record.query})" if record.query else ""
+
+
+def _claimed(record: Record) -> str:
+    """What the evidence of a record shows, the first of it."""
+    claims = [_shortened(str(claim)) for claim, _ in record.shown]
+    more = f", and {len(claims) - _CLAIMS_MAX} more claims" if len(claims) > _CLAIMS_MAX else ""
+    return f"{'; '.join(claims[:_CLAIMS_MAX])}{more}"
 
 
 def _shortened(text: str) -> str:
@@ -173,6 +196,7 @@ def _told(verdict: Verdict, method: str, only_claimed: str, *, shown: bool) -> V
     """What is said of a verdict of a bundle; one that the bundle leaves undecided claims nothing, and weighs so."""
     from firable.nets.verdict import Status, Verdict
 
+    method = text.singular(method)
     if verdict.status is Status.UNKNOWN:
         return Verdict(verdict.name, Status.UNKNOWN, verdict.statement, method, verdict.weight, bound=only_claimed)
     violated = "it is violated: " if verdict.status is Status.VIOLATED else ""
@@ -230,79 +254,3 @@ def _obligations(document: Document, timeout_ms: int) -> Iterator[tuple[str, str
                 yield f"{name}.{obligation.name}.smt2", obligation.text(evidence)
             if (sums := sums_text(evidence)) is not None:
                 yield f"{name}.sums.smt2", sums
-
-
-def _show(report: Report) -> None:
-    text.heading(report.net, report.input)
-    if report.bundle:
-        _show_bundle(report)
-        return
-    words = {"interleaving": "interleaving", "step": "synchronous steps"}[report.discipline]
-    click.echo(f"  {words}, external gates free")
-    text.show_verdicts(report.net, report.verdicts, verbose=True, words=_WORDS)
-    _summary(report)
-    if report.files:
-        click.echo(f"\n  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
-
-
-def _show_bundle(report: Report) -> None:
-    from firable.decompose.verification.bereft import PREFIX as DEAD
-    from firable.decompose.verification.explored import TITLES
-    from firable.decompose.verification.machines import TITLES as MACHINES
-    from firable.decompose.verification.outages import TITLE as WHILE_DEAD
-    from firable.decompose.verification.protocol import TITLE
-    from firable.decompose.verification.refinement import TITLE as REFINEMENT
-    from firable.decompose.verification.restating import HEADS
-
-    click.echo(f"  the bundle {report.bundle['digest'][:16]}…: split anew, and stated anew what it must prove")
-    if signers := report.bundle.get("signed_by"):
-        click.echo("  signed by " + ", ".join(f"{name[:16]}…" for name in signers.split(", ")) + ", which you trust")
-    titles = {
-        **HEADS,
-        "protocol": TITLE,
-        **TITLES,
-        DEAD: WHILE_DEAD,
-        **MACHINES,
-        "refinement": REFINEMENT,
-        "unit": "of the places of each unit one at most holds a token",
-        "persistent": "of each vote it is shown whether it is persistent",
-    }
-    families: dict[str, list[Verdict]] = {family: [] for family in titles}
-    others: list[Verdict] = []
-    for verdict in report.verdicts:
-        family = DEAD if verdict.name.startswith(DEAD) else verdict.name.partition(".")[0]
-        families.get(family, others).append(verdict)
-    click.echo(f"\n{click.style('obligations', bold=True)}, answered by {report.bundle['solver']}")
-    for family, some in families.items():
-        if some:
-            shown = sum(verdict.holds for verdict in some)
-            symbol, colour = ("✓", "green") if shown == len(some) else ("?", "yellow")
-            count = f"{shown:>4} of {len(some):<4}"
-            click.echo(f"  {click.style(symbol, fg=colour)} {count} {family:<16} {titles[family]}")
-    late = [verdict for some in families.values() for verdict in some if not verdict.holds]
-    told = [*late, *others]
-    text.show_verdicts(report.net, [v for v in told if _claims(v)], verbose=True, words=_WORDS)
-    if undecided := [verdict for verdict in told if not _claims(verdict)]:
-        click.echo(f"\n{click.style('left undecided by the bundle itself', bold=True)}")
-        width = max(len(verdict.name) for verdict in undecided)
-        for verdict in undecided:
-            click.echo(f"  ? {verdict.name:<{width}}  {verdict.statement}")
-    _summary(report)
-    if report.files:
-        click.echo(f"\n  {len(report.files)} SMT-LIB 2 files in {Path(report.files[0]).parent}")
-
-
-def _claims(verdict: Verdict) -> bool:
-    """Whether the bundle claims something of it; of a verdict that must hold it does, since it runs by it."""
-    return verdict.holds or verdict.weight.value == "required"
-
-
-def _summary(report: Report) -> None:
-    claimed = [verdict for verdict in report.verdicts if _claims(verdict)]
-    counts: Mapping[str, int] = {
-        "shown": sum(verdict.holds for verdict in claimed),
-        "not shown": sum(not verdict.holds for verdict in claimed),
-        "left undecided": len(report.verdicts) - len(claimed),
-    }
-    told = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
-    click.echo(f"\n{told or 'the document claims nothing'}")

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from firable.cli.page.markup import Content, Markup, tag, together
-from firable.cli.text import SIGNS, WORDS, mark
+from firable.cli.text import SIGNS, mark
 from firable.nets.verdict import Status, Verdict
 
 ROWS_MAX: Final = 400
@@ -20,7 +20,7 @@ TONES: Final = {"✓": "good", "✗": "bad", "?": "open", "!": "open", "·": Non
 
 def badge(verdict: Verdict) -> Markup:
     """How a verdict ended, as a sign and a word."""
-    sign, word, _ = mark(verdict, WORDS)
+    sign, word, _ = mark(verdict)
     return tag("span", f"{sign} {word}", cls=classes(TONES[sign]))
 
 

@@ -172,7 +172,7 @@ def test_evidence_is_written_and_verified(tmp_path: Path, capsys: pytest.Capture
     assert main(["verify", *map(str, documents)]) == 0
     assert main(["refine", "catalogue:conceptual_one_robot", "--cell", "one", "--evidence", str(folder)]) == 0
     assert main(["verify", str(folder / "one.detailed.evidence.json")]) == 0
-    assert "✓ shown     property.ends-clean" in capsys.readouterr().out
+    assert "✓ shown  property.ends-clean" in capsys.readouterr().out
 
 
 def test_the_schema_of_files_of_tasks_is_printed(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import re
 from importlib.resources import files
 from pathlib import Path
 
@@ -42,7 +43,7 @@ def invariant(tmp_path: Path) -> Path:
 def test_evidence_that_shows_its_claim_is_told_so(invariant: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", str(invariant)]) == 0
     told = capsys.readouterr().out
-    assert "✓ shown     deadlock-free  it holds: never (deadlock)" in told
+    assert "✓ shown  deadlock-free  never (deadlock)" in told
     assert "discharged by z3" in told
 
 
@@ -136,14 +137,35 @@ def test_a_net_too_large_to_list_has_an_invariant_as_evidence(
     assert "discharged by z3" in verified["method"]
 
 
+def test_what_is_shown_to_be_violated_is_told_so_and_how_much_it_matters(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "evidence"
+    assert main(["check", "catalogue:one_robot_mc_late", "--evidence", str(folder)]) == 1
+    capsys.readouterr()
+    (file,) = folder.iterdir()
+    assert main(["verify", str(file)]) == 0
+    told = capsys.readouterr().out
+    must_hold, besides = told[told.index("\nmust hold\n") :].split("\ntold besides\n")
+    assert re.search(r"✗ shown: violated  deadlock-free +\(deadlock\) is reachable", must_hold)
+    assert re.search(r"✓ shown            contact-free +never ", must_hold)
+    assert re.search(r"! shown: violated  live +from some reachable marking", besides)
+    assert re.search(r"· shown: violated  reversible ", besides)
+    assert re.search(r"✓ shown            self-loops +no place is both", besides), (
+        "its sentence, where no claim is told"
+    )
+    assert "1 marking and 0 firings gone through" in besides
+    assert "20 shown (9 to be violated, 3 of which must hold)" in told
+
+
 def test_a_verdict_that_nothing_shows_is_only_claimed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     net, path = family_net("token_ring-5"), tmp_path / "claimed.evidence.json"
     records = (Record("live", True, (), "nobody has looked"), Record("self-loops", True, ()))
     path.write_text(Document(net, Discipline.INTERLEAVING, records).to_text())
     assert main(["verify", str(path)]) == 3
     told = capsys.readouterr().out
-    assert "? claimed   live        it holds" in told
-    assert "✓ shown     self-loops" in told
+    assert "? claimed  live        from every reachable marking" in told
+    assert "✓ shown    self-loops" in told
     assert "only claimed: nobody has looked" in told
     assert "1 shown, 1 not shown" in told
 

@@ -32,8 +32,24 @@ def test_a_bundle_is_shown_family_by_family_and_verdict_by_verdict(
     told = capsys.readouterr().out
     assert "obligations, answered by cvc5" in told
     assert "6 of 6    eq7 " in told
-    assert "✓ shown     deadlock-free" in told
-    assert told.rstrip().endswith("shown")
+    must_hold, besides = told[told.index("\nmust hold\n") :].split("\ntold besides\n")
+    assert "✓ shown            deadlock-free" in must_hold
+    assert "violated" not in must_hold
+    assert "✓ shown            doomed-markings" in besides
+    assert (
+        "· shown: violated  structural-conflicts              no two transitions share an input or an output place\n"
+        in besides
+    )
+    assert "it is violated" not in told
+    assert "shown (1 to be violated, which need not hold)" in told
+
+
+def test_of_votes_it_is_told_how_many_are_shown_to_stand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(tmp_path / "cell.bundle")
+    assert main(["bundle", "catalogue:one_robot", "-o", path]) == 0
+    assert main(["verify", path]) == 0
+    said = "24 of 24   persistent       of each vote it is shown whether it is persistent: 22 hold, 2 do not\n"
+    assert said in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("solver", ["cvc5", "z3"])
@@ -113,7 +129,7 @@ def test_a_warning_that_nothing_shows_is_only_claimed(
     text = replace(document, records=records).to_text()
     write_bundle(tmp_path / "bare", replace(whole, verdicts=bare, evidence={**whole.evidence, file: text}))
     assert main(["verify", str(tmp_path / "bare")]) == 3
-    assert "? claimed   live" in capsys.readouterr().out
+    assert "? claimed          live" in capsys.readouterr().out
 
 
 def test_what_the_bundle_leaves_undecided_is_told_and_claims_nothing(
@@ -129,7 +145,7 @@ def test_what_the_bundle_leaves_undecided_is_told_and_claims_nothing(
     assert main(["verify", str(tmp_path / "doubted")]) == 0
     told = capsys.readouterr().out
     assert "left undecided by the bundle itself\n  ? starvation  every live transition" in told
-    assert "shown, 1 left undecided\n" in told
+    assert "shown (1 to be violated, which need not hold), 1 left undecided\n" in told
     write_bundle(tmp_path / "edited", replace(doubted, evidence=whole.evidence))
     assert main(["verify", str(tmp_path / "edited")]) == 2
     assert "'starvation' is unknown, and the evidence says otherwise" in capsys.readouterr().err.replace("\n", " ")
