@@ -171,9 +171,11 @@ def show(answered: Answered) -> None:
     if answered.faults:
         _show_faults(answered.faults)
     if answered.outages:
-        from firable.decompose.protocol.outages import outage_text
+        from firable.decompose.protocol.outages import namesakes, outage_text
 
         click.echo(f"\n{click.style('what may stand still while somebody is dead', bold=True)}")
+        for line in _folded(namesakes(answered.outages), 2):
+            click.echo(f"  {line}")
         for line in outage_text(answered.outages, text.columns() - 2).splitlines():
             click.echo(f"  {line}")
     if answered.refutations:

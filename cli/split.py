@@ -217,8 +217,10 @@ def _proposed(suggestion: Mapping[str, Any] | None, *, written: bool) -> Iterato
         if (of := suggestion[key]) is not None:
             sizes = [f"{name} {size}" for name, size in of["sizes"].items()]
             yield f"{title:<12} {of['cut']:>4} global, {of['votes']:>4} votes; places and signals: {_listed(sizes)}"
-    least, most = suggestion["fewest"], suggestion["most"]
-    yield f"{'at least':<12} {least:>4} global, as the net hangs together; at most {most}, with an owner for each block"
+    n, least, most = len(suggestion["proposed"]["sizes"]), suggestion["fewest"], suggestion["most"]
+    pieces = "for one controller owns all" if n == 1 else "for the net is in as many pieces as controllers, or more"
+    why = "as the net hangs together" if least else pieces
+    yield f"{'at least':<12} {least:>4} global, {why}; at most {most}, with an owner for each block"
     yield f"sizes from {low} to {high} were allowed (--slack); machines stay whole, and completions with their places"
     cut = suggestion["cut"]
     for one in cut[:_CONTROLLERS_MAX]:

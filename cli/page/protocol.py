@@ -51,9 +51,11 @@ def while_dead(report: Report) -> Markup | None:
     """Who is dead, and what that keeps back."""
     if not report.outages:
         return None
+    from firable.decompose.protocol.outages import namesakes
+
     rows: list[tuple[Content, ...]] = []
     for outage in report.outages:
-        who = tag("b", outage.name)
+        who = tag("b", outage.told)
         if outage.bound:
             rows.append((who, f"not known: {outage.bound}", *("" for _ in range(4))))
             continue
@@ -64,6 +66,7 @@ def while_dead(report: Report) -> Markup | None:
         "may, for ever, by what the crash has left open. What goes on does so whenever the crash was. A machine may "
         "stand that may get no command any more."
     )
+    both = namesakes(report.outages)
     heads = (
         "dead",
         "stands still at once",
@@ -73,7 +76,9 @@ def while_dead(report: Report) -> Markup | None:
         "machines running",
     )
     return together(
-        tag("p", lead, cls="lead"), table(heads, rows, caption="What may stand still while somebody is dead")
+        tag("p", lead, cls="lead"),
+        tag("p", both, ".") if both else None,
+        table(heads, rows, caption="What may stand still while somebody is dead"),
     )
 
 

@@ -46,6 +46,7 @@ from firable.analysis.evidence.meaning import property_claim
 from firable.analysis.evidence.producing.claims import Certifier
 from firable.analysis.evidence.producing.lacking import LackingError
 from firable.analysis.goal import Limits
+from firable.analysis.question import listed
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.spaces.space import StateSpace
 from firable.analysis.spaces.symbolic import explore_symbolically
@@ -93,6 +94,11 @@ class Outage:
     def name(self) -> str:
         """Who is dead, in words."""
         return self.who or self.coordinator
+
+    @property
+    def told(self) -> str:
+        """The same where controllers and coordinators stand beside each other, which may bear the same name."""
+        return f"controller {self.who}" if self.who else self.coordinator
 
 
 def fault_exploration(decomposition: Decomposition, limits: Limits | None = None) -> Exploration:
@@ -263,13 +269,27 @@ def outage_verdict(outage: Outage) -> Verdict:
     )
 
 
+def namesakes(found: Sequence[Outage]) -> str:
+    """What is to be said of those that are a controller and a coordinator by one name; empty where nobody is.
+
+    >>> namesakes([Outage("line"), Outage("robot"), Outage("", coordinator="coordinator line")])
+    "'line' is a controller and a coordinator: the one fires its parts, the other decides, and either may die alone"
+    """
+    controllers, coordinators = {one.who for one in found}, (one.coordinator for one in found if not one.who)
+    both = [f"'{name}'" for one in coordinators if (name := one.removeprefix("coordinator ")) in controllers]
+    if not both:
+        return ""
+    is_ = "is a controller and a coordinator" if len(both) == 1 else "are each a controller and a coordinator"
+    return f"{listed(both)} {is_}: the one fires its parts, the other decides, and either may die alone"
+
+
 def outage_text(found: Sequence[Outage], columns: int = COLUMNS) -> str:
     """The outages as a text: a paragraph for each, a row for each kind; `goes on` is what a person looks for.
 
     Rows are folded to so many columns, under their names; no name is broken.
 
     >>> print(outage_text([Outage("robot", ("move",), ("load",), ("mill",), ("arm",), ("mill",))]), end="")
-    robot dead
+    controller robot dead
       stands still at once     move
       may stand still          load
       goes on                  mill
@@ -278,7 +298,7 @@ def outage_text(found: Sequence[Outage], columns: int = COLUMNS) -> str:
     """
     lines = []
     for outage in found:
-        lines.append(f"{outage.name} dead")
+        lines.append(f"{outage.told} dead")
         if outage.bound:
             lines.append(f"  not known: {outage.bound}")
             continue

@@ -13,10 +13,13 @@ from support.free_parts import freed
 
 from firable.analysis._engine import BudgetExceeded
 from firable.cli.main import main
+from firable.cli.page.protocol import while_dead
+from firable.cli.protocol import Answered, show
 from firable.cli.prove import show_obligations
+from firable.cli.report import Report
 from firable.decompose.protocol import exploring, verdicts
 from firable.decompose.protocol.inductive_script import Proof
-from firable.decompose.protocol.outages import sealed_outages
+from firable.decompose.protocol.outages import Outage, sealed_outages
 from firable.decompose.splitting.cut import split
 from firable.nets import read_net
 from firable.nets.verdict import Status, Verdict
@@ -113,7 +116,28 @@ def test_faults_tell_what_stands_still(capsys: pytest.CaptureFixture[str], net: 
     assert main(["prove", net, "--faults"]) == 0
     told = capsys.readouterr().out
     assert "✓ proved    faults.resumes" in told
-    assert "  robot dead\n    stands still at once     fetch\n    may stand still          hand_over, unload\n" in told
+    assert (
+        "  controller robot dead\n    stands still at once     fetch\n    may stand still          hand_over, unload\n"
+        in told
+    )
+
+
+def test_who_is_dead_is_told_as_controller_or_as_coordinator(capsys: pytest.CaptureFixture[str], net: str) -> None:
+    found = (Outage("line", goes_on=("t",)), Outage("robot"), Outage("", ("t",), coordinator="coordinator line"))
+    both = "'line' is a controller and a coordinator: the one fires its parts, the other decides, and either may die"
+    show(Answered(outages=found))
+    told = capsys.readouterr().out
+    assert f"{both} alone\n" in told.replace("\n  alone", " alone")
+    assert re.findall("^  (.*) dead$", told, re.MULTILINE) == [
+        "controller line",
+        "controller robot",
+        "coordinator line",
+    ]
+    page = str(while_dead(Report("prove", net, read_net(Path(net)), (), outages=found)))
+    assert f"{both} alone." in page
+    assert re.findall("<b>([^<]*)</b>", page) == ["controller line", "controller robot", "coordinator line"]
+    show(Answered(outages=found[:2]))
+    assert "either may die" not in capsys.readouterr().out
 
 
 CHUTE = """\
@@ -216,7 +240,10 @@ def section(page: str, anchor: str) -> str:
 def test_page_tells_what_stands_still(net: str, tmp_path: Path) -> None:
     page = page_of(net, tmp_path, "--faults")
     dead = section(page, "dead")
-    assert '<tr><th scope="row"><b>robot</b></th><td data-of="stands still at once"><span class="code">fetch<' in dead
+    assert (
+        '<tr><th scope="row"><b>controller robot</b></th><td data-of="stands still at once"><span class="code">fetch<'
+        in dead
+    )
     assert '<td data-of="may stand still"><span class="code">hand_over, unload<' in dead
     assert '<td data-of="goes on">–</td>' in dead
     others = page.replace(section(page, "fault"), "")

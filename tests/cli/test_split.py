@@ -169,3 +169,18 @@ def test_a_pattern_that_matches_nothing_is_told_without_what_follows_from_it(
     said = capsys.readouterr().err
     assert "F2002" in said
     assert "F2011" not in said
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ("1", "at least        0 global, for one controller owns all; at most"),
+        ("2", "at least        0 global, for the net is in as many pieces as controllers, or more; at most"),
+        ("5", "at least        1 global, as the net hangs together; at most"),
+    ],
+)
+def test_what_bounds_a_proposal_is_said_of_a_net_that_hangs_together_only(
+    capsys: pytest.CaptureFixture[str], parts: str, said: str
+) -> None:
+    assert main(["split", "catalogue:machines-4", "--suggest", parts]) == 0
+    assert said in capsys.readouterr().out
