@@ -102,6 +102,7 @@ def loop_report(
             "transitions": len(report.loop.net.transitions),
             "markings_gates_free": report.opened.figures.markings,
             "comparison": [_compared(one) for one in report.differences],
+            **({"faults_not_asked": f"fault.MACHINE is not asked of {unasked}"} if (unasked := faults.unasked) else {}),
         },
     )
 
@@ -141,6 +142,8 @@ def show_loop(report: Report, *, verbose: bool) -> None:
         if "remark" in row:
             click.echo(f"      {row['remark']}")
     text.show_verdicts(report.loop_net or report.net, report.verdicts, verbose=verbose)
+    if "faults_not_asked" in loop:
+        click.echo(f"\n{loop['faults_not_asked']}")
     text.show_summary(report)
     for file in report.files:
         if file != "-":

@@ -43,6 +43,16 @@ class FaultsAsked:
         """The loops that were asked."""
         return tuple(one for one in (self.for_good, self.repaired) if one is not None)
 
+    @property
+    def unasked(self) -> str:
+        """Why of machines that may fail it is only asked whether that is safe; empty where more is asked."""
+        if self.live or self.for_good is None:
+            return ""
+        machines = listed(self.for_good.loop.failed)
+        return (
+            f"{machines}: without faults no transition is live here, so a fault takes nothing, and repair gives nothing"
+        )
+
     def verdicts(self) -> Iterator[Verdict]:
         """The verdicts as they are told: what stands still after a fault, and what hangs, in one."""
         if self.for_good is not None:

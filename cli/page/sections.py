@@ -155,7 +155,8 @@ def _loop(report: Report) -> Markup | None:
         "gate that never opens."
     )
     heads = ("question", "gates free", "with its machines", "")
-    return together(tag("p", lead, cls="lead"), table(heads, rows, caption="Verdicts side by side"))
+    unasked = tag("p", loop["faults_not_asked"], ".") if "faults_not_asked" in loop else None
+    return together(tag("p", lead, cls="lead"), table(heads, rows, caption="Verdicts side by side"), unasked)
 
 
 def refuted(report: Report) -> list[tuple[str, Verdict]]:

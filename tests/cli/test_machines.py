@@ -34,6 +34,28 @@ def test_the_loop_is_told_beside_the_net_with_gates_free(capsys: pytest.CaptureF
     assert told.endswith("all hold: 17 proved\n")
 
 
+def test_why_nothing_is_asked_of_faults_where_nothing_is_live_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    late, page = "catalogue:one_robot_mc_late", tmp_path / "page.html"
+    said = (
+        "fault.MACHINE is not asked of R, MC, CV1, CV2: without faults no transition is live here, so a fault takes "
+        "nothing, and repair gives nothing"
+    )
+    assert main(["check", late, "--machines", late]) == 1
+    told = capsys.readouterr().out
+    assert f"\n{said}\n" in told
+    assert "fault.safe" in told
+    assert "fault.MC" not in told
+    assert main(["check", late, "--machines", late, "--format", "json", "--report", str(page)]) == 1
+    data = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator(SCHEMA).validate(data)
+    assert data["reports"][0]["loop"]["faults_not_asked"] == said
+    assert f"<p>{said}.</p>" in page.read_text("utf-8")
+    assert main(["check", CELL, "--machines", PLANT]) == 0
+    assert "not asked" not in capsys.readouterr().out
+
+
 def test_what_gates_free_was_too_hopeful_about_stands_out(wrong_plant: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", CELL, "--machines", wrong_plant]) == 1
     told = capsys.readouterr().out
