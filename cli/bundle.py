@@ -130,8 +130,9 @@ def _show(report: Report) -> None:
     for note in report.notes:
         text.show_diagnostic(note)
     text.heading(report.net, report.input)
-    if not report.files:
-        text.show_verdicts(report.net, [v for v in report.verdicts if not v.holds])
+    # What is told for information has its place in `check` and `split`; a warning is told wherever it is counted.
+    told = [v for v in report.verdicts if not v.holds and (not report.files or v.weight.value == "warning")]
+    text.show_verdicts(report.net, told)
     text.show_summary(report)
     if report.files:
         click.echo(f"  bundle {report.files[0]}, identity {report.figures['bundle_digest'][:16]}…")

@@ -37,6 +37,16 @@ def as_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, A
     return code, data
 
 
+def test_a_bundle_that_is_made_tells_the_warnings_that_it_counts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["bundle", "catalogue:one_robot", "-o", str(tmp_path / "cell.bundle")]) == 0
+    told = capsys.readouterr().out
+    assert "\nwarnings\n  ! warning   machine-never-stopped  every machine" in told
+    assert "all hold: 152 proved, 1 warning\n" in told
+    assert "structural-conflicts" not in told
+
+
 def test_the_published_schema_is_one() -> None:
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
 
