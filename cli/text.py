@@ -34,7 +34,6 @@ COLUMNS: Final = 120
 ALIKE_SHOWN: Final = 2
 """Of how many errors with one cause each is told in full; of more, the first is, and the others are counted."""
 _NAMES_SHOWN: Final = 4
-_ONE_OF: Final = re.compile(r"(?<![\d.,])1 (firing|marking|edge|node)s\b")
 _QUOTED: Final = re.compile(r"'[^']*'")
 
 
@@ -82,23 +81,10 @@ def heading(net: Net, where: str) -> None:
 
 
 def counted(n: int, word: str) -> str:
-    """A number with its noun.
+    """A number with its noun."""
+    from firable.nets import verdict
 
-    >>> counted(1, "place"), counted(1200, "marking")
-    ('1 place', '1,200 markings')
-    """
-    from firable.nets.verdict import spelled
-
-    return f"{spelled(n)} {word}{'' if n == 1 else 's'}"
-
-
-def singular(told: str) -> str:
-    """What was counted by others, with each noun after a one as it should be.
-
-    >>> singular("21 firings played, and from there: 1 markings and 1 firings gone through")
-    '21 firings played, and from there: 1 marking and 1 firing gone through'
-    """
-    return _ONE_OF.sub("1 \\1", told)
+    return verdict.counted(n, word)
 
 
 def rule(sequence: Sequence[str], by: str) -> str:

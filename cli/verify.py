@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from firable.cli import text
 from firable.cli.options import answer_all, formats_option, load_net, refuse_a_net, write_folder
 from firable.cli.progress import stages
 from firable.cli.report import Report
@@ -158,7 +157,7 @@ def _verdict(document: Document, checked: CheckedRecord) -> Verdict:
         record.name or "evidence",
         Status.PROVED if checked.shown else Status.UNKNOWN,
         f"{said}{_claimed(record)}".removesuffix(": "),
-        text.singular("; ".join(checked.methods)) or "nothing",
+        "; ".join(checked.methods) or "nothing",
         bound=checked.only_claimed,
         hint="allow more time" if late else "",
         discipline=document.discipline.value,
@@ -196,7 +195,6 @@ def _told(verdict: Verdict, method: str, only_claimed: str, *, shown: bool) -> V
     """What is said of a verdict of a bundle; one that the bundle leaves undecided claims nothing, and weighs so."""
     from firable.nets.verdict import Status, Verdict
 
-    method = text.singular(method)
     if verdict.status is Status.UNKNOWN:
         return Verdict(verdict.name, Status.UNKNOWN, verdict.statement, method, verdict.weight, bound=only_claimed)
     violated = "it is violated: " if verdict.status is Status.VIOLATED else ""

@@ -240,6 +240,15 @@ def spelled(count: int) -> str:
     return f"{count:,}" if count < 10**15 else f"{Decimal(count):.3e}"
 
 
+def counted(n: int, word: str) -> str:
+    """A number with its noun.
+
+    >>> counted(1, "place"), counted(1200, "marking")
+    ('1 place', '1,200 markings')
+    """
+    return f"{spelled(n)} {word}{'' if n == 1 else 's'}"
+
+
 def overall(verdicts: Iterable[Verdict]) -> Status:
     """The outcome of all verdicts that matter together: unknown never passes, and a violation outweighs it.
 

@@ -61,6 +61,7 @@ STATE_GOALS: Final = frozenset(ClaimKind) - {ClaimKind.CTL, ClaimKind.LTL, Claim
 """The kinds whose goal is a state formula."""
 
 TRUE: Final = Constant(value=True)
+FALSE: Final = Constant(value=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +108,10 @@ class Claim:
         if not isinstance(self.goal, Formula):
             raise ValueError(f"'{format_temporal(self.goal)}' is no state formula")
         return self.goal
+
+
+NEVER_FALSE: Final = Claim(ClaimKind.NEVER, FALSE)
+"""What needs nothing to show it, so that no evidence has it."""
 
 
 def tidy(formula: Formula) -> Formula:

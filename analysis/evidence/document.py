@@ -41,7 +41,7 @@ from pydantic import ValidationError
 from firable.analysis.evidence.certificate import Certificate
 from firable.analysis.evidence.certificate_records import certificate_to_json
 from firable.analysis.evidence.claim_records import Sets, claim_to_json
-from firable.analysis.evidence.claims import Claim
+from firable.analysis.evidence.claims import NEVER_FALSE, Claim
 from firable.analysis.evidence.document_records import BeforeRecord, EvidenceRecord
 from firable.nets.diagnostics import Diagnostic, InputError, Span
 from firable.nets.formula import FormulaError
@@ -251,6 +251,8 @@ def _document(record: EvidenceRecord) -> Document:
         shown = []
         for one in verdict.shown:
             claim, of = one.claim.of(net), one.certificate
+            if claim == NEVER_FALSE and verdict.name:
+                raise ValueError("that something false is never so needs nothing to show it")
             certificate = before.certificate(claim) if isinstance(of, BeforeRecord) else of.of(net, sets)
             before.has(claim, certificate)
             shown.append((claim, certificate))

@@ -20,7 +20,7 @@ from itertools import combinations, permutations
 
 from firable.analysis.deadline import NEVER, Deadline
 from firable.analysis.evidence.by_goals import said_by_goals
-from firable.analysis.evidence.claims import Claim, ClaimKind, marking_of, temporal_claim, tidy
+from firable.analysis.evidence.claims import NEVER_FALSE, TRUE, Claim, ClaimKind, marking_of, temporal_claim, tidy
 from firable.analysis.evidence.read_off import eager_cycle, read_off
 from firable.analysis.evidence.refusal import in_time
 from firable.nets.formula import (
@@ -142,13 +142,14 @@ class Shown:
         homes = (c.state_goal for c in claims if c.kind is ClaimKind.ALWAYS_POSSIBLE)
         self.homes = {home for home in homes if marking_of(net, home) is not None}
         of_runs = [c for c in claims if c.kind in {ClaimKind.FIRES, ClaimKind.IN_ORDER}]
-        self.fired = {name for claim in of_runs for name in claim.fires}
+        from_the_start = {TRUE, *self.homes}
+        self.fired = {name for claim in of_runs if claim.goal in from_the_start for name in claim.fires}
         self.fired_at_home = {name for claim in of_runs if claim.goal in self.homes for name in claim.fires}
         later = (claim for claim in claims if claim.kind is ClaimKind.LATER)
         self.met_at_home = {claim.then for claim in later if claim.goal in self.homes}
 
     def __contains__(self, claim: Claim) -> bool:
-        return claim in self.claims or (claim.kind is ClaimKind.NEVER and claim.goal == Constant(value=False))
+        return claim in self.claims or claim == NEVER_FALSE
 
     def live(self, name: str) -> bool:
         """Whether a transition is shown to be live."""

@@ -187,7 +187,7 @@ class Inquest:
             claim = _claim(of, proved=verdict.holds)
             record = Record(f"property.{name}", verdict.holds, ())
             try:
-                records.append(replace(record, shown=((claim, certifier.certify(claim, verdict.witness)),)))
+                records.append(replace(record, shown=certifier.shown(claim, verdict.witness)))
             except LackingError as error:
                 records.append(replace(record, lacking=str(error)))
         return Document(net, self.space.discipline, tuple(records))

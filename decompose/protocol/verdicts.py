@@ -96,7 +96,7 @@ def document(exploration: Exploration, limits: Limits | None = None) -> Document
             claim = Claim(ClaimKind.NEVER if proved else ClaimKind.REACHABLE, tidy(of.formula))
             name = f"property.{of.name}"
             try:
-                records.append(Record(name, proved, ((claim, certifier.certify(claim, verdict.witness)),)))
+                records.append(Record(name, proved, certifier.shown(claim, verdict.witness)))
             except LackingError as error:
                 records.append(Record(name, proved, (), str(error)))
     return Document(net, space.discipline, tuple(records))

@@ -35,7 +35,7 @@ from firable.decompose.refinement.carrying import METHOD
 from firable.decompose.refinement.closed import BlockProof
 from firable.decompose.refinement.confirming import MARKINGS_MAX, TheoremError
 from firable.nets.bundle import file_stem
-from firable.nets.formula import And, Firable, Formula, Holds, Not, Or
+from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or
 from firable.nets.net import Fairness, Net, Property, PropertyKind
 from firable.nets.tasks.model import Task
 from firable.nets.verdict import Status, Verdict
@@ -121,9 +121,9 @@ def conditions(task: Task, net: Net) -> Iterator[Property]:
     yield Property("ends", PropertyKind.ALWAYS_POSSIBLE, Or((ready, Not(inside))))
     yield Property("ends-clean", PropertyKind.NEVER, And((ready, Or((*map(Holds, left), *not_idle)))))
     yield Property("settles", PropertyKind.LEADS_TO, inside, Not(inside), Fairness.NONE)
-    competing = (
+    competing = tuple(
         And((Firable(t.name), Firable(u.name)))
         for t, u in combinations(net.transitions, 2)
         if {*t.inputs} & {*u.inputs} or {*t.outputs} & {*u.outputs}
     )
-    yield Property("orderly", PropertyKind.NEVER, Or(tuple(competing)))
+    yield Property("orderly", PropertyKind.NEVER, Or(competing) if competing else Constant(value=False))

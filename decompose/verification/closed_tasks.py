@@ -15,7 +15,7 @@ from itertools import combinations
 from typing import Final
 
 from firable.decompose.verification.refusal import NotShownError
-from firable.nets.formula import And, Firable, Formula, Holds, Not, Or
+from firable.nets.formula import And, Constant, Firable, Formula, Holds, Not, Or
 from firable.nets.net import (
     ExternalGate,
     Fairness,
@@ -123,12 +123,12 @@ class ClosedTask:
         yield Property("ends", PropertyKind.ALWAYS_POSSIBLE, Or((ready, Not(inside))))
         yield Property("ends-clean", PropertyKind.NEVER, And((ready, Or((*rest, *kept)))))
         yield Property("settles", PropertyKind.LEADS_TO, inside, Not(inside), Fairness.NONE)
-        pairs = (
+        pairs = tuple(
             And((Firable(t.name), Firable(u.name)))
             for t, u in combinations(net.transitions, 2)
             if {*t.inputs} & {*u.inputs} or {*t.outputs} & {*u.outputs}
         )
-        yield Property("orderly", PropertyKind.NEVER, Or(tuple(pairs)))
+        yield Property("orderly", PropertyKind.NEVER, Or(pairs) if pairs else Constant(value=False))
 
     @cached_property
     def inner(self) -> tuple[str, ...]:

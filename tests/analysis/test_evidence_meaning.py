@@ -11,10 +11,11 @@ from support.naive_space import NaiveSpace
 from support.true_claims import true
 
 from firable.analysis.check import check
-from firable.analysis.evidence.certificate import FiringSequence
+from firable.analysis.evidence.certificate import FiringSequence, InductiveInvariant
 from firable.analysis.evidence.checking.checker import check_document
 from firable.analysis.evidence.checking.obligation import Evidence
-from firable.analysis.evidence.claims import Claim, ClaimKind, is_marking, tidy
+from firable.analysis.evidence.claims import FALSE, TRUE, Claim, ClaimKind, is_marking, tidy
+from firable.analysis.evidence.document import document_from_text
 from firable.analysis.evidence.meaning import (
     commands_clash,
     competing,
@@ -26,6 +27,8 @@ from firable.analysis.evidence.meaning import (
 )
 from firable.analysis.evidence.producing.producer import evidence_of_report
 from firable.analysis.report import report_on
+from firable.nets.catalogue import catalogue_net
+from firable.nets.diagnostics import InputError
 from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
 from firable.nets.net import Command, Net, Place, Property, PropertyKind, Transition
 from firable.nets.temporal import parse_temporal
@@ -190,6 +193,31 @@ def test_true_claims_never_suffice_for_the_opposite_of_a_verdict(discipline: Dis
     assert judged > 200
 
 
+def test_only_runs_from_the_start_or_from_home_show_that_a_transition_fires() -> None:
+    net = catalogue_net("conceptual_one_robot")
+    every = [t.name for t in net.transitions]
+
+    def enough(*claims: Claim) -> bool:
+        return suffices(net, Discipline.INTERLEAVING, "quasi-live", True, claims, None)
+
+    assert enough(fires(TRUE, *every))
+    assert not enough(fires(Start(), *every))
+    assert enough(fires(Start(), *every), Claim(ClaimKind.ALWAYS_POSSIBLE, Start()))
+
+
+def test_what_needs_nothing_to_show_it_stands_in_no_record() -> None:
+    net = replace(catalogue_net("conceptual_one_robot"), properties=(Property("no", PropertyKind.NEVER, FALSE),))
+    document = evidence_of_report(check(net))
+    (record,) = (one for one in document.records if one.name == "property.no")
+    assert record.shown == ()
+    (shown,) = (one for one in check_document(document) if one.record.name == "property.no")
+    assert shown.shown
+    never = Claim(ClaimKind.NEVER, FALSE)
+    idle = replace(record, shown=((never, InductiveInvariant()),))
+    with pytest.raises(InputError, match="needs nothing to show it"):
+        document_from_text(replace(document, records=(idle,)).to_text())
+
+
 def test_a_machine_is_never_stopped_where_no_run_sends_another_command_before_or_after() -> None:
     places = (
         Place("a", marked=True),
@@ -199,7 +227,7 @@ def test_a_machine_is_never_stopped_where_no_run_sends_another_command_before_or
     go, halt = Transition("go", ("a",), ("b",)), Transition("halt", ("a",), ("c",))
     either = Net("either", places, (go, halt))
     beside = Claim(ClaimKind.LTL, never_beside(("go",), ("halt",)))
-    sent = fires(Start(), "go")
+    sent = fires(TRUE, "go")
 
     def enough(*claims: Claim) -> bool:
         return suffices(either, Discipline.INTERLEAVING, "machine-never-stopped", False, claims, None)

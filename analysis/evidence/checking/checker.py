@@ -65,6 +65,7 @@ from firable.nets.formula import format_formula
 from firable.nets.net import Net
 from firable.nets.queries import parse_query
 from firable.nets.temporal import format_temporal
+from firable.nets.verdict import counted
 from firable.semantics.formulas import evaluate
 from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
@@ -208,7 +209,8 @@ class _Checker:
                     refuse("stubborn sets are checked under interleaving only")
                 stubborn = Stubborn(net, certificate, self.deadline)
                 stubborn.check(claim.state_goal)
-                words = f"{len(stubborn.markings):,} markings with stubborn sets, and {stubborn.n_firings:,} firings"
+                markings, firings = counted(len(stubborn.markings), "marking"), counted(stubborn.n_firings, "firing")
+                words = f"{markings} with stubborn sets, and {firings}"
                 return Checked(shown=True, method=f"{words}, looked through")
             case Reduction():
                 left = left_of(evidence, self.deadline)
@@ -219,7 +221,7 @@ class _Checker:
                 return replace(rest, method=f"{left.words}, and of what is left: {rest.method}")
             case Continuation(firings):
                 rest = self.check(continued(evidence))
-                return replace(rest, method=f"{len(firings):,} firings played, and from there: {rest.method}")
+                return replace(rest, method=f"{counted(len(firings), 'firing')} played, and from there: {rest.method}")
             case Progress(space):
                 listed = self._listed(evidence, space)
                 check_progress(listed, claim, certificate)
@@ -362,7 +364,7 @@ def _true(assignment: object, name: str) -> bool:
 
 def _run(evidence: Evidence, of: FiringSequence) -> Checked:
     net, discipline, claim = evidence.net, evidence.discipline, evidence.claim
-    method = f"{len(of.firings) + len(of.cycle):,} firings played by the reference player"
+    method = f"{counted(len(of.firings) + len(of.cycle), 'firing')} played by the reference player"
     match claim.kind:
         case ClaimKind.NOT_LTL:
             check_refuting_run(net, discipline, claim, of)

@@ -15,6 +15,7 @@ from firable.analysis.evidence.checking.cubes import firings
 from firable.analysis.evidence.refusal import in_time, refuse, shown
 from firable.nets.formula import Formula, format_formula
 from firable.nets.net import Marking, Net
+from firable.nets.verdict import counted
 from firable.semantics.algebra import Bitwise
 from firable.semantics.formulas import evaluate
 
@@ -41,7 +42,8 @@ class Closed:
     @property
     def method(self) -> str:
         """What was gone through, in words."""
-        return f"{len(self.markings):,} markings and {self.n_firings:,} firings looked through in columns"
+        markings, firings = counted(len(self.markings), "marking"), counted(self.n_firings, "firing")
+        return f"{markings} and {firings} looked through in columns"
 
     def require_never(self, goal: Formula) -> None:
         """Refuse a goal that holds in a marking of the set."""

@@ -15,6 +15,7 @@ from firable.analysis.evidence.checking.columns import columns
 from firable.analysis.evidence.refusal import TimeIsOverError, refuse, shown
 from firable.nets.formula import Formula
 from firable.nets.net import Marking, Net
+from firable.nets.verdict import counted
 from firable.semantics.algebra import Bitwise
 from firable.semantics.firing import firable
 from firable.semantics.formulas import evaluate
@@ -67,8 +68,8 @@ class Part:
     @property
     def method(self) -> str:
         """What was gone through, in words."""
-        n_edges = sum(map(len, self.edges))
-        return f"{len(self.markings):,} markings and {n_edges:,} firings gone through by the reference player"
+        markings = counted(len(self.markings), "marking")
+        return f"{markings} and {counted(sum(map(len, self.edges)), 'firing')} gone through by the reference player"
 
     def _successors(self, i: int, marking: Marking) -> Iterable[tuple[FiringSet, Marking]]:
         if self.discipline is Discipline.STEP:

@@ -25,7 +25,7 @@ from firable.analysis.evidence.certificate import (
     Unfolded,
 )
 from firable.analysis.evidence.checking.theorems import check_premises
-from firable.analysis.evidence.claims import Claim, ClaimKind, as_ctl, tidy, without_start
+from firable.analysis.evidence.claims import NEVER_FALSE, Claim, ClaimKind, as_ctl, tidy, without_start
 from firable.analysis.evidence.producing.labels import TooLargeError, drawn, labelling
 from firable.analysis.evidence.producing.lacking import NO_TIME, LackingError
 from firable.analysis.evidence.producing.nevers import Nevers
@@ -70,6 +70,10 @@ class Certifier:
         self.nevers = Nevers(self.spaces, {tidy(goal): found for goal, found in findings})
         self._ends: list[tuple[Continuation, Callable[[Formula], bool]]] = []
         self.deadlock: Witness | None = None
+
+    def shown(self, claim: Claim, witness: Witness | None = None) -> tuple[tuple[Claim, Certificate], ...]:
+        """A claim with its certificate, as a record has it: nothing where it needs none. Raises `LackingError`."""
+        return () if claim == NEVER_FALSE else ((claim, self.certify(claim, witness)),)
 
     def certify(self, claim: Claim, witness: Witness | None = None) -> Certificate:
         """A certificate for a claim; `witness` is the run that the verdict came with.

@@ -39,7 +39,7 @@ from firable.analysis.goal import Finding, Limits
 from firable.analysis.report import CheckReport
 from firable.analysis.verdicts.behaviour import DEADLOCK_FREE
 from firable.analysis.verdicts.properties import possibilities
-from firable.nets.formula import And, Constant, Deadlock, Firable, Formula, Holds, Not, Start
+from firable.nets.formula import And, Deadlock, Firable, Formula, Holds, Not, Start
 from firable.nets.net import Marking, Property, TemporalProperty
 from firable.nets.queries import Query, QueryKind, format_query
 from firable.nets.temporal import Logic, Temporal, TemporalAnd, TemporalNot, TemporalOr
@@ -49,7 +49,6 @@ from firable.semantics.formulas import evaluate
 from firable.semantics.player import Player, holds_in
 
 Shown = list[tuple[Claim, Certificate]]
-_FALSE: Final = Constant(value=False)
 STABLE_PLACES_MAX: Final = 500
 
 
@@ -102,12 +101,12 @@ class _Verdicts:
         return Record(verdict.name, proved, tuple(shown), lacking, "" if query is None else format_query(query))
 
     def _one(self, claim: Claim, witness: Witness | None = None) -> Iterator[tuple[Claim, Certificate]]:
-        yield claim, self.certifier.certify(claim, witness)
+        yield from self.certifier.shown(claim, witness)
 
     def _never(self, bad: Formula, verdict: Verdict) -> Iterator[tuple[Claim, Certificate]]:
         """That something is never so, for a verdict that says this, or that it is."""
         if verdict.status is Status.PROVED:
-            return iter(()) if bad == _FALSE else self._one(Claim(ClaimKind.NEVER, bad))
+            return self._one(Claim(ClaimKind.NEVER, bad))
         return self._one(Claim(ClaimKind.REACHABLE, bad), verdict.witness)
 
     def _shown(self, verdict: Verdict, query: Query | None, proved: bool) -> Iterable[tuple[Claim, Certificate]]:
@@ -176,7 +175,7 @@ class _Verdicts:
 
     def _or_theorem(self, claim: Claim, witness: Witness | None) -> Iterator[tuple[Claim, Certificate]]:
         try:
-            yield claim, self.certifier.certify(claim, witness)
+            yield from self._one(claim, witness)
         except LackingError as error:
             if claim.kind is not ClaimKind.ALWAYS_POSSIBLE:
                 raise
@@ -275,7 +274,7 @@ class _Verdicts:
 
     def _never_sent(self, sending: tuple[str, ...]) -> Iterator[tuple[Claim, Certificate]]:
         goal = some_firable(sending)
-        return iter(()) if goal == _FALSE else self._one(Claim(ClaimKind.NEVER, goal))
+        return self._one(Claim(ClaimKind.NEVER, goal))
 
     def _never_stopped(self) -> Iterator[tuple[Claim, Certificate]]:
         """A command that is sent, and beside which no run sends another one to its machine."""
