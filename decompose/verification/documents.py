@@ -234,5 +234,5 @@ def _judge(
         said = "undecided: the bundle itself does not say" if undecided else "only claimed: no evidence is on it"
         examination.judge(verdict, shown=False, method="nothing", only_claimed=said)
         return
-    method = "; ".join(found[0].methods) or "read off the net"
+    method = "; ".join(found[0].methods) or "the net itself"
     examination.judge(verdict, shown=found[0].shown, method=method, only_claimed=found[0].only_claimed)

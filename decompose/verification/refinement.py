@@ -199,7 +199,7 @@ class _Records:
             if one.record.name not in known or key in self.status or one.record.query:
                 raise NotShownError(f"'{file}' speaks of '{one.record.name}', as no bundle does", "evidence", file)
             self.status[key] = Status.PROVED if one.record.proved else Status.VIOLATED
-            self.methods[key] = "; ".join(one.methods) or "read off the net"
+            self.methods[key] = "; ".join(one.methods) or "the net itself"
             if not one.shown:
                 self.late[key] = one.only_claimed
 

@@ -160,7 +160,7 @@ def _checked(checker: _Checker, document: Document, record: Record) -> CheckedRe
         return CheckedRecord(record, shown=False, methods=methods, only_claimed=str(error))
     if enough and not record.lacking:
         return CheckedRecord(
-            record, shown=True, methods=methods or (_BY_DEFINITION.get(record.name, "read off the net"),)
+            record, shown=True, methods=methods or (_BY_DEFINITION.get(record.name, "the net itself"),)
         )
     reason = record.lacking or "what is shown does not say so"
     return CheckedRecord(record, shown=False, methods=methods, only_claimed=f"only claimed: {reason}")
