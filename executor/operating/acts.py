@@ -116,6 +116,8 @@ class Acts:
         self.clock: RunClock | None = None
         self.ticks: dict[str, asyncio.TimerHandle] = {}
         """For each controller with a time that runs, when it is told the time next."""
+        self.unbegun: set[str] = set()
+        """The controllers with a time that begins when its command has left."""
         self.messages = 0
         self.repeats = 0
         self.heard = False
@@ -278,10 +280,16 @@ class Acts:
         self.act(machine, effects, known)
 
     def _tick(self, machine: str) -> None:
-        """Tell a controller the time, and see to it that it is told again when the next of its times is over."""
+        """Tell a controller the time, and see to it that it is told again when the next of its times is over.
+
+        A time begins with that, so not before its command has left: a machine is not accused of a disk that is slow.
+        """
         controller = self.controllers[machine]
         if not controller.timers.running and machine not in self.ticks:
             return  # most machines have no time limits, and this is on the way of each signal
+        if controller.timers.begins_with(one.place for one in self.outbox if isinstance(one, Sending)):
+            self.unbegun.add(machine)  # `let_go` has it told
+            return
         self.act(machine, controller.tick(self.now_seconds()))
         if (earlier := self.ticks.pop(machine, None)) is not None:
             earlier.cancel()
@@ -403,6 +411,9 @@ class Acts:
 
     def let_go(self) -> list[Sending | Message]:
         """What leaves the host now that its cause is stored, or is never sent."""
+        for machine in self.unbegun:
+            self.post(machine, None)
+        self.unbegun.clear()
         return self.outbox.over()
 
     # What is open

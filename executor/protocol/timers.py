@@ -1,8 +1,9 @@
 """The times of one controller: how long each command under a time limit has been under way, and whether that is over.
 
 Time is an input, like a signal: whoever hosts the controller says what its clock shows (`tick`), and asks when the
-next time will be over (`deadline`). A time begins with the first tick after the token has entered, and is over when its
-limit has gone by and the token is still there without its completion. Then the timer is set in the process image, as a
+next time will be over (`deadline`). A time begins with the first tick after the token has entered, so a host gives
+none before the command has left it (`begins_with`), and is over when its limit has gone by and the token is still there
+without its completion. Then the timer is set in the process image, as a
 driver would set a sensor, and the fault transition is a local one like any other.
 
 A late tick is a late timeout and nothing worse: no proof says when a time is over. A clock that jumps makes timeouts
@@ -15,7 +16,7 @@ left, and come again after another has entered, and so needs numbers and a test 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import inf
 from typing import Final
 
@@ -48,6 +49,10 @@ class Timers:
         """A token has entered a place, and its command is sent: its time begins with the next tick."""
         if place in self.places:
             self.running[place] = -inf
+
+    def begins_with(self, places: Iterable[str]) -> bool:
+        """Whether the next tick would begin the time of one of these places."""
+        return any(self.running.get(place) == -inf for place in places)
 
     def begin_anew(self, word: Word) -> None:
         """Begin the time of every place that waits for its completion: after a restart."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import random
 from collections import deque
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
@@ -85,6 +85,12 @@ class Process(Generic[Machine]):
         if batches := sum(act.writes for act in self.outbox.behind):
             self.disk.sync(batches)
         return [effect for act in self.outbox.over() for effect in act.leaving]
+
+    @property
+    def held_back(self) -> Iterator[str]:
+        """The places whose commands have not left."""
+        waiting = [effect for act in self.outbox for effect in act.leaving]
+        return (effect.place for effect in (*waiting, *self.leaving) if isinstance(effect, Sending))
 
     def hand(self, sending: Sending) -> bool:
         """Let the driver keep a command for later; returns whether that counts as sent."""

@@ -315,9 +315,14 @@ class World:
             self.act(process, process.machine.report())
 
     def tick(self, process: Process[LocalController]) -> None:
-        """Tell a controller the time if it wants to know; sometimes also if it does not, as its host does."""
+        """Tell a controller the time if it wants to know; sometimes also if it does not, as its host does.
+
+        Nobody is told while that would begin the time of a command that has not left.
+        """
         timekeeper = self.timekeepers.get(process.name)
         if timekeeper is None or process.machine is None:
+            return
+        if process.machine.timers.begins_with(process.held_back):
             return
         now, due = process.clock.shown_seconds, process.machine.deadline()
         if (due is not None and due <= now) or self.draw.random() < 0.5:

@@ -7,6 +7,7 @@ import io
 import json
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
+from math import inf
 from pathlib import Path
 from threading import Semaphore, Thread
 from typing import Any
@@ -314,14 +315,17 @@ def test_a_disk_that_fails_on_its_thread_ends_the_run_with_the_machines_stopped_
     asyncio.run(main())
 
 
-def test_a_command_whose_time_is_over_before_the_disk_has_answered_is_not_sent() -> None:
+def test_a_command_whose_token_has_left_before_the_disk_has_answered_is_not_sent() -> None:
     async def main() -> None:
-        rig = Rig(CELL.replace("until: worked", "until: worked, within: 20ms"))
+        rig = Rig()
         async with rig.running():
             rig.journal.is_slow = True
             rig.host.signal("b.key", value=True, entry=None)
             await turns()
-            await until(lambda: "b.working" not in rig.host.marking, "the end of its time")
+            assert "b.working" in rig.host.marking
+            rig.host.signal("b.worked", value=True, entry=None)  # as a sensor shows it, whoever has done it
+            await turns()
+            assert "b.working" not in rig.host.marking
             assert rig.machines.sent == []
             await rig.answer_all()
             assert rig.machines.sent == []
@@ -465,5 +469,29 @@ def test_a_trace_whose_disk_never_answers_ends_a_stop_as_an_error(tmp_path: Path
             assert rig.machines.sent == []
             trace.close()  # which does not wait either
             trace.answers.release(1000)
+
+    asyncio.run(main())
+
+
+TIMED = CELL.replace("until: worked}", "until: worked, within: 20ms}")
+
+
+def test_a_time_begins_when_its_command_has_left_and_not_while_that_waits_for_the_disk() -> None:
+    async def main() -> None:
+        rig = Rig(TIMED)
+        async with rig.running():
+            await rig.slow_from_now_on()
+            rig.host.signal("b.key", value=True, entry=None)
+            await turns()
+            running = rig.host.acts.controllers["b"].timers.running
+            assert running == {"b.working": -inf}
+            await rig.answer()  # to what was done before
+            assert running == {"b.working": -inf}
+            assert "b.working" not in rig.machines.sent
+            await rig.answer()
+            assert "b.working" in rig.machines.sent
+            await until(lambda: not running, "the end of the time")
+            await rig.answer_all()
+            assert '"b.working_overdue"' in rig.stream.getvalue()
 
     asyncio.run(main())

@@ -15,6 +15,7 @@ from support.rehearsals import BAD, ORDERLY, rehearsed
 from support.timed_nets import HANDOVER, timed_nets
 
 from firable.decompose.splitting.cut import split
+from firable.decompose.splitting.persistence import freed
 from firable.executor.cell.disturbances import NeverCompletes
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import until
@@ -26,6 +27,7 @@ from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.messages import Decision, Effect, Firing, Keep, Sending, Stored, Taken, VoteRequest
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.executor.simulation.campaign import Passed, Run, rehearse
+from firable.executor.simulation.drawn import DRAWN
 from firable.executor.simulation.judge import Subject
 from firable.nets.catalogue import catalogue_net, catalogue_path, catalogue_plant
 from firable.nets.decomposition import Decomposition
@@ -349,3 +351,9 @@ def test_what_only_a_timeout_would_fire_is_not_said_to_be_waited_for() -> None:
 def test_the_timed_cell_of_the_catalogue_runs() -> None:
     report = execute(split(catalogue_net("one_robot_timed")), catalogue_plant("one_robot_timed"), workpieces=2)
     assert report.state is State.DONE
+
+
+def test_a_time_that_is_over_is_that_of_a_command_that_was_sent() -> None:
+    """It began with the entry of the token, while the command still waited for a disk that was slow."""
+    run = Run(7003351, ("partition", "crash", "unsynced", "pause"), 283)
+    assert isinstance(rehearse(Subject(freed(split(DRAWN["drawn-timed"](run.seed // 10)))), run), Passed)
