@@ -50,6 +50,7 @@ class NetFile(pytest.File):
     def verdicts(self) -> dict[str, Verdict]:
         """What `firable check` says of the net, held to what the file expects."""
         from firable.analysis.check import check
+        from firable.analysis.cures.finding import explained
         from firable.analysis.spaces.reachability import Budget
         from firable.nets.verdict import held_to
 
@@ -59,7 +60,7 @@ class NetFile(pytest.File):
         except ValueError:
             raise pytest.UsageError(f"firable_max_seconds: '{given}' is no number of seconds") from None
         with self.loaded.placing():
-            verdicts = check(self.loaded.net, budget=Budget(seconds=seconds)).verdicts
+            verdicts = explained(check(self.loaded.net, budget=Budget(seconds=seconds)))
             return {verdict.name: verdict for verdict in held_to(self.loaded.net.expected, verdicts)}
 
     def collect(self) -> Iterator[NetTest]:

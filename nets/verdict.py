@@ -12,7 +12,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from enum import StrEnum
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from firable.nets.changes import Change
 
 TOKENS_MAX: Final = 200
 """Of a marking with more tokens a witness may tell none: thousands of runs of a large net would fill a report."""
@@ -66,13 +69,15 @@ class Cure:
     """A change of the net after which a violated verdict is proved, as checking the changed net has shown.
 
     `changes` say what to write, a sentence each; `proves` names the verdicts that come out well besides, and `loses`
-    those that do no longer; `markings` is how many the changed net has.
+    those that do no longer; `markings` is how many the changed net has. `parts` are the changes themselves, for who
+    makes them: known where the cure was found, and not where it was read from a file, which tells them in words alone.
     """
 
     changes: tuple[str, ...]
     proves: tuple[str, ...]
     loses: tuple[str, ...]
     markings: int
+    parts: tuple[Change, ...] = field(default=(), compare=False)
 
     def to_json(self) -> dict[str, Any]:
         """The cure as JSON data."""

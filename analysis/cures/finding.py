@@ -31,12 +31,12 @@ from itertools import combinations, islice, product
 from typing import Any, Final, Generic
 
 from firable.analysis.check import check
-from firable.analysis.cures.changes import Arbitration, Change, Gate, capacity, changed, free_name
 from firable.analysis.methods import Method
 from firable.analysis.report import CheckReport
 from firable.analysis.spaces.reachability import Budget, explore
 from firable.analysis.spaces.space import S, StateSpace
 from firable.analysis.verdicts.goals import goals_of
+from firable.nets.changes import Arbitration, Change, Gate, capacity, changed, free_name
 from firable.nets.diagnostics import InputError
 from firable.nets.formula import Or
 from firable.nets.net import Arbiter, Net, Property, PropertyKind
@@ -102,7 +102,7 @@ class _Cured:
     def told(self, name: str) -> Cure:
         """The cure of one of the verdicts that it proves."""
         proves = tuple(of for of in self.proves if of != name)
-        return Cure(tuple(map(str, self.changes)), proves, self.loses, self.markings)
+        return Cure(tuple(map(str, self.changes)), proves, self.loses, self.markings, self.changes)
 
 
 class _Search(Generic[S]):

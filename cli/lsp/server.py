@@ -1,16 +1,17 @@
 """A language server for net files, over standard input and output (Language Server Protocol 3.17, by pygls).
 
 What it tells is what the other commands tell: the diagnostics of the reader as one types, and the verdicts of `firable
-check` that matter, for a moment's budget, when a file is opened or saved. Names are found in the text as it stands, so
-going to a definition works in a net that is not well formed yet; hovering needs the net, and takes the last one that
-was. A rename is offered only where the text after it is a net again.
+check` that matter, for a moment's budget, when a file is opened or saved; a change that cures a violated one is offered
+as a code action. Names are found in the text as it stands, so going to a definition works in a net that is not well
+formed yet; hovering needs the net, and takes the last one that was. A rename or a cure is offered only where the text
+after it is a net again.
 """
 
 from __future__ import annotations
 
 import asyncio
 from dataclasses import dataclass, field
-from typing import Final
+from typing import TYPE_CHECKING, Final
 from urllib.parse import unquote, urlparse
 
 from lsprotocol import types as lsp
@@ -23,11 +24,17 @@ from firable.cli.lsp.hover import hover
 from firable.cli.report import Report
 from firable.cli.text import reasons
 from firable.nets.diagnostics import Diagnostic, InputError, Span
+from firable.nets.editing import edits
 from firable.nets.net import Net
 from firable.nets.occurrences import Kind, Names, Occurrence
 from firable.nets.rules import rule_of
 from firable.nets.source import Source
 from firable.nets.text import parse_positioned
+from firable.nets.text_positions import Positions
+from firable.nets.verdict import Cure, Verdict
+
+if TYPE_CHECKING:
+    from firable.analysis.report import CheckReport
 
 SECONDS: Final = 5.0
 """How long a net that was opened or saved is checked."""
@@ -47,13 +54,17 @@ _ITEMS: Final = {
     Kind.TRANSITION: lsp.CompletionItemKind.Method,
 }
 
+_Told = tuple[lsp.Diagnostic, tuple[Cure, ...]]
+"""What is told of a verdict, and the changes that cure it."""
+
 
 @dataclass
 class _Opened:
-    """A file in the editor: its last text that was a net, and what checking has told of the one it stands for."""
+    """A file in the editor: its last text that was a net, and what cures the verdicts on the text that was checked."""
 
     net: Net | None = None
-    verdicts: list[lsp.Diagnostic] = field(default_factory=list)
+    checked: str = ""
+    cures: list[tuple[lsp.Diagnostic, Cure]] = field(default_factory=list)
 
 
 class NetServer(LanguageServer):
@@ -119,46 +130,70 @@ class NetServer(LanguageServer):
         severity = lsp.DiagnosticSeverity.Error if one.severity.value == "error" else lsp.DiagnosticSeverity.Warning
         return lsp.Diagnostic(self.of_span(uri, one.span), told, severity, one.code, source="firable")
 
-    def checked(self, uri: str, source: Source) -> list[lsp.Diagnostic]:
-        """The verdicts on a net that matter and do not hold, for a moment's budget; takes seconds."""
-        from firable.analysis.check import check
-        from firable.analysis.spaces.reachability import Budget
+    def told(self, uri: str, found: CheckReport, verdicts: tuple[Verdict, ...], positions: Positions) -> list[_Told]:
+        """The verdicts on a net that matter and do not hold, each with the changes that cure it."""
         from firable.nets.verdict import Status, held_to
 
-        try:
-            net, positions = parse_positioned(source.text, source.file)
-            verdicts = held_to(net.expected, check(net, budget=Budget(seconds=SECONDS)).verdicts)
-        except InputError as error:
-            return [self.diagnostic(uri, one) for one in error.diagnostics]
-        report = Report("check", source.file, net, verdicts, positions=positions)
-        found = []
+        net = found.net
+        report = Report("check", uri, net, held_to(net.expected, verdicts), positions=positions)
+        told = []
         for alert in alerts(report):
             verdict = alert.verdict
             if verdict.status is Status.UNKNOWN:
                 continue  # of a budget that nobody has asked for
             severity = lsp.DiagnosticSeverity.Error if alert.is_error else lsp.DiagnosticSeverity.Warning
-            told = "\n".join((f"{verdict.name} {ending(verdict)}: {verdict.statement}", *reasons(net, verdict)))
+            words = "\n".join((f"{verdict.name} {ending(verdict)}: {verdict.statement}", *reasons(net, verdict)))
             at = self.of_span(uri, place_of(report, verdict))
-            found.append(lsp.Diagnostic(at, told, severity, rule_of(verdict), source="firable check"))
-        return found
+            told.append((lsp.Diagnostic(at, words, severity, rule_of(verdict), source="firable check"), verdict.cures))
+        return told
+
+    def whole(self, uri: str, text: str) -> lsp.WorkspaceEdit:
+        """Another text in the place of all that stands in a file."""
+        end = lsp.Position(len(self.workspace.get_text_document(uri).lines) + 1, 0)
+        return lsp.WorkspaceEdit(changes={uri: [lsp.TextEdit(lsp.Range(lsp.Position(0, 0), end), text)]})
 
 
 server = NetServer()
 
 
 async def _look(uri: str) -> None:
-    """Tell at once what the reader says, and soon what checking says, unless the text has changed meanwhile."""
-    found = server.read(uri)
-    opened = server.opened[uri]
-    opened.verdicts = []
-    server.publish(uri, found)
-    if found:
+    """Tell at once what the reader says, soon what checking says, and then what cures it, unless the text has changed
+    meanwhile.
+    """
+    from firable.analysis.cures.finding import explained
+
+    refused = server.read(uri)
+    server.publish(uri, refused)
+    if refused:
         return
     source = server.source(uri)
-    verdicts = await asyncio.to_thread(server.checked, uri, source)
-    if uri in server.opened and server.source(uri).text == source.text:
-        opened.verdicts = verdicts
-        server.publish(uri, verdicts)
+    net, positions = parse_positioned(source.text, source.file)
+    try:
+        found = await asyncio.to_thread(_checked, net)
+        if not _show(uri, source, server.told(uri, found, found.verdicts, positions)):
+            return
+        verdicts = await asyncio.to_thread(explained, found)
+        if verdicts != found.verdicts:
+            _show(uri, source, server.told(uri, found, verdicts, positions))
+    except InputError as error:  # such as of an `expect:` that names no verdict
+        _show(uri, source, [(server.diagnostic(uri, one), ()) for one in error.diagnostics])
+
+
+def _checked(net: Net) -> CheckReport:
+    from firable.analysis.check import check
+    from firable.analysis.spaces.reachability import Budget
+
+    return check(net, budget=Budget(seconds=SECONDS))
+
+
+def _show(uri: str, source: Source, told: list[_Told]) -> bool:
+    """Publish what was found of a text, if it is still the one in the editor."""
+    opened = server.opened.get(uri)
+    if opened is None or server.source(uri).text != source.text:
+        return False
+    opened.checked, opened.cures = source.text, [(one, cure) for one, cures in told for cure in cures]
+    server.publish(uri, [one for one, _ in told])
+    return True
 
 
 @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
@@ -233,7 +268,6 @@ def rename(params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
     found = server.name_at(uri, params.position)
     if found is None:
         return None
-    document = server.workspace.get_text_document(uri)
     try:
         source = server.source(uri)
         parse_positioned(source.text, source.file)
@@ -241,8 +275,33 @@ def rename(params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
         parse_positioned(text, source.file)
     except InputError as error:
         raise JsonRpcInvalidParams(error.diagnostics[0].message) from None
-    end = lsp.Position(len(document.lines) + 1, 0)
-    return lsp.WorkspaceEdit(changes={uri: [lsp.TextEdit(lsp.Range(lsp.Position(0, 0), end), text)]})
+    return server.whole(uri, text)
+
+
+@server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions([lsp.CodeActionKind.QuickFix]))
+def cures(params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
+    """Offer the changes that cure what is violated here, while the text is the one that was checked."""
+    uri = params.text_document.uri
+    opened, source, wanted = server.opened.get(uri), server.source(uri), params.context.only
+    if opened is None or opened.checked != source.text:
+        return []
+    if wanted is not None and not {lsp.CodeActionKind.QuickFix, lsp.CodeActionKind.Empty} & set(wanted):
+        return []
+    found: dict[tuple[str, ...], lsp.CodeAction] = {}
+    for told, cure in opened.cures:
+        if not told.range.start.line <= params.range.end.line or not params.range.start.line <= told.range.end.line:
+            continue
+        if (action := found.get(cure.changes)) is not None:
+            action.diagnostics = [*(action.diagnostics or ()), told]
+            continue
+        try:
+            text = edits.change(source, cure.parts).text
+            parse_positioned(text, source.file)
+        except InputError:
+            continue  # it is told in words; where it would stand in the text is no form that is edited by itself
+        title = "; and ".join(cure.changes)
+        found[cure.changes] = lsp.CodeAction(title, lsp.CodeActionKind.QuickFix, [told], edit=server.whole(uri, text))
+    return list(found.values())
 
 
 @server.feature(lsp.TEXT_DOCUMENT_COMPLETION)

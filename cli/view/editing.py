@@ -39,6 +39,8 @@ STEPS_MAX: Final = 200
 """So many edits are undone."""
 
 Asked = Mapping[str, Any]
+Edit = Callable[[Source], Source]
+"""An edit of a text."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ class Editing:
 
     async def edit(self, asked: Asked) -> dict[str, Any]:
         """One edit of the net."""
-        make, what = _edit_of(asked)
+        make, what = self._cure_of(asked) if asked.get("do") == "cure" else _edit_of(asked)
         async with self.one_at_a_time:
             file = self._meant(asked)
             after = make(file.source)
@@ -141,6 +143,16 @@ class Editing:
             except InputError as error:
                 return _draft(error, file.source.text, version=file.version)
             return await self._shown()
+
+    def _cure_of(self, asked: Asked) -> tuple[Edit, str]:
+        """The change that a request names, of those that checking the net as it is has offered."""
+        match asked:
+            case {"verdict": str(name), "number": int(number)}:
+                for verdict in self.playing.verdicts or ():
+                    if verdict.name == name and 0 <= number < len(verdict.cures):
+                        parts = verdict.cures[number].parts
+                        return lambda s, parts=parts: edits.change(s, parts), f"what cures {name}"
+        raise refusal("the page asks for a cure that no check of this net has found")
 
     def _file(self) -> NetFile:
         if self.file is None:
@@ -225,7 +237,7 @@ def _text(asked: Asked) -> str:
 _KINDS: Final = {kind.value: kind for kind in (Kind.CONTROLLER, Kind.PLACE, Kind.SIGNAL, Kind.TRANSITION)}
 
 
-def _edit_of(asked: Asked) -> tuple[Callable[[Source], Source], str]:
+def _edit_of(asked: Asked) -> tuple[Edit, str]:
     """The edit that a request names, and in words; raises `InputError` F5070 where it names none."""
     match asked:
         case {"do": "add", "kind": "controller", "name": str(name)}:

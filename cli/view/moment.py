@@ -16,10 +16,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from firable.cli.story import waits_told
 from firable.cli.view.site import refusal
 from firable.executor.operating.situation import Blocked
 from firable.nets.net import Marking, Net
 from firable.semantics.player import Player
+from firable.semantics.waiting import circle
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ def begin(net: Net, *, free: bool = False) -> Moment:
 
 
 def told(player: Player, now: Moment) -> dict[str, Any]:
-    """A moment as the page shows it."""
+    """A moment as the page shows it; in a deadlock also who waits for whom."""
     net = player.net
     firable = frozenset(player.may_fire(now.marking))
     enabled = firable if now.free else firable & frozenset(player.enabled(now.marking, now.valuation()))
@@ -66,6 +68,7 @@ def told(player: Player, now: Moment) -> dict[str, Any]:
             for t, transition in enumerate(net.transitions)
         },
         "deadlock": not firable,
+        **({} if firable else {"circle": list(waits_told(net, circle(net, now.marking)))}),
     }
 
 

@@ -21,6 +21,7 @@ from firable.cli.view.top_view import top_of
 from firable.executor.operating.control import Endpoint, admission
 from firable.nets.loading import Loaded
 from firable.nets.machines.plant_file import PlantModel, misfits
+from firable.nets.verdict import Verdict
 from firable.semantics.player import Player
 
 
@@ -37,7 +38,7 @@ class Playing:
         self.editable = False
         self.plant = plant
         self.player = Player(loaded.net)
-        self.verdicts: list[dict[str, Any]] | None = None
+        self.verdicts: tuple[Verdict, ...] | None = None
         self.checking = asyncio.Lock()
 
     def take(self, loaded: Loaded) -> None:
@@ -86,7 +87,7 @@ class Playing:
             "net": moment.structure(net),
             "moment": moment.told(self.player, moment.begin(net)),
             "runs": [run.summary() for run in self.runs],
-            "verdicts": self.verdicts,
+            "verdicts": self._told(),
             "top": top_of(stage, self.misfit),
         }
 
@@ -123,9 +124,12 @@ class Playing:
                     verdicts, runs = await asyncio.to_thread(checked, loaded.net)
                 if loaded is not self.loaded:
                     raise refusal("the net has been edited while it was checked")
-                self.verdicts = [verdict_json(verdict) for verdict in verdicts]
+                self.verdicts = verdicts
                 self.runs += runs
-        return {"verdicts": self.verdicts, "runs": [run.summary() for run in self.runs]}
+        return {"verdicts": self._told(), "runs": [run.summary() for run in self.runs]}
+
+    def _told(self) -> list[dict[str, Any]] | None:
+        return None if self.verdicts is None else [verdict_json(verdict) for verdict in self.verdicts]
 
     async def run(self, asked: dict[str, Any]) -> dict[str, Any]:
         """The frames of a run, by its name."""

@@ -13,11 +13,13 @@ Rejected: a `Net` that is edited and printed. The file would be another one, wit
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
+from firable.nets.changes import Arbitration, CapacityPlace, Change, Gate
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
-from firable.nets.editing.yaml_text import SCOPE_KEYS, Path, YamlText
+from firable.nets.editing.yaml_text import SCOPE_KEYS, Path, Value, YamlText
+from firable.nets.net import Arbiter
 from firable.nets.occurrences import Kind, Names
 from firable.nets.source import Source
 from firable.nets.time_limits import fault_place_name, fault_transition_name, timer_name
@@ -48,6 +50,12 @@ def add_sensor(source: Source, name: str, owner: str | None = None) -> Source:
 def add_transition(source: Source, name: str) -> Source:
     """One more transition, without arcs."""
     return YamlText(source).with_entry(("transitions",), _named(name), None).source
+
+
+def add_arbiter(source: Source, arbiter: Arbiter) -> Source:
+    """One more arbiter."""
+    body: Value = {"among": list(arbiter.among), "by": str(arbiter.by)}
+    return YamlText(source).with_entry(("arbiters",), _named(arbiter.name), body).source
 
 
 def connect(source: Source, transition: str, part: str, name: str) -> Source:
@@ -99,6 +107,19 @@ def describe(source: Source, kind: Kind, name: str, words: str) -> Source:
     return text.with_text((*path, "description"), words).source
 
 
+def change(source: Source, changes: Iterable[Change]) -> Source:
+    """With what cures a verdict: gates, capacity places and arbiters, as they are made to a net."""
+    for one in changes:
+        match one:
+            case Gate(transition, place, permissive):
+                source = connect(source, transition, "if" if permissive else "unless", place)
+            case CapacityPlace():
+                source = _with_capacity(source, one)
+            case Arbitration(arbiter):
+                source = add_arbiter(source, arbiter)
+    return source
+
+
 def rename(source: Source, kind: Kind, name: str, new: str) -> Source:
     """Another name, wherever the name stands in this file; raises `InputError` F2012 and F2001 as `Names.renamed`."""
     names = Names(source)
@@ -146,6 +167,16 @@ def delete(source: Source, kind: Kind, name: str) -> Source:
         case Kind.CONTROLLER:
             return YamlText(source).without_entry(_scope(source, name)).source
     raise _stands_nowhere(f"the {kind.value} '{name}'", "delete it in the text of the file")
+
+
+def _with_capacity(source: Source, one: CapacityPlace) -> Source:
+    local = one.place.removeprefix(f"{one.owner}.")
+    source = describe(add_place(source, local, one.owner), Kind.PLACE, one.place, one.description)
+    source = mark(source, one.place, marked=True)
+    for part, transitions in (("from", one.takers), ("to", one.givers)):
+        for transition in transitions:
+            source = connect(source, transition, part, one.place)
+    return source
 
 
 def _own_sensor(source: Source, name: str, owner: str | None) -> Source:

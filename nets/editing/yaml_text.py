@@ -273,6 +273,7 @@ _TABLES_AFTER: Final = {
     "controllers": SCOPE_KEYS[:5],
     "places": SCOPE_KEYS,
     "transitions": (*SCOPE_KEYS, "places"),
+    "arbiters": (*SCOPE_KEYS, "places", "transitions"),
 }
 """The keys that a table follows where it is made."""
 

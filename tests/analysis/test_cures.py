@@ -13,10 +13,14 @@ from support.examples import seeds
 from support.lively_nets import lively_net
 
 from firable.analysis.check import check
-from firable.analysis.cures.changes import Arbitration, CapacityPlace, Gate, capacity, changed, free_name
 from firable.analysis.cures.finding import explained
 from firable.nets.catalogue import catalogue_net
+from firable.nets.changes import Arbitration, CapacityPlace, Change, Gate, capacity, changed, free_name
+from firable.nets.editing import edits
 from firable.nets.net import Arbiter, Net, Place, Transition
+from firable.nets.printing import format_net, in_file_order
+from firable.nets.source import Source
+from firable.nets.text import parse_net
 from firable.nets.verdict import Cure, Status, Verdict, Weight
 
 _CAPACITY_PLACE: Final = r"add the place `(\S+)`, marked at the start, to `from` of (.+) and to `to` of (.+)"
@@ -52,6 +56,30 @@ def test_competitors_without_an_arbiter_are_offered_one() -> None:
     assert cure.changes[0] == (
         "add to `arbiters`: `p1_takes_left_or_p4_takes_right: {among: [p1_takes_left, p4_takes_right], by: priority}`"
     )
+
+
+@pytest.mark.parametrize("name", ["one_robot_mc_late", "conceptual_one_robot_mc_late", "philosophers-4"])
+def test_a_cure_written_into_the_net_file_makes_the_net_that_was_checked(name: str) -> None:
+    net = catalogue_net(name)
+    text = format_net(net)
+    cures = [cure for verdict in _explained(net).values() for cure in verdict.cures]
+    assert len(cures) >= 2
+    for cure in cures:
+        written = parse_net(edits.change(Source("cell.firable.yaml", text), cure.parts).text)
+        assert in_file_order(written) == in_file_order(changed(net, cure.parts))
+
+
+@pytest.mark.seeds
+def test_cures_of_drawn_nets_are_written_as_they_were_checked() -> None:
+    seen: set[type[Change]] = set()
+    for seed in seeds(60):
+        net = lively_net(random.Random(seed))
+        source = Source("cell.firable.yaml", format_net(net))
+        for cure in (cure for verdict in _explained(net).values() for cure in verdict.cures):
+            written = parse_net(edits.change(source, cure.parts).text)
+            assert in_file_order(written) == in_file_order(changed(net, cure.parts)), seed
+            seen |= {type(part) for part in cure.parts}
+    assert seen == {Gate, CapacityPlace, Arbitration}
 
 
 def test_what_the_file_wants_reachable_is_told_where_it_is_the_price() -> None:

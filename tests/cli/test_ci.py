@@ -129,6 +129,8 @@ def test_each_verdict_that_matters_is_a_test(pytester: pytest.Pytester) -> None:
     assert "late.firable.yaml::deadlock-free FAILED" in told
     assert "late.firable.yaml::property.cv1_held_while_grasped PASSED" in told
     assert " 15. t1-b  arrived at MC with the workpiece" in told
+    assert "robot.put_mc (putting on MC) waits in G4 for mc.free, which comes from mc.release by G6 and G7" in told
+    assert "cure: give G2 the gate `unless: system.processing`" in told
     found, told = outcomes(pytester, "-k", "restart")
     assert found == {"failed": 1, "deselected": 8}
 

@@ -38,6 +38,9 @@ class Editor:
         whole: list[Any] = [lsp.TextDocumentContentChangeWholeDocument(text)]
         self.client.text_document_did_change(lsp.DidChangeTextDocumentParams(document, whole))
 
+    def save(self) -> None:
+        self.client.text_document_did_save(lsp.DidSaveTextDocumentParams(self.document))
+
     async def told(self, wanted: Callable[[list[lsp.Diagnostic]], bool]) -> list[lsp.Diagnostic]:
         """The first list of diagnostics that is as wanted."""
         while True:
@@ -149,6 +152,44 @@ def test_a_rename_changes_the_text_or_says_why_not(tmp_path: Path) -> None:
             await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "free"))
         with pytest.raises(JsonRpcException, match="'on' is text for some YAML parsers"):
             await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "on"))
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_a_cure_is_offered_as_an_action_while_the_text_is_the_checked_one(tmp_path: Path) -> None:
+    def actions(one: Editor, line: int) -> Awaitable[Any]:
+        here = lsp.Range(lsp.Position(line, 0), lsp.Position(line, 1))
+        params = lsp.CodeActionParams(one.document, here, lsp.CodeActionContext([]))
+        return one.client.text_document_code_action_async(params)
+
+    async def act(one: Editor) -> None:
+        one.open(LATE)
+        found = await one.told(lambda found: any("cure: " in each.message for each in found))
+        (deadlock,) = (each for each in found if each.code == "F3011")
+        assert "robot.put_mc (putting on MC) waits in G4 for mc.free" in deadlock.message
+        gate, capacity = await actions(one, deadlock.range.start.line)
+        assert gate.title == "give G2 the gate `unless: system.processing`"
+        assert gate.kind == lsp.CodeActionKind.QuickFix
+        assert [each.code for each in gate.diagnostics] == ["F3011"]
+        assert "`system.capacity`" in capacity.title
+        (change,) = gate.edit.changes[one.uri]
+        lines, after = LATE.splitlines(), change.new_text.splitlines()
+        (added,) = (line for line in after if line not in lines)
+        assert added.strip() == "unless: system.processing"
+        assert not await actions(one, 0)
+        one.change(change.new_text)
+        assert not await actions(one, deadlock.range.start.line)
+        one.save()
+        assert "F3011" not in {each.code for each in await one.told(bool)}
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_what_the_file_expects_of_no_verdict_is_told_at_its_place(tmp_path: Path) -> None:
+    async def act(one: Editor) -> None:
+        one.open(LATE + "expect: {deadlock-fre: violated}\n")
+        (wrong,) = await one.told(bool)
+        assert "deadlock-fre" in wrong.message
 
     within(tmp_path / "cell.firable.yaml", act)
 

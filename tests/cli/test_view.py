@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -115,6 +116,7 @@ def test_a_counterexample_is_played_with_a_slider(chromium: Browser, late: str) 
         cure = cures.get_by_role("listitem").first
         expect(cure).to_contain_text("give G2 the gate unless: system.processing")
         expect(cure).to_contain_text("checked: 40 markings; cures doomed-markings")
+        expect(cure.get_by_role("button")).to_have_count(0)  # a net of the catalogue is no file to write it into
         playing.click()
         slider = page.get_by_role("slider", name="Steps of deadlock-free")
         expect(slider).to_be_focused()
@@ -123,6 +125,12 @@ def test_a_counterexample_is_played_with_a_slider(chromium: Browser, late: str) 
         assert "system.carrying_in" in tokens(page)
         page.keyboard.press("End")
         expect(page.locator(".playback")).to_contain_text("A deadlock: nothing can fire any more.")
+        expect(page.locator(".playback .circle li")).to_have_text(
+            [
+                "robot.put_mc (putting on MC) waits in G4 for mc.free, which comes from mc.release by G6 and G7",
+                re.compile("^mc.release .* waits in G6 for robot.free, which comes from robot.put_mc by G4 and G5$"),
+            ]
+        )
         assert {"robot.put_mc", "mc.release"} <= tokens(page)
         page.keyboard.press("Home")
         assert "robot.free" in tokens(page)
@@ -130,6 +138,7 @@ def test_a_counterexample_is_played_with_a_slider(chromium: Browser, late: str) 
         expect(page.locator(".playback")).to_contain_text("G4 waits for a token on mc.free")
         page.get_by_role("button", name="Go on from here").click()
         expect(page.locator(".status")).to_have_text("A deadlock: no transition can fire any more.")
+        expect(page.locator(".own .circle li").first).to_contain_text("waits in G4 for mc.free")
         page.get_by_role("button", name="Undo").click()
         assert "robot.free" in tokens(page)
 

@@ -19,6 +19,7 @@ from firable.cli.main import main
 from firable.cli.options import load_net
 from firable.cli.view.editing import editing_of
 from firable.cli.view.playing import Playing
+from firable.nets.catalogue import catalogue_path
 from firable.nets.diagnostics import InputError
 
 expect.set_options(timeout=PATIENCE_MS)
@@ -145,6 +146,46 @@ def test_a_net_is_edited_in_the_picture_and_by_names_and_all_is_undone(
         assert file.read_text() == TEXT
         page.keyboard.press("Control+Shift+z")
         expect(page.locator('[id="place:mc.done"]')).to_be_attached()
+
+
+@needs_browser
+def test_a_cure_that_was_checked_is_written_into_the_file_and_undone(chromium: Browser, tmp_path: Path) -> None:
+    late = catalogue_path("one_robot_mc_late").read_text("utf-8")
+    path = tmp_path / "late.firable.yaml"
+    path.write_text(late, "utf-8")
+    with command("view", path, "--no-browser") as (address, _), page_at(chromium, address) as page:
+        status, answer = asked(address, "", {"version": asked(address, "")[1]["version"], "do": "cure"})
+        assert (status, answer["errors"][0]["code"]) == (422, "F5070")
+        violated = page.locator(".verdicts > li").filter(has_text="✗ deadlock-free")
+        checking = page.get_by_role("button", name="Check this net")
+        writing = violated.get_by_role(
+            "button", name="Write into the file: give G2 the gate `unless: system.processing`"
+        )
+        checking.click()
+        page.get_by_role("button", name="▶ Play deadlock-free").click()
+        page.get_by_role("slider").press("End")
+        violated.get_by_text("2 cures of deadlock-free").click()
+        writing.click()
+        expect(page.locator(".banner")).to_contain_text("Written into the file: give G2 the gate")
+        expect(page.locator(".playback")).to_have_count(0)
+        assert path.read_text("utf-8") != late
+        page.locator(".banner").get_by_role("button", name="Undo").click()
+        expect(page.locator(".banner")).to_contain_text("Undone: what cures deadlock-free.")
+        assert path.read_text("utf-8") == late
+        checking.click()
+        violated.get_by_text("2 cures of deadlock-free").click()
+        writing.click()
+        expect(page.locator(".banner")).to_contain_text("Written into the file: give G2 the gate")
+        begin = late.index("to: [system.loading, robot.to_cv1, conveyor.cv1_wait]\n")
+        end = late.index("\n", begin) + 1
+        assert path.read_text("utf-8") == f"{late[:end]}    unless: system.processing\n{late[end:]}"
+        checking.click()
+        expect(page.locator(".verdicts > li").filter(has_text="✓ deadlock-free")).to_be_visible()
+        expect(violated).to_have_count(0)
+        page.get_by_role("button", name="Edit", exact=True).click()
+        expect(page.get_by_role("button", name="Undo")).to_have_attribute(
+            "title", "Undo (Ctrl+Z): what cures deadlock-free"
+        )
 
 
 @needs_browser

@@ -20,8 +20,13 @@ async function begin(): Promise<void> {
   }
 }
 
-function play(page: PlayPage): void {
-  new Play(page, (state) => edit(page, state), () => void reload(page));
+function play(page: PlayPage): Play {
+  return new Play(page, {
+    edit: (state) => void edit(page, state),
+    reload: () => void reload(page),
+    cured: (edited, words) => play(edited.page).written(edited.edit, words),
+    mend: (state, draft) => edit(page, state).refuse(draft.errors, draft.draft),
+  });
 }
 
 function edit(page: PlayPage, state: EditState): Edit {
@@ -32,7 +37,7 @@ function edit(page: PlayPage, state: EditState): Edit {
 async function reload(page: PlayPage): Promise<void> {
   try {
     const now = await ask<Edited>("api/edit/reload", {});
-    if ("page" in now) return play(now.page);
+    if ("page" in now) return void play(now.page);
     const state = { text: now.draft, version: now.version ?? "", undo: null, redo: null, arcs: {}, marked: [] };
     edit(page, state).refuse(now.errors, now.draft);
   } catch (error) {

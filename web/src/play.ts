@@ -4,13 +4,23 @@ import { announce, counted, h } from "./dom";
 import { banner, frame, panel, watchFile, type Frame } from "./frame";
 import { Drawing } from "./drawing";
 import type { Picture } from "./picture";
-import { Playback } from "./playback";
-import { ask, Refused, type At, type EditState, type Fired, type Moment, type PlayPage, type Run, type RunSummary, type Verdict } from "./server";
+import { circle, Playback } from "./playback";
+import { ask, Refused, type At, type Draft, type Edited, type EditState, type Fired, type Moment, type PlayPage, type Run, type RunSummary, type Verdict, type Written } from "./server";
 import { TopView } from "./top_view";
 
 interface Step {
   what: string;
   moment: Moment;
+}
+
+/** What leads away from playing with this net. */
+interface Leaving {
+  edit: (state: EditState) => void;
+  reload: () => void;
+  /** The file has been written: its net is played now. */
+  cured: (edited: Written, words: string) => void;
+  /** What was to be written is no net. */
+  mend: (state: EditState, draft: Draft) => void;
 }
 
 const KEPT = "firable-at";
@@ -41,8 +51,7 @@ export class Play {
 
   constructor(
     private readonly page: PlayPage,
-    private readonly edit: (state: EditState) => void,
-    private readonly reload: () => void,
+    private readonly to: Leaving,
   ) {
     for (const { name, says } of page.net.transitions) this.words.set(name, says);
     const drawing = new Drawing(page.net, {
@@ -57,7 +66,7 @@ export class Play {
     this.steps = [{ what: "the initial marking", moment: "scene" in page.top ? { ...page.moment, top: page.top } : page.moment }];
     const editButton = this.button("Edit", "Edit the net file", () => void this.beginEdit());
     this.frame.tools.append(this.undoButton, this.redoButton, this.resetButton, this.gatesSwitch, editButton);
-    if (page.editable) watchFile(this.frame, this.reload);
+    if (page.editable) watchFile(this.frame, this.to.reload);
     this.gatesSwitch.title = "Free: external gates are open, as the analysis has them. Else they are as the signals say.";
     this.frame.side.append(
       h("div", { class: "own" }, panel("May fire", this.mayFire), this.waitPanel),
@@ -75,7 +84,7 @@ export class Play {
   private beginEdit(): Promise<void> {
     return this.doing(async () => {
       const state = await ask<EditState>("api/edit");
-      if (state.why_not === undefined) return this.edit(state);
+      if (state.why_not === undefined) return this.to.edit(state);
       this.frame.hint.textContent = `Not to be edited: ${state.why_not}.`;
       announce(this.frame.hint.textContent);
     });
@@ -280,7 +289,7 @@ export class Play {
       else if (wait.may === "not") not.push(h("li", { class: "not", ...over }, wait.why ?? ""));
       else waiting.push(h("li", { class: "wait", ...over }, h("span", {}, wait.why ?? ""), ...(wait.closed ?? []).map((signal) => this.opener(signal))));
     }
-    if (may.length === 0) may.push(h("li", { class: "none" }, moment.deadlock ? "Nothing ever again: this is a deadlock." : "Nothing: open a gate."));
+    if (may.length === 0) may.push(h("li", { class: "none" }, moment.deadlock ? "Nothing ever again: this is a deadlock." : "Nothing: open a gate."), ...circle(moment));
     this.mayFire.replaceChildren(...may);
     this.mayWait.replaceChildren(...waiting);
     this.mayNot.replaceChildren(...not);
@@ -326,8 +335,37 @@ export class Play {
   private cures(verdict: Verdict): HTMLElement | null {
     if (verdict.cures.length === 0) return null;
     const inCode = (words: string): (Node | string)[] => words.split("`").map((part, i) => (i % 2 === 1 ? h("code", {}, part) : part));
-    return h("details", { class: "cures" }, h("summary", {}, `${counted(verdict.cures.length, "cure")} of ${verdict.name}`), h("ul", { class: "list" }, ...verdict.cures.map((cure) =>
-      h("li", {}, ...inCode(cure.changes.join("; and ")), h("span", { class: "soft" }, `checked: ${cure.checked}`)))));
+    const write = (words: string, number: number): HTMLElement =>
+      h("button", { type: "button", class: "small", "aria-label": `Write into the file: ${words}`, click: () => void this.cure(verdict.name, number, words) }, "Write into the file");
+    return h("details", { class: "cures" }, h("summary", {}, `${counted(verdict.cures.length, "cure")} of ${verdict.name}`), h("ul", { class: "list" }, ...verdict.cures.map((cure, i) => {
+      const words = cure.changes.join("; and ");
+      return h("li", {}, ...inCode(words), h("span", { class: "soft" }, `checked: ${cure.checked}`), this.page.editable ? write(words, i) : null);
+    })));
+  }
+
+  /** Write a cure into the net file, and play with the net that it makes. */
+  private cure(verdict: string, number: number, words: string): Promise<void> {
+    return this.writing("api/edit", { do: "cure", verdict, number }, `Written into the file: ${words}.`);
+  }
+
+  private writing(path: string, body: object, words: string): Promise<void> {
+    if (this.playback !== null) {
+      this.playback.stop();
+      this.ended(null);
+    }
+    return this.doing(async () => {
+      const state = await ask<EditState>("api/edit");
+      const edited = await ask<Edited>(path, { ...body, version: state.version });
+      if ("page" in edited) this.to.cured(edited, words);
+      else this.to.mend(state, edited);
+    });
+  }
+
+  /** Say what was written, and how it is taken back. */
+  written(state: EditState, words: string): void {
+    const undo = h("button", { type: "button", click: () => void this.writing("api/edit/undo", {}, `Undone: ${state.undo}.`) }, "Undo");
+    banner(this.frame.banner, "good", words, ...(state.undo !== null ? [undo] : []));
+    announce(words);
   }
 
   private check(button: HTMLButtonElement): Promise<void> {

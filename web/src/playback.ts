@@ -7,6 +7,12 @@ import type { Scene } from "./top_view";
 
 const FRAME_MS = 900;
 
+/** Who waits for whom in a deadlock. */
+export function circle(moment: Moment): HTMLElement[] {
+  const told = moment.circle ?? [];
+  return told.length > 0 ? [h("li", { class: "circle" }, "In a circle, each waiting for the next:", h("ul", { class: "list" }, ...told.map((one) => h("li", {}, one))))] : [];
+}
+
 export class Playback {
   readonly element: HTMLElement;
   private readonly slider: HTMLInputElement;
@@ -108,7 +114,7 @@ export class Playback {
       this.picture.show(moment);
       if (this.at === this.run.frames.length - 1 && moment.deadlock) {
         const stuck = Object.values(moment.transitions).filter((wait) => wait.near).map((wait) => wait.why ?? "");
-        this.stuck.replaceChildren(h("li", { class: "stuck" }, "A deadlock: nothing can fire any more."), ...stuck.map((why) => h("li", {}, why)));
+        this.stuck.replaceChildren(h("li", { class: "stuck" }, "A deadlock: nothing can fire any more."), ...circle(moment), ...stuck.map((why) => h("li", {}, why)));
         this.stuck.hidden = false;
       }
     } catch (error) {

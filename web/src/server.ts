@@ -19,6 +19,8 @@ export interface Moment {
   free: boolean;
   transitions: Record<string, Wait>;
   deadlock: boolean;
+  /** In a deadlock: who waits for whom. */
+  circle?: string[];
   /** How the cell looks, where a plant says what it is made of. */
   top?: Top;
 }
@@ -137,8 +139,21 @@ export interface EditState {
   marked: string[];
 }
 
-/** What came of an edit: the net with it, or a text that is no net and was not written. */
-export type Edited = { page: PlayPage; edit: EditState } | { errors: Problem[]; draft: string; version: string | null };
+/** The net with an edit. */
+export interface Written {
+  page: PlayPage;
+  edit: EditState;
+}
+
+/** A text that is no net and was not written. */
+export interface Draft {
+  errors: Problem[];
+  draft: string;
+  version: string | null;
+}
+
+/** What came of an edit. */
+export type Edited = Written | Draft;
 
 /** An answer that is a refusal, in the server's words. */
 export class Refused extends Error {

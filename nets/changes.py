@@ -2,7 +2,7 @@
 
 All three only forbid firings, or choose between them: no marking is added on the places that the net has, so what
 could never happen still cannot. What they may break is that something still can happen, which is why every change is
-checked before it is offered (`finding.py`).
+checked before it is offered (`analysis/cures/finding.py`). `nets/editing/edits.py` makes them in a net file.
 """
 
 from __future__ import annotations
@@ -57,6 +57,8 @@ class CapacityPlace:
     takers: tuple[str, ...]
     givers: tuple[str, ...]
 
+    description = "capacity control condition"
+
     @property
     def size(self) -> int:
         """The place and its arcs."""
@@ -64,7 +66,7 @@ class CapacityPlace:
 
     def made(self, net: Net) -> Net:
         """The net with the place."""
-        place = Place(self.place, self.owner, marked=True, description="capacity control condition")
+        place = Place(self.place, self.owner, marked=True, description=self.description)
         takers, givers = set(self.takers), set(self.givers)
         transitions = tuple(
             replace(
