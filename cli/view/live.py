@@ -10,7 +10,8 @@ they take part in, under the names that these have in the cell. Nothing is comma
 are those of the operator's endpoint, by its rules (`executor/operating/control.py`).
 
 What may fire is judged by the executor's own token player, since that is what runs. It looks again only at a
-transition that reads something that has changed.
+transition that reads something that has changed. A host among others judges its parts alone: a transition whose part
+is ready here is shown as one that waits, for whom else it needs, until all that it knows of are ready.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from firable.cli.view.moment import Moment
 from firable.cli.view.scene import Stage
 from firable.cli.view.site import PUBLIC, answering, file_routes
 from firable.cli.view.top_view import top_of
-from firable.cli.view.votes import votes
+from firable.cli.view.votes import awaited, votes
 from firable.executor import Host
 from firable.executor.operating.latch import may_stay
 from firable.executor.protocol.token_player import TokenPlayer, Word
@@ -143,7 +144,7 @@ class LivePage:
         situation = host.situation()
         if ended and host.outcome is not None and not host.outcome.cancelled() and host.outcome.exception() is None:
             situation = host.outcome.result()
-        now = self.now()
+        now, rows = self.now(), votes(host)
         self._judge(now)
         return {
             "at": host.now_seconds(),
@@ -152,10 +153,10 @@ class LivePage:
             "message": situation.message,
             "marking": list(net.names(now.marking)),
             "signals": sorted(now.signals),
-            "transitions": follower.news("transition", self.states),
+            "transitions": follower.news("transition", self._states(rows)),
             "waits": [str(one) for one in situation.blocked],
             "bars": follower.bars(self.lanes),
-            "votes": list(follower.news("votes", {row["name"]: row for row in votes(host)}).values()),
+            "votes": list(follower.news("votes", {row["name"]: row for row in rows}).values()),
             "top": self._top(follower),
             "unreached": sorted(host.peers.names - host.peers.connected_to),
             "paused": host.paused,
@@ -183,6 +184,14 @@ class LivePage:
             if controller.word & controller.player.signal_bit(signal.name)
         ]
         return Moment(self.net.marking(host.marking), frozenset(on))
+
+    def _states(self, rows: Iterable[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        """Whether each transition may fire, or what it waits for: here, and of a host among others also elsewhere."""
+        if self.owners is None:
+            return self.states
+        ready = (row for row in rows if self.states.get(row["name"]) == {"may": "fire"})
+        waiting = {row["name"]: {"may": "wait", "why": why} for row in ready if (why := awaited(self.host, row))}
+        return self.states | waiting
 
     def _judge(self, now: Moment) -> None:
         word = now.marking | sum(self.player.signal_bit(name) for name in now.signals)

@@ -7,9 +7,11 @@ have to guess.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from firable.executor import Host
+from firable.executor.links.link import called
 from firable.executor.protocol.coordinator import Round
 from firable.executor.protocol.deciders import coordinator_at
 from firable.nets.decomposition import Coordinated
@@ -26,8 +28,23 @@ def votes(host: Host) -> list[dict[str, Any]]:
         opened = next((one for one in rounds if one.committed in (None, row.name)), None)
         parts = [{"controller": p.controller, "vote": _vote(host, row, p.controller, opened)} for p in row.parts]
         state = "" if opened is None else "applying" if opened.decided else "asking"
-        rows.append({"name": row.name, "says": row.description, "parts": parts, "round": state})
+        decided = coordinator_at(row.at)
+        rows.append({"name": row.name, "says": row.description, "parts": parts, "round": state, "decider": decided})
     return rows
+
+
+def awaited(host: Host, row: Mapping[str, Any]) -> str:
+    """What a row of `votes` whose part here is ready still waits for, in a sentence; empty where all are ready."""
+    of: dict[str, list[str]] = {"lost": [], "no": [], "unknown": []}
+    decider = row["decider"]
+    if decider in host.peers.names - host.peers.connected_to:
+        of["lost"].append(called(decider))
+    for part in row["parts"]:
+        if part["controller"] not in host.controllers and part["vote"] in of:
+            of[part["vote"]].append(part["controller"])
+    words = {"lost": "{} to be connected", "no": "{} to be ready", "unknown": f"{called(decider)} to ask {{}}"}
+    told = "; ".join(words[vote].format(", ".join(names)) for vote, names in of.items() if names)
+    return f"{row['name']} is ready here, and waits for {told}" if told else ""
 
 
 def _vote(host: Host, row: Coordinated, controller: str, opened: Round | None) -> str:

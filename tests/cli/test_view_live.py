@@ -9,6 +9,8 @@ import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
@@ -19,6 +21,8 @@ from support.waiting import PATIENCE_SECONDS
 from firable.cli.main import main
 from firable.cli.view.lanes import Lanes
 from firable.cli.view.live import own_part
+from firable.cli.view.votes import awaited
+from firable.executor import Host
 from firable.nets.catalogue import catalogue_net
 from firable.semantics.trace import CommandSent, Fired, SignalChanged, read_trace
 
@@ -225,6 +229,32 @@ def test_the_page_of_one_controller_shows_what_is_its_own(chromium: Browser, bun
         expect(robot.locator(".vote.ready")).to_have_count(1)
         expect(robot.locator(".vote.lost")).to_have_count(3)
         expect(page.locator(".list .lost").first).to_contain_text("is not connected")
+        ready = page.locator('[id="transition:G2"]')
+        expect(ready).to_contain_class("may-wait")
+        away = "the coordinator, system, mc, conveyor to be connected"
+        expect(ready).to_have_attribute(
+            "aria-label", f"G2, start of loading from CV1, G2 is ready here, and waits for {away}"
+        )
+        expect(page.locator('[id="transition:G3"]')).to_contain_class("may-not")
+
+
+@pytest.mark.parametrize(
+    ("of_mc", "of_conveyor", "told"),
+    [
+        ("ready", "yes", ""),
+        ("no", "promised", "G2 is ready here, and waits for mc to be ready"),
+        ("unknown", "unknown", "G2 is ready here, and waits for the coordinator to ask mc, conveyor"),
+        ("lost", "no", "G2 is ready here, and waits for mc to be connected; conveyor to be ready"),
+    ],
+)
+def test_a_part_that_is_ready_waits_for_those_of_others_as_far_as_they_are_known(
+    of_mc: str, of_conveyor: str, told: str
+) -> None:
+    peers = SimpleNamespace(names={"", "mc", "conveyor"}, connected_to={"", "conveyor"})
+    host = cast(Host, SimpleNamespace(peers=peers, controllers={"robot": None}))
+    votes = {"robot": "ready", "mc": of_mc, "conveyor": of_conveyor}
+    parts = [{"controller": name, "vote": vote} for name, vote in votes.items()]
+    assert awaited(host, {"name": "G2", "decider": "", "parts": parts}) == told
 
 
 def test_what_is_of_one_controller_is_its_subnet() -> None:
