@@ -13,7 +13,7 @@ place to which the limit leads, so `within` then says it (`to`); else the limit 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -130,9 +130,9 @@ class Names:
             return found
         return next(other for other in self.occurrences if other.defines and other.name == self.given[one.name].place)
 
-    def renamed(self, one: Occurrence, new: str) -> str:
-        """The text with a name changed wherever it stands; of a controller also in the full names of its parts, of a
-        place with a time limit also in the names that the limit gives.
+    def renames(self, one: Occurrence, new: str) -> Mapping[str, str]:
+        """The full names that a rename changes, with the new ones: of a controller also those of its parts, of a place
+        with a time limit also those that the limit gives.
 
         `new` is the short name; the full one will do. Raises `InputError` F2012 where it is no name, F2001 where
         something has it already, F1020 for a name that a time limit gives and nothing declares.
@@ -152,21 +152,37 @@ class Names:
         taken = ({other.name for other in self.occurrences} | self.given.keys()) - changed.keys()
         if twice := sorted(taken.intersection(changed.values())):
             raise InputError([Diagnostic("F2001", f"there is a '{twice[0]}' already", "choose another name")])
+        if one.kind is Kind.CONTROLLER:
+            of_it = (other for other in self.occurrences if other.defines and other.name.startswith(f"{old}."))
+            changed |= {other.name: new + other.name[len(old) :] for other in of_it}
+            limits = ((name, limit) for name, limit in self.given.items() if limit.place in changed)
+            changed |= {name: limit.named(changed[limit.place]) for name, limit in limits}
+        return changed
+
+    def renamed(self, one: Occurrence, new: str) -> str:
+        """The text with a name changed wherever it stands, and those that follow; raises `InputError` as `renames`."""
+        changed = self.renames(one, new)
+        if one.kind is Kind.CONTROLLER:
+            return self._with_controller(one.name, changed[one.name])
+        short = changed[one.name].rpartition(".")[2]
         kinds = {one.name: one.kind} | {name: self.given[name].kind for name in changed if name != one.name}
         parts = [
             (other.line, other.column, other.length, changed[other.name].removeprefix(other.prefix))
             for other in self.occurrences
             if kinds.get(other.name) is other.kind
         ]
-        if one.kind is Kind.CONTROLLER:
-            parts += [
-                (other.line, other.column, len(old), new)
-                for other in self.occurrences
-                if not other.prefix and other.name.startswith(f"{old}.") and other.kind is not Kind.CONTROLLER
-            ]
         if one.kind is Kind.PLACE and one.name in self.given:
-            parts += self._leading_to(self.given[one.name].within, new)
-        return self._with_parts(parts)
+            parts += self._leading_to(self.given[one.name].within, short)
+        return self.source.with_parts(parts)
+
+    def _with_controller(self, old: str, new: str) -> str:
+        """The text with another name of a controller, also in the full names of its parts."""
+        return self.source.with_parts(
+            (other.line, other.column, len(old), new)
+            for other in self.occurrences
+            if (other.kind, other.name) == (Kind.CONTROLLER, old)
+            or (not other.prefix and other.name.startswith(f"{old}.") and other.kind is not Kind.CONTROLLER)
+        )
 
     def _leading_to(self, within: Node, place: str) -> Iterator[tuple[int, int, int, str]]:
         """What makes a time limit name its fault place: in `{...}` as on lines of its own, or for a time alone."""
@@ -181,21 +197,13 @@ class Names:
 
     def replaced(self, names: Mapping[str, str]) -> str:
         """The text in which each full name that is a key of `names` is used under another; declarations stay."""
-        return self._with_parts(
+        return self.source.with_parts(
             (*place, length, names[word])
             for scalar, prefix, at, length in self._used()
             if not prefix
             and (word := scalar.text[at : at + length]) in names
             and (place := self._inside(scalar, at, length))
         )
-
-    def _with_parts(self, parts: Iterable[tuple[int, int, int, str]]) -> str:
-        """The text with parts of lines replaced, each by line, column (from 1), length and the new text."""
-        lines = re.split(r"(\r\n|\r|\n)", self.source.text)  # lines at even indexes, their ends between them
-        for line, column, length, new in sorted(parts, reverse=True):
-            text = lines[2 * (line - 1)]
-            lines[2 * (line - 1)] = text[: column - 1] + new + text[column - 1 + length :]
-        return "".join(lines)
 
     def _declared(self) -> Iterator[Occurrence]:
         for name, key, body in entries_of(self.tree, "controllers"):

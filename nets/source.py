@@ -7,7 +7,9 @@ All readers (text, PNML) go through here, so each of these mistakes has one code
 
 from __future__ import annotations
 
+import re
 import stat
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -41,6 +43,14 @@ class Source:
             start = first if first else 1
             text = window
         return Span(self.file, line, column, printable(text), max(1, length), start)
+
+    def with_parts(self, parts: Iterable[tuple[int, int, int, str]]) -> str:
+        """The text with parts of lines replaced, each by line, column (from 1), length and the new text."""
+        lines = re.split(r"(\r\n|\r|\n)", self.text)  # lines at even indexes, their ends between them
+        for line, column, length, new in sorted(parts, reverse=True):
+            text = lines[2 * (line - 1)]
+            lines[2 * (line - 1)] = text[: column - 1] + new + text[column - 1 + length :]
+        return "".join(lines)
 
     def refuse(self, code: str, message: str, hint: str, line: int = 1, column: int = 1, length: int = 1) -> InputError:
         """The error with one diagnostic at a place of this text."""

@@ -10,7 +10,9 @@ after it is a net again.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 from urllib.parse import unquote, urlparse
 
@@ -24,6 +26,7 @@ from firable.cli.lsp.hover import hover
 from firable.cli.report import Report
 from firable.cli.text import reasons
 from firable.nets.diagnostics import Diagnostic, InputError, Span
+from firable.nets.drawing.layout_file import layout_path, renamed_layout
 from firable.nets.editing import edits
 from firable.nets.net import Net
 from firable.nets.occurrences import Kind, Names, Occurrence
@@ -152,6 +155,20 @@ class NetServer(LanguageServer):
         end = lsp.Position(len(self.workspace.get_text_document(uri).lines) + 1, 0)
         return lsp.WorkspaceEdit(changes={uri: [lsp.TextEdit(lsp.Range(lsp.Position(0, 0), end), text)]})
 
+    def with_layout(self, edit: lsp.WorkspaceEdit, uri: str, names: Mapping[str, str]) -> lsp.WorkspaceEdit:
+        """An edit of a net file, with the new names in the layout file beside it where there is one that is YAML."""
+        beside = layout_path(Path(unquote(urlparse(uri).path)))
+        if edit.changes is None or not beside.is_file():
+            return edit
+        there = beside.as_uri()
+        try:
+            source = self.source(there)
+            text = renamed_layout(source, names)
+        except InputError:
+            return edit
+        more = self.whole(there, text).changes or {} if text != source.text else {}
+        return lsp.WorkspaceEdit(changes={**edit.changes, **more})
+
 
 server = NetServer()
 
@@ -271,11 +288,11 @@ def rename(params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
     try:
         source = server.source(uri)
         parse_positioned(source.text, source.file)
-        text = found[0].renamed(found[1], params.new_name)
+        text, names = found[0].renamed(found[1], params.new_name), found[0].renames(found[1], params.new_name)
         parse_positioned(text, source.file)
     except InputError as error:
         raise JsonRpcInvalidParams(error.diagnostics[0].message) from None
-    return server.whole(uri, text)
+    return server.with_layout(server.whole(uri, text), uri, names)
 
 
 @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions([lsp.CodeActionKind.QuickFix]))

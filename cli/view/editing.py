@@ -5,7 +5,8 @@ the file on the disk is always the net that is shown. What does not read comes b
 mended in the text or thrown away. The page says with each edit which file it means, by the bytes that it had; where
 these are others now, because somebody has the file open in an editor, nothing is written (F1019).
 
-Who may edit: whoever may see, on this host, and only the one net file that `firable view` was given. A net of the
+Who may edit: whoever may see, on this host, and only the one net file that `firable view` was given, and in the layout
+file beside it the names that change. A net of the
 catalogue, PNML and bundles are not edited, and with `--read-only` nothing is.
 
 Steps are undone here and not in the page, so that a reload of the window loses none. A file that was read again begins
@@ -16,27 +17,33 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
 from aiohttp import web
 
+from firable.cli.view.drawing import Look
 from firable.cli.view.playing import Playing
 from firable.cli.view.site import answering, diagnostic_json, refusal
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.drawing import NODES_MAX
+from firable.nets.drawing.layout_file import SIZE_BYTES_MAX as LAYOUT_BYTES_MAX
+from firable.nets.drawing.layout_file import layout_path, parse_layout, renamed_layout
 from firable.nets.editing import edits
 from firable.nets.editing.net_file import NetFile
 from firable.nets.editing.yaml_text import YamlText
 from firable.nets.loading import Loaded
 from firable.nets.occurrences import Kind
-from firable.nets.source import Source
+from firable.nets.source import Source, read_source
 from firable.nets.text import parse_positioned
 from firable.nets.text_positions import Positions
+from firable.nets.writing import write_whole
 
 STEPS_MAX: Final = 200
 """So many edits are undone."""
+NO_NAMES: Final[Mapping[str, str]] = {}
 
 Asked = Mapping[str, Any]
 Edit = Callable[[Source], Source]
@@ -49,6 +56,8 @@ class _Step:
 
     what: str
     text: str
+    names: Mapping[str, str] = field(default_factory=dict)
+    """What going back to the text makes of names that other files know: the full ones, with those that they get."""
 
 
 @dataclass
@@ -106,7 +115,7 @@ class Editing:
             after = make(file.source)
             if after.text == file.source.text:
                 return await self._shown()
-            return await self._written(after.text, what)
+            return await self._written(after.text, what, _names_of(asked, file.source))
 
     async def put(self, asked: Asked) -> dict[str, Any]:
         """The whole text, as somebody has typed it."""
@@ -139,7 +148,7 @@ class Editing:
             self.done.clear()
             self.undone.clear()
             try:
-                self.playing.take(await asyncio.to_thread(_read, file.source))
+                self._take(await asyncio.to_thread(_read, file.source))
             except InputError as error:
                 return _draft(error, file.source.text, version=file.version)
             return await self._shown()
@@ -175,22 +184,37 @@ class Editing:
         loaded = await asyncio.to_thread(_read, Source(file.source.file, step.text))
         self.file = file.written(step.text)
         steps.pop()
-        others.append(_Step(step.what, file.source.text))
-        self.playing.take(loaded)
+        others.append(_Step(step.what, file.source.text, _turned(step.names)))
+        self._take(loaded, step.names)
         return await self._shown()
 
-    async def _written(self, text: str, what: str) -> dict[str, Any]:
-        """A new text, written where it is a net."""
+    async def _written(self, text: str, what: str, names: Mapping[str, str] = NO_NAMES) -> dict[str, Any]:
+        """A new text, written where it is a net, and the layout file beside it where names are others now."""
         file = self._file()
         try:
             loaded = await asyncio.to_thread(_read, Source(file.source.file, text))
         except InputError as error:
             return _draft(error, text)
         self.file = file.written(text)
-        self.done = [*self.done, _Step(what, file.source.text)][-STEPS_MAX:]
+        self.done = [*self.done, _Step(what, file.source.text, _turned(names))][-STEPS_MAX:]
         self.undone.clear()
-        self.playing.take(loaded)
+        self._take(loaded, names)
         return await self._shown()
+
+    def _take(self, loaded: Loaded, names: Mapping[str, str] = NO_NAMES) -> None:
+        """Show another net, arranged by the layout file beside it; what got other names keeps its position there.
+
+        A layout file that cannot be read, or written, is left as it is: the net is what is edited, and it is written.
+        """
+        path, look = layout_path(self._file().path), self.playing.pictures.look
+        given = look.given
+        with suppress(InputError):
+            if path.is_file():
+                source = read_source(path, LAYOUT_BYTES_MAX)
+                if (text := renamed_layout(source, names)) != source.text:
+                    write_whole(path, text)
+                given = parse_layout(text, source.file)
+        self.playing.take(loaded, Look(given, tuple(names.get(name, name) for name in look.folded)))
 
     async def _shown(self) -> dict[str, Any]:
         return {"page": await self.playing.page({}), "edit": await self.state({})}
@@ -232,6 +256,20 @@ def _text(asked: Asked) -> str:
     if not isinstance(text := asked.get("text"), str):
         raise refusal("a text is wanted")
     return text
+
+
+def _names_of(asked: Asked, source: Source) -> Mapping[str, str]:
+    """The full names that an edit changes, with the new ones."""
+    match asked:
+        case {"do": "rename", "kind": str(kind), "name": str(name), "new": str(new)}:
+            return edits.renames(source, _KINDS[kind], name, new)
+        case {"do": "own", "kind": str(kind), "name": str(name), "owner": str() | None as owner}:
+            return edits.owned(source, _KINDS[kind], name, owner)
+    return NO_NAMES
+
+
+def _turned(names: Mapping[str, str]) -> Mapping[str, str]:
+    return {new: name for name, new in names.items()}
 
 
 _KINDS: Final = {kind.value: kind for kind in (Kind.CONTROLLER, Kind.PLACE, Kind.SIGNAL, Kind.TRANSITION)}

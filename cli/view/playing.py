@@ -41,10 +41,10 @@ class Playing:
         self.verdicts: tuple[Verdict, ...] | None = None
         self.checking = asyncio.Lock()
 
-    def take(self, loaded: Loaded) -> None:
+    def take(self, loaded: Loaded, look: Look | None = None) -> None:
         """Another net, after an edit; nothing that was found of the one before is known of it."""
         self.loaded = loaded
-        self.pictures = Pictures(loaded.net, self.pictures.look)
+        self.pictures = Pictures(loaded.net, look or self.pictures.look)
         self.player = Player(loaded.net)
         self.verdicts = None
         self.runs = [run for run in self.runs if run.is_given]

@@ -21,7 +21,7 @@ each of them would be a changed line in the review of a net that has not changed
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -31,7 +31,7 @@ from firable.nets.diagnostics import Diagnostic, InputError, Severity
 from firable.nets.drawing.arrangement import Arrangement
 from firable.nets.net import Net
 from firable.nets.source import Source, quoted, read_source
-from firable.nets.yaml_tree import Node, data, node_span, nodes_along, parse_tree
+from firable.nets.yaml_tree import Node, data, node_span, nodes_along, parse_tree, scalars_of, value_of
 from firable.nets.yaml_writing import scalar
 
 SIZE_BYTES_MAX: Final = 1024 * 1024
@@ -160,6 +160,26 @@ def format_layout(given: Arrangement) -> str:
     lines.append("rows:" if rows else "rows: []")
     lines += [f"- {_listed(rows[row])}" for row in sorted(rows)]
     return "\n".join(lines) + "\n"
+
+
+def renamed_layout(source: Source, names: Mapping[str, str]) -> str:
+    """The text of a layout file with other names in it; comments, order and columns stay as they are.
+
+    Raises `InputError` as `read_layout` does where it is not YAML. A place that goes to another controller is found in
+    a track of the old one then, which the layout passes over: it finds a track for it by itself.
+
+    >>> text = "firable_layout: 1\\nrows:\\n- [G1, a.p]   # first\\n"
+    >>> renamed_layout(Source("cell.layout.yaml", text), {"G1": "start"}).splitlines()[2]
+    '- [start, a.p]   # first'
+    """
+    tree = parse_tree(source)
+    tables = [node for key in ("lanes", "rows") if (node := value_of(tree, key)) is not None]
+    return source.with_parts(
+        (one.line, one.column, one.length, scalar(names[one.text]))
+        for table in tables
+        for one in scalars_of(table)
+        if one.text in names
+    )
 
 
 def _listed(names: tuple[str, ...] | list[str]) -> str:

@@ -20,7 +20,7 @@ from firable.nets.changes import Arbitration, CapacityPlace, Change, Gate
 from firable.nets.diagnostics import Diagnostic, InputError, did_you_mean
 from firable.nets.editing.yaml_text import SCOPE_KEYS, Path, Value, YamlText
 from firable.nets.net import Arbiter
-from firable.nets.occurrences import Kind, Names
+from firable.nets.occurrences import Kind, Names, Occurrence
 from firable.nets.source import Source
 from firable.nets.time_limits import fault_place_name, fault_transition_name, timer_name
 
@@ -123,10 +123,13 @@ def change(source: Source, changes: Iterable[Change]) -> Source:
 def rename(source: Source, kind: Kind, name: str, new: str) -> Source:
     """Another name, wherever the name stands in this file; raises `InputError` F2012 and F2001 as `Names.renamed`."""
     names = Names(source)
-    found = next((one for one in names.occurrences if one.defines and (one.kind, one.name) == (kind, name)), None)
-    if found is None:
-        raise _stands_nowhere(f"the name '{name}'", "it follows from a time limit: name it there, beside `within`")
-    return Source(source.file, names.renamed(found, new))
+    return Source(source.file, names.renamed(_definition(names, kind, name), new))
+
+
+def renames(source: Source, kind: Kind, name: str, new: str) -> Mapping[str, str]:
+    """All full names that `rename` changes, with the new ones, for other files that speak of them."""
+    names = Names(source)
+    return names.renames(_definition(names, kind, name), new)
 
 
 def own(source: Source, kind: Kind, name: str, owner: str | None) -> Source:
@@ -146,6 +149,13 @@ def own(source: Source, kind: Kind, name: str, owner: str | None) -> Source:
     if marked:
         text = text.with_item(to, "start", local, _before("start", SCOPE_KEYS))
     return Source(source.file, Names(text.source).replaced(renamed))
+
+
+def owned(source: Source, kind: Kind, name: str, owner: str | None) -> Mapping[str, str]:
+    """All full names that `own` changes, with the new ones, for other files that speak of them."""
+    if kind is Kind.SIGNAL:
+        return {name: _full(owner, name.rpartition(".")[2])}
+    return _moved_names(YamlText(source), *_declared(source, name, "places"), owner)
 
 
 def delete(source: Source, kind: Kind, name: str) -> Source:
@@ -241,6 +251,13 @@ def _declared(source: Source, name: str, table: str) -> tuple[Path, str]:
         hint = "what follows from `until` or `within` is edited at its place"
         raise _stands_nowhere(f"'{name}'", hint)
     return scope, local
+
+
+def _definition(names: Names, kind: Kind, name: str) -> Occurrence:
+    found = next((one for one in names.occurrences if one.defines and (one.kind, one.name) == (kind, name)), None)
+    if found is None:
+        raise _stands_nowhere(f"the name '{name}'", "it follows from a time limit: name it there, beside `within`")
+    return found
 
 
 def _of_transition(source: Source, name: str) -> Path:

@@ -148,6 +148,13 @@ def test_a_rename_changes_the_text_or_says_why_not(tmp_path: Path) -> None:
         assert edit.changes is not None
         (change,) = edit.changes[one.uri]
         assert change.new_text == LATE.replace("grasp_cv1", "take")
+        beside = tmp_path / "cell.layout.yaml"
+        beside.write_text("firable_layout: 1\nrows: [[G3]]   # kept\nlanes: [{tracks: [[robot.grasp_cv1]]}]\n")
+        edit = await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "take"))
+        assert edit is not None
+        assert edit.changes is not None
+        (change,) = edit.changes[beside.as_uri()]
+        assert change.new_text == beside.read_text().replace("grasp_cv1", "take")
         with pytest.raises(JsonRpcException, match=r"there is a 'robot\.free' already"):
             await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "free"))
         with pytest.raises(JsonRpcException, match="'on' is text for some YAML parsers"):

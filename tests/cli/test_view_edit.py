@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import urllib.error
 import urllib.request
-from collections.abc import Coroutine, Iterator
+from collections.abc import Coroutine, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -67,10 +68,10 @@ def file(served: tuple[str, Path]) -> Path:
     return path
 
 
-def asked(address: str, path: str, body: object = None, *, shown: bool = True) -> tuple[int, Any]:
+def asked(address: str, path: str, body: object = None, *, shown: bool = True, of: str = "edit/") -> tuple[int, Any]:
     base, _, token = address.partition("#token=")
     data = None if body is None else json.dumps(body).encode()
-    request = urllib.request.Request(f"{base}api/edit/{path}".rstrip("/"), data)
+    request = urllib.request.Request(f"{base}api/{of}{path}".rstrip("/"), data)
     if shown:
         request.add_header("Authorization", f"Bearer {token}")
     try:
@@ -230,6 +231,58 @@ def test_a_file_that_somebody_else_has_changed_is_not_written_over(
         expect(page.get_by_role("button", name="Undo")).to_be_disabled()
         file.write_text(TEXT)
         expect(page.locator(".banner")).to_contain_text("The file has been changed on the disk.")
+
+
+def test_what_gets_another_name_keeps_its_place_in_the_layout_file(served: tuple[str, Path], file: Path) -> None:
+    address = served[0]
+    layout = file.with_name("cell.layout.yaml")
+    before = """\
+firable_layout: 1
+lanes:
+- owner: mc   # on the left
+- {owner: robot, tracks: [[robot.busy], [robot.free]]}
+rows: [[back], [go]]   # turned round
+"""
+    moved = {"do": "own", "kind": "place", "name": "robot.free", "owner": "mc"}
+    edits = [
+        ({"do": "rename", "kind": "place", "name": "robot.busy", "new": "work"}, {"robot.busy": "robot.work"}),
+        ({"do": "rename", "kind": "transition", "name": "go", "new": "start"}, {"go": "start"}),
+        ({"do": "rename", "kind": "controller", "name": "robot", "new": "R1"}, {"robot": "R1"}),
+        (moved | {"name": "R1.free"}, {"R1.free": "mc.free"}),
+    ]
+
+    def edited(path: str, body: Mapping[str, object]) -> None:
+        status, answer = asked(address, path, {"version": asked(address, "")[1]["version"], **body})
+        assert (status, answer.get("errors")) == (200, None)
+
+    def drawn() -> dict[str, str]:
+        answer = asked(address, "picture", {}, of="")[1]["picture"]
+        return dict(re.findall(r'id="transition:(\w+)".*?<rect class="bar" x="[^"]*" y="([^"]*)"', answer, re.DOTALL))
+
+    layout.write_text(before)
+    try:
+        asked(address, "reload", {})
+        shown, texts = drawn(), [before]
+        assert float(shown["back"]) < float(shown["go"])
+        for edit, names in edits:
+            edited("", edit)
+            text = texts[-1]
+            for name, new in names.items():
+                text = re.sub(rf"\b{re.escape(name)}\b", new, text)
+            assert layout.read_text() == text
+            texts.append(text)
+        assert drawn() == {"start": shown["go"], "back": shown["back"]}
+        for text in texts[-2::-1]:
+            edited("undo", {})
+            assert layout.read_text() == text
+        assert drawn() == shown
+        edited("redo", {})
+        assert layout.read_text() == texts[1]
+        layout.write_text("- broken")
+        edited("", edits[1][0])
+        assert layout.read_text() == "- broken"
+    finally:
+        layout.unlink()
 
 
 def test_nobody_edits_without_the_token_or_what_is_not_understood(served: tuple[str, Path], file: Path) -> None:

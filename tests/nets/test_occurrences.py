@@ -71,6 +71,18 @@ def test_a_rename_changes_every_place_of_a_name_and_nothing_else(data: st.DataOb
         assert one.name not in {other.name for other in back.occurrences}
 
 
+@pytest.mark.parametrize("name", catalogue_names())
+def test_a_rename_says_all_names_that_it_changes(name: str) -> None:
+    source = Source(name, catalogue_path(name).read_text("utf-8"))
+    names = Names(source)
+    for one in (each for each in names.occurrences if each.defines):
+        before, after = parse_net(source.text), parse_net(names.renamed(one, "another"))
+        said = names.renames(one, "another")
+        for of in ("controllers", "places", "signals", "transitions", "arbiters", "properties"):
+            told = {said.get(each.name, each.name) for each in getattr(before, of)}
+            assert told == {each.name for each in getattr(after, of)}, (one.name, of)
+
+
 def test_a_controller_is_renamed_in_the_full_names_of_its_parts() -> None:
     text = TEXTS["one_robot"]
     names = names_in(text)
