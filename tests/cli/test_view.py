@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import urllib.error
 import urllib.request
@@ -103,6 +104,36 @@ def test_steps_are_undone_done_again_and_reset_and_a_reload_keeps_them(chromium:
         assert tokens(page) == after
         page.get_by_role("button", name="Reset").click()
         assert tokens(page) == begin
+
+
+@needs_browser
+def test_a_workpiece_stays_in_the_hand_that_carries_it(chromium: Browser, late: str) -> None:
+    moves = "document.getAnimations().filter((one) => one instanceof CSSTransition)"
+    rest = f"async () => {{ while ({moves}.length > 0) await new Promise(requestAnimationFrame); }}"
+    begun = f"async () => {{ while ({moves}.length === 0) await new Promise(requestAnimationFrame); }}"
+    halfway = f"() => {{ for (const one of {moves}) {{ one.pause(); one.currentTime = 50_000; }} }}"
+    middles = """(all) => all.map((one) => {
+        const { x, y, width, height } = one.getBoundingClientRect();
+        return [x + width / 2, y + height / 2];
+    })"""
+    with page_at(chromium, late) as page:
+        page.get_by_role("switch", name="Gates free").click()
+        page.get_by_role("tab", name="Top view").click()
+        for name in ("G1", "G2", "t1-a"):
+            page.locator(f"[data-transition={name}]").click()
+            expect(page.locator("#said")).to_contain_text(f"{name} has fired")
+        page.evaluate(rest)
+        slow = """.topview .moving:not([style*="duration: 0s"]) { transition-duration: 100s !important; }"""
+        page.add_style_tag(content=slow)
+        (begin,) = page.locator(".topview .hand").evaluate_all(middles)
+        page.locator("[data-transition=G3]").click()
+        expect(page.locator("#said")).to_contain_text("G3 has fired")
+        page.evaluate(begun)
+        page.evaluate(halfway)
+        (hand,) = page.locator(".topview .hand").evaluate_all(middles)
+        (piece,) = page.locator(".topview .piece").evaluate_all(middles)
+        assert math.dist(begin, hand) > 20, "it is on its way"
+        assert math.dist(hand, piece) < 2
 
 
 @needs_browser

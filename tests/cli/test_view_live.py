@@ -229,6 +229,8 @@ def test_the_page_of_one_controller_shows_what_is_its_own(chromium: Browser, bun
         expect(robot.locator(".vote.ready")).to_have_count(1)
         expect(robot.locator(".vote.lost")).to_have_count(3)
         expect(page.locator(".list .lost").first).to_contain_text("is not connected")
+        never = page.locator(".banner").filter(has_text="the coordinator was never reached")
+        expect(never).to_contain_class("open")
         ready = page.locator('[id="transition:G2"]')
         expect(ready).to_contain_class("may-wait")
         away = "the coordinator, system, mc, conveyor to be connected"

@@ -209,7 +209,8 @@ export class Live {
   private showState(now: Now): void {
     const { state, message } = now;
     const words = message ? `${state}: ${message}` : state;
-    const kind = BAD.has(state) ? "bad" : state === "paused" || state === "held" ? "open" : "good";
+    const isOpen = state === "paused" || state === "held" || (message !== "" && state !== "done");
+    const kind = BAD.has(state) ? "bad" : isOpen ? "open" : "good";
     this.frame.status.className = `status ${kind}`;
     const clock = `${now.at.toFixed(1)} s`;
     this.frame.status.replaceChildren(h("b", { class: `state ${kind}` }, state), h("span", { class: "soft clock" }, clock));

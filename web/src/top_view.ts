@@ -43,6 +43,10 @@ const PLAYED_S = 0.7;
 const MARGIN = 95;
 const WIDTH = 44;
 
+function polar([x, y]: Spot, at: Spot): { turn: number; length: number } {
+  return { turn: (Math.atan2(at[1] - y, at[0] - x) * 180) / Math.PI, length: Math.hypot(at[0] - x, at[1] - y) };
+}
+
 export class TopView {
   readonly element = h("div", { class: "topview", id: "top", role: "tabpanel", "aria-labelledby": "tab-top", tabindex: "0", hidden: true });
   private readonly drawing = svg("svg", { role: "img" });
@@ -144,12 +148,14 @@ export class TopView {
     const there = new Set<number>();
     for (const [number, on, machined] of top.scene.pieces) {
       there.add(number);
-      const [x, y] = this.spot(view, top, on);
+      const at = this.spot(view, top, on);
       const mover = this.hands.has(on) || on in view.belts ? on : Object.keys(top.doing).find((name) => top.doing[name]!.to === on || top.doing[name]!.from === on);
-      const piece = this.pieces.get(number) ?? this.piece(number, [x, y]);
+      const holder = this.holder(view, on) ?? "";
+      const piece = this.pieces.get(number) ?? this.piece(number, holder, at);
       piece.classList.toggle("machined", machined);
+      if (piece.dataset["holder"] !== holder) this.hold(piece, holder);
       piece.style.transitionDuration = `${mover === undefined ? Math.min(seconds, 0.2) : lasting(mover)}s`;
-      piece.style.transform = `translate(${x}px, ${y}px)`;
+      piece.style.transform = this.held(view, holder, at);
     }
     for (const [number, piece] of this.pieces) {
       if (there.has(number)) continue;
@@ -163,13 +169,33 @@ export class TopView {
     }
   }
 
-  private piece(number: number, [x, y]: Spot): SVGGElement {
-    const made = svg("g", { class: "piece moving" });
+  private piece(number: number, holder: string, at: Spot): SVGGElement {
+    const made = svg("g", { class: "piece moving", "data-holder": holder });
     made.append(svg("rect", { x: -13, y: -13, width: 26, height: 26, rx: 4 }), svg("circle", { r: 6 }));
-    made.style.transform = `translate(${x}px, ${y}px)`;
+    made.style.transform = this.held(this.view!, holder, at);
     this.layer.append(made);
     this.pieces.set(number, made);
     return made;
+  }
+
+  /** A workpiece goes into a hand, or out of it: from where it is, without a move. */
+  private hold(piece: SVGGElement, holder: string): void {
+    const { e, f } = new DOMMatrix(getComputedStyle(piece).transform);
+    piece.dataset["holder"] = holder;
+    piece.style.transitionDuration = "0s";
+    piece.style.transform = this.held(this.view!, holder, [e, f]);
+    piece.getBoundingClientRect(); // the browser has moved it there before the next move begins
+  }
+
+  /** Where a workpiece is, told as the hand that holds it is (`reach`), so that both turn on their way alike. */
+  private held(view: View, holder: string, at: Spot): string {
+    const [x, y] = view.arms[holder]?.base ?? at;
+    const { turn, length } = polar([x, y], at);
+    return `translate(${x}px, ${y}px) rotate(${turn}deg) translate(${length}px, 0px) rotate(${-turn}deg)`;
+  }
+
+  private holder(view: View, on: string): string | undefined {
+    return Object.keys(view.arms).find((name) => name === on || view.arms[name]!.gripper.includes(on));
   }
 
   private handAt(view: View, top: Top, name: string): Spot {
@@ -182,17 +208,16 @@ export class TopView {
 
   /** Where a workpiece is drawn: on its station, in a hand, or on a belt, at the end to which it is carried. */
   private spot(view: View, top: Top, on: string): Spot {
-    const arm = Object.keys(view.arms).find((name) => name === on || view.arms[name]!.gripper.includes(on));
+    const arm = this.holder(view, on);
     if (arm !== undefined) return this.handAt(view, top, arm);
     const belt = view.belts[on];
     if (belt === undefined) return view.stations[on] ?? [0, 0];
     return view.stations[top.doing[on]?.to ?? ""] ?? [(belt[0] + belt[2]) / 2, (belt[1] + belt[3]) / 2];
   }
 
-  private reach({ base }: Arm, name: string, [x, y]: Spot, seconds: number): void {
+  private reach({ base }: Arm, name: string, at: Spot, seconds: number): void {
     const { arm, reach, hand } = this.hands.get(name)!;
-    const length = Math.max(1, Math.hypot(x - base[0], y - base[1]));
-    const turn = (Math.atan2(y - base[1], x - base[0]) * 180) / Math.PI;
+    const { turn, length } = polar(base, at);
     for (const one of [arm, reach, hand]) one.style.transitionDuration = `${seconds}s`;
     arm.style.transform = `translate(${base[0]}px, ${base[1]}px) rotate(${turn}deg)`;
     reach.style.transform = `scaleX(${Math.max(1, length - 16)})`;
