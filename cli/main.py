@@ -84,6 +84,16 @@ class _Commands(click.Group):
         command: click.Command = getattr(import_module(f"firable.cli.{module}"), function)
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that is named; raises `click.UsageError` with the one that was probably meant."""
+        if args[0] not in COMMANDS and not args[0].startswith("-"):
+            from firable.nets.diagnostics import did_you_mean
+
+            ctx.fail(f"No such command '{args[0]}'. {did_you_mean(args[0], list(COMMANDS))}".rstrip())
+        return super().resolve_command(ctx, args)
+
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, message="%(prog)s %(version)s")

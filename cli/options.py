@@ -198,10 +198,12 @@ def refuse_a_net(file: str, wanted: str, then: str = "") -> None:
 
 def _not_in_catalogue(name: str) -> str:
     from firable.nets.catalogue import FAMILIES, catalogue_names
+    from firable.nets.diagnostics import did_you_mean
 
     families = ", ".join(f"{family}-N" for family in FAMILIES)
     cells = ", ".join(catalogue_names())
-    return f"the catalogue has no '{name}'; it has: {cells}; and for numbers N the families {families}"
+    suggestion = did_you_mean(name, [*catalogue_names(), *FAMILIES])
+    return f"the catalogue has no '{name}'; {suggestion}it has: {cells}; and for numbers N the families {families}"
 
 
 def write_text(path: str, text: str) -> None:

@@ -15,7 +15,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
-from firable.nets.diagnostics import Diagnostic, InputError, Span
+from firable.nets.diagnostics import Diagnostic, InputError, Span, did_you_mean
 
 EXCERPT_CHARACTERS_MAX: Final = 100
 
@@ -111,10 +111,20 @@ def read_bytes(path: str | Path, size_bytes_max: int) -> bytes:
             data = stream.read(size_bytes_max + 1)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise _refusal(path, "F1001", f"cannot be read: {reason}", "check the path and the permissions") from None
+        hint = f"{_beside(path)}check the path and the permissions"
+        raise _refusal(path, "F1001", f"cannot be read: {reason}", hint) from None
     if len(data) > size_bytes_max:
         raise _refusal(path, "F1003", "the file grew beyond the limit while it was read", "is something writing to it?")
     return data
+
+
+def _beside(path: Path) -> str:
+    """The start of a hint that names the file of the same folder which was probably meant."""
+    try:
+        names = [] if path.exists() else sorted(one.name for one in path.parent.iterdir() if one.is_file())
+    except (OSError, ValueError):  # ValueError: a NUL in the path
+        return ""
+    return did_you_mean(path.name, names)
 
 
 def _refusal(path: str | Path, code: str, message: str, hint: str) -> InputError:
