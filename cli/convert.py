@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from firable.cli import text
-from firable.cli.options import load_net, write_text
+from firable.cli.options import load_net, write_net, write_text
 
 
 @click.command(short_help="Convert a net between *.firable.yaml and PNML.")
@@ -22,18 +22,18 @@ def convert(source: str, output: str) -> int:
     """
     from firable.nets.loading import PNML_SUFFIXES, TEXT_SUFFIXES
     from firable.nets.pnml import write_pnml
-    from firable.nets.printing import format_net
 
     suffix = Path(output).suffix.lower()
     if suffix not in PNML_SUFFIXES | TEXT_SUFFIXES:
         raise click.UsageError(f"cannot tell the format of '{output}': name a file *.firable.yaml or *.pnml")
     loaded = load_net(source)
     if suffix in TEXT_SUFFIXES:
-        written, lost = format_net(loaded.net), loaded.notes
+        write_net(output, loaded.net)
+        lost = loaded.notes
     else:
         written, more = write_pnml(loaded.net)
+        write_text(output, written)
         lost = (*loaded.notes, *more)
-    write_text(output, written)
     for note in lost:
         text.show_diagnostic(note)
     return 0

@@ -13,7 +13,7 @@ import click
 
 from firable.cli import text
 from firable.cli.evidence_files import is_evidence
-from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_folder, write_text
+from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_folder, write_net
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
@@ -66,7 +66,6 @@ def loop_report(
     """The report on one net with its machines; the evidence on each of its loops goes into a folder."""
     from firable.analysis.loop.faults import ask_faults
     from firable.analysis.loop.verdicts import check_loop
-    from firable.nets.printing import format_net
     from firable.nets.verdict import held_to
 
     loaded, model = load_net(argument), read_machines(machines)
@@ -75,7 +74,7 @@ def loop_report(
     faults = ask_faults(report.asked, model, allowed)
     files: tuple[str, ...] = ()
     if loop_file is not None:
-        write_text(loop_file, format_net(report.closed.net))
+        write_net(loop_file, report.closed.net)
         files = (loop_file,)
     if evidence_dir is not None:
         loops = {"loop": report.asked, "loop.failing": faults.for_good, "loop.repaired": faults.repaired}

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.loading import Loaded
+    from firable.nets.net import Net
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -214,6 +215,32 @@ def write_text(path: str, text: str) -> None:
         click.echo(text, nl=False)
     else:
         write_whole(path, text)
+
+
+SCHEMA_FILE = "net.schema.json"
+
+
+def write_net(path: str, net: Net) -> None:
+    """Write a net file, as `write_text` does; its first line names its JSON Schema where the project has one.
+
+    That is the nearest `net.schema.json` beside the file or above it, up to the folder that the command runs in. An
+    editor completes and checks a file by that line; where there is none, the line would name nothing.
+    """
+    from firable.nets.printing import format_net
+
+    found = None if path == "-" else _schema_above(Path(path).absolute())
+    first = "" if found is None else f"# yaml-language-server: $schema={found}\n"
+    write_text(path, first + format_net(net))
+
+
+def _schema_above(file: Path) -> str | None:
+    here = Path.cwd()
+    for steps, folder in enumerate(file.parents):
+        if (folder / SCHEMA_FILE).is_file():
+            return "../" * steps + SCHEMA_FILE
+        if not folder.is_relative_to(here) or folder == here:
+            break
+    return None
 
 
 def write_folder(folder: str, files: Mapping[str, str | bytes]) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from firable.cli.options import (
     page_option,
     with_page,
     write_folder,
-    write_text,
+    write_net,
 )
 from firable.cli.report import Report
 
@@ -111,7 +111,6 @@ def _report(
     from firable.decompose.refinement.evidence import refinement_evidence
     from firable.decompose.refinement.refining import proved_tasks
     from firable.decompose.refinement.refining import refine as refine_net
-    from firable.nets.printing import format_net
 
     loaded = load_net(argument)
     catalogue = read_catalogue(files)
@@ -135,7 +134,7 @@ def _report(
         verdicts, documents = refinement_evidence(blocks, report, verdicts, _limits(most), detailed=detailed)
         written = write_folder(evidence_dir, documents)
     if output is not None:
-        write_text(output, format_net(refinement.net))
+        write_net(output, refinement.net)
     return Report(
         "refine",
         argument,

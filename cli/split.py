@@ -104,10 +104,9 @@ class _Asked:
 def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | None) -> Report:
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
-    from firable.cli.options import write_text
+    from firable.cli.options import write_net
     from firable.decompose.splitting.cut import split as split_net
     from firable.decompose.splitting.persistence import persistence
-    from firable.nets.printing import format_net
 
     loaded, rules = load_net(argument), _rules(asked)
     with loaded.placing():
@@ -116,7 +115,7 @@ def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | 
     found = persistence(decomposition, limits=Limits(Deadline.after(asked.max_seconds)))
     files = write_folder(subnet_dir, _subnets(decomposition)) if subnet_dir is not None else ()
     if output is not None:
-        write_text(output, format_net(net))
+        write_net(output, net)
         files = (output, *files)
     split_json = _split_json(found)
     if suggestion is not None:

@@ -332,3 +332,29 @@ def test_every_command_is_loaded_by_its_name(capsys: pytest.CaptureFixture[str])
         assert main([name, "--help"]) == 0
         assert capsys.readouterr().out.startswith(f"Usage: firable {name}")
     assert sorted(COMMANDS) == list(COMMANDS)
+
+
+def test_a_net_file_that_is_written_names_the_schema_of_its_project(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "net.schema.json").touch()
+    project = tmp_path / "project"
+    (project / "cells").mkdir(parents=True)
+    monkeypatch.chdir(project)
+    lines = []
+    for schema in (None, "net.schema.json", "cells/net.schema.json"):
+        if schema is not None:
+            assert main(["schema", "net"]) == 0
+            (project / schema).write_text(capsys.readouterr().out, "utf-8")
+        assert main(["convert", "catalogue:one_robot", "-o", "cells/cell.firable.yaml"]) == 0
+        lines.append((project / "cells/cell.firable.yaml").read_text("utf-8").splitlines()[0])
+    assert main(["refine", "catalogue:conceptual_one_robot", "-o", "refined.firable.yaml"]) == 0
+    lines.append((project / "refined.firable.yaml").read_text("utf-8").splitlines()[0])
+    named = "# yaml-language-server: $schema="
+    assert lines == [
+        "firable: 1",  # the schema above the project is not the project's
+        f"{named}../net.schema.json",
+        f"{named}net.schema.json",
+        f"{named}net.schema.json",
+    ]
+    assert main(["check", "cells/cell.firable.yaml"]) == 0
