@@ -117,8 +117,8 @@ class _Layouter:
             for t, _ in edges:
                 self.attached[t].add(self.track_of[p])
         for t, tracks in enumerate(self.attached):
-            if not tracks:
-                tracks.add(self._spare(min(self.participants[t])))
+            reached = {self.lane_of_track[track] for track in tracks}
+            tracks |= {self._spare(lane) for lane in self.participants[t] - reached}
 
     def _taking(self, t: int) -> frozenset[Owner]:
         """Who takes part in a transition: by its arcs and gates, unless it is given."""

@@ -10,7 +10,7 @@ from support.whole_nets import whole_nets
 
 from firable.nets.catalogue import catalogue_net
 from firable.nets.drawing import draw_net
-from firable.nets.drawing.folding import fold, tasks
+from firable.nets.drawing.folding import fold, taking_part, tasks
 from firable.nets.net import Net
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -54,6 +54,21 @@ def test_local_transitions_inside_a_task_go_and_global_ones_keep_their_part() ->
     left, width = float(robot.get("x", "")), float(robot.get("width", ""))
     g3 = next(one for one in svg.iter() if one.get("id") == "transition:G3")
     assert any(left < float(bar.get("x", "")) < left + width for bar in g3.iter(f"{SVG}rect"))
+
+
+@pytest.mark.parametrize("name", ["one_robot", "two_cells", "two_robots_shared", "philosophers-4", "machines-2"])
+def test_a_global_transition_has_a_bar_in_the_box_of_each_who_takes_part_in_it(name: str) -> None:
+    net = catalogue_net(name)
+    for folded in ([], ["all"]):
+        svg = ET.fromstring(draw_net(net, folded=folded))
+        boxes = {str(one.get("id")): one for one in svg.iter() if one.get("id", "").startswith("lane:")}
+        for t in fold(net, folded).net.transitions:
+            group = next(one for one in svg.iter() if one.get("id") == f"transition:{t.name}")
+            bars = [float(bar.get("x", "")) for bar in group.iter(f"{SVG}rect")]
+            for owner in taking_part(net, net.transition(t.name)):
+                box = boxes[f"lane:{owner}"]
+                left, width = float(box.get("x", "")), float(box.get("width", ""))
+                assert any(left < x < left + width for x in bars), (t.name, owner)
 
 
 def test_a_folded_task_is_a_double_circle_and_holds_the_token_of_any_place_in_it() -> None:
