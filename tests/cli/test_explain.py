@@ -62,7 +62,7 @@ def test_what_a_page_shows_is_printed(code: str, tmp_path: Path, monkeypatch: py
 
 
 def test_most_codes_show_an_example() -> None:
-    assert len(WITH_EXAMPLE) >= 91
+    assert len(WITH_EXAMPLE) >= 94
 
 
 @pytest.mark.parametrize("asked", ["F3011", "f3011", "3011", "[F3011]", "error[F3011]"])
