@@ -1,6 +1,7 @@
 """The line that tells how far an exploration has come: on a terminal or on request, and never in a report."""
 
 import io
+import re
 from pathlib import Path
 
 import pytest
@@ -142,5 +143,5 @@ def test_ctrl_c_while_a_bundle_is_checked_leaves_the_rest_claimed(
     assert main(["verify", bundle]) == 3
     told = capsys.readouterr().out
     assert "6 of 6    eq7 " in told
-    assert "? claimed   deadlock-free" in told
+    assert re.search(r"\? claimed +deadlock-free", told)
     assert "interrupted" in told
