@@ -45,6 +45,7 @@ from firable.nets.verdict import Status, Verdict, Witness
 
 FIRST_MARKINGS: Final = 200_000
 """How many markings are looked for in a table before a diagram is tried."""
+AT_FAULT: Final = "the protocol itself is at fault: run no net by it, and report it"
 MORE_TIME: Final = "give each exploration more time (--timeout)"
 MORE_MEMORY: Final = "the diagram needs more memory than `prove` gives it; `explore_protocol` takes `Limits` with more"
 
@@ -56,19 +57,21 @@ STATEMENTS: Final = {
 COMPLETE: Final = Question(
     "explored.complete",
     "whatever the central net may fire next, the protocol can still fire next (branching bisimilar, its steps hidden)",
-    code="F4002",
-    hint="the last event of the run is what it is lost by",
+    code="F4006",
+    hint=f"the last event of the run is what it is lost by; {AT_FAULT}",
 )
 ONE_TOKEN: Final = Question(
     "explored.one-token",
     "no step finds a full place that it would fill, but where the central net has contact, or an order under way takes "
     "the token of a part free of promise",
-    code="F4002",
+    code="F4006",
+    hint=AT_FAULT,
 )
 DIVERGENCE: Final = Question(
     "explored.divergence",
     "while nothing fires, a run goes on for ever only by repeating requests, votes or orders, or giving rounds up",
-    code="F4002",
+    code="F4006",
+    hint=AT_FAULT,
     method="weights on places that every other hidden step lowers",
 )
 
@@ -171,12 +174,13 @@ class Exploration:
         return () if witness is None else tuple(str(self.protocol.steps[t]) for (t,) in witness.firings)
 
     def _told(self, verdict: Verdict) -> Verdict:
-        name = verdict.name.removeprefix("property.")
+        name, wrong = verdict.name.removeprefix("property."), verdict.status is Status.VIOLATED
         return replace(
             verdict,
             name=f"explored.{name}",
             statement=STATEMENTS[name],
-            code="F4002" if verdict.status is Status.VIOLATED else verdict.code,
+            code="F4006" if wrong else verdict.code,
+            hint=AT_FAULT if wrong else verdict.hint,
             witness=None if verdict.witness is None else replace(verdict.witness, note=_note(name)),
         )
 

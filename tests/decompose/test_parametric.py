@@ -24,6 +24,7 @@ from firable.nets.catalogue import catalogue_names, catalogue_net
 from firable.nets.decomposition import Coordinated, Decomposition, Part
 from firable.nets.knowledge import knowledge
 from firable.nets.net import Command, Controller, ExternalGate, Net, Place, Signal, SignalKind, Transition
+from firable.nets.rules import rule_of
 from firable.nets.verdict import Status, Verdict
 
 # --- The theorem
@@ -33,6 +34,15 @@ def test_every_obligation_is_proved() -> None:
     verdicts, _ = theorem()
     assert {verdict.name: verdict.status for verdict in verdicts if verdict.status is not Status.PROVED} == {}
     assert {verdict.evidence for verdict in verdicts} == {("protocol.smt2",)}
+
+
+def test_an_obligation_that_is_refuted_has_the_code_of_the_protocol(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Reader, "answer", lambda *_: Answer.SAT)
+    verdicts, _ = theorem(9_998)
+    assert {(verdict.status, rule_of(verdict)) for verdict in verdicts} == {(Status.VIOLATED, "F4006")}
+    assert {verdict.hint for verdict in verdicts} == {
+        "the protocol itself is at fault: run no net by it, and report it"
+    }
 
 
 def test_another_solver_confirms_the_file() -> None:

@@ -7,7 +7,7 @@ from firable.analysis.goal import Limits
 from firable.decompose.protocol.building import protocol_net
 from firable.decompose.protocol.directed import Search, directed, numbered
 from firable.decompose.protocol.draft import ASTRAY
-from firable.decompose.protocol.exploring import explore_protocol
+from firable.decompose.protocol.exploring import AT_FAULT, COMPLETE, DIVERGENCE, ONE_TOKEN, explore_protocol
 from firable.decompose.protocol.refuting import LINES_READ, Refutation, is_true_here, readable, refute
 from firable.decompose.protocol.variant import Variant
 from firable.decompose.protocol.wrong import WRONG, WrongProtocol, example
@@ -44,6 +44,11 @@ def test_wrong_protocol_is_refuted_by_a_run_that_the_reference_player_plays(wron
     central = {place.removeprefix("central/") for place in holds if place.startswith("central/")}
     own = {place for place in holds if place in found.protocol.parts.net.place_index}
     assert ASTRAY in holds or central != own
+
+
+def test_what_is_wrong_with_a_protocol_has_its_code_and_says_what_to_do() -> None:
+    assert {question.code for question in (COMPLETE, ONE_TOKEN, DIVERGENCE)} == {"F4006"}
+    assert all(question.hint.endswith(AT_FAULT) for question in (COMPLETE, ONE_TOKEN, DIVERGENCE))
 
 
 @pytest.mark.parametrize("wrong", WRONG, ids=named)

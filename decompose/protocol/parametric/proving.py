@@ -95,6 +95,6 @@ def _verdict(obligation: ParametricObligation, answer: Answer) -> Verdict:
         case Answer.UNSAT:
             return verdict(Status.PROVED)
         case Answer.SAT:
-            return verdict(Status.VIOLATED, "F4002", "the protocol itself is at fault: run no net by it")
+            return verdict(Status.VIOLATED, "F4006", "the protocol itself is at fault: run no net by it, and report it")
         case Answer.UNKNOWN:
             return verdict(Status.UNKNOWN, hint="allow more time", bound="z3 gave up")
