@@ -84,7 +84,10 @@ def _demand_reachable(net: Net, marking: tuple[str, ...], allowed: Budget) -> No
         raise InputError([Diagnostic("F5051", message, "give it more time or memory: --max-seconds, --max-memory")])
     if verdict.status is Status.VIOLATED:
         message = f"'{net.name}' never comes into the marking {shown}, so nothing is proved of what follows"
-        hint = "run the old bundle on, to a marking that both nets reach: best to the end of the cycle"
+        hint = (
+            "run the old bundle on, to a marking that both nets reach: best to the end of the cycle; where there is "
+            "none, bring the cell by hand to the initial marking of the new net, and begin with a new journal"
+        )
         raise InputError([Diagnostic("F5051", message, hint)])
 
 

@@ -45,6 +45,7 @@ from firable.nets.temporal import Logic, format_temporal, logics, parse_temporal
 from firable.nets.verdict import Expectation, Status
 
 FORMAT: Final = "firable-net/3"
+_ANEW: Final = f"write it anew with `net_to_json`, or make the bundle or the evidence anew: the form is {FORMAT}"
 
 
 def net_to_json(net: Net) -> dict[str, Any]:
@@ -138,7 +139,7 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
             Diagnostic(
                 "F1015",
                 f"not a net in JSON: {'.'.join(str(step) for step in one['loc']) or 'the whole'}: {one['msg']}",
-                f"the form is that of `net_to_json`, {FORMAT}",
+                _ANEW,
             )
             for one in error.errors(include_url=False, include_input=False)[:20]
         ) from None
@@ -183,7 +184,7 @@ def net_from_json(data: Mapping[str, Any]) -> Net:
     try:
         return Net(*parts)
     except ValueError as error:  # a contradiction that no text can express, such as a completion that gates nothing
-        raise InputError([Diagnostic("F1015", f"not a net in JSON: {error}", "take it from `net_to_json`")]) from None
+        raise InputError([Diagnostic("F1015", f"not a net in JSON: {error}", _ANEW)]) from None
 
 
 def canonical_json(value: Any) -> bytes:
@@ -215,9 +216,8 @@ def _without_descriptions(data: dict[str, Any]) -> dict[str, Any]:
 
 def _property(record: _PropertyRecord) -> Property | TemporalProperty:
     if (record.then is None) == (record.kind == "leads_to"):
-        raise InputError(
-            [Diagnostic("F1015", f"the property '{record.name}' wants 'then' exactly where it is a leads_to", "")]
-        )
+        message = f"the property '{record.name}' wants 'then' exactly where it is a leads_to"
+        raise InputError([Diagnostic("F1015", message, _ANEW)])
     if record.kind in {*Logic}:
         return _temporal_property(record)
     formula = _formula(record.name, record.formula)
@@ -228,7 +228,7 @@ def _property(record: _PropertyRecord) -> Property | TemporalProperty:
 def _temporal_property(record: _PropertyRecord) -> TemporalProperty:
     logic = Logic(record.kind)
     if record.fairness != "none":
-        raise InputError([Diagnostic("F1015", f"the property '{record.name}' assumes no fairness", "")])
+        raise InputError([Diagnostic("F1015", f"the property '{record.name}' assumes no fairness", _ANEW)])
     try:
         formula = parse_temporal(record.formula)
         if logic not in logics(formula):
@@ -247,7 +247,7 @@ def _formula(name: str, text: str) -> Formula:
 
 def _no_formula(name: str, error: FormulaError) -> InputError:
     message = f"the property '{name}' is not a formula: {error.message}"
-    return InputError([Diagnostic("F1012", message, "", ("properties", name))])
+    return InputError([Diagnostic("F1012", message, _ANEW, ("properties", name))])
 
 
 class _Record(BaseModel):

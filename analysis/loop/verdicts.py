@@ -163,7 +163,8 @@ def _families(loop: ClosedLoop) -> Iterator[Family]:
         "loop.completions",
         "a place that waits for a completion has its machine at work, or the completion is there",
         {subject: never(f"loop.completion.{i}", lost) for i, (subject, lost) in enumerate(_losses(loop))},
-        hint="the completion that this place waits for was cleared, or its command was never sent",
+        hint="the completion was cleared, or its command never sent: begin at a place without a command, and give "
+        "each command a completion of its own",
     )
     yield Family(
         "loop.deadlock-free",

@@ -347,7 +347,8 @@ class _Deciding:
         note = f"before the last firing '{vote.part}' votes yes, after it no"
         told = after if after.bit_count() <= TOKENS_MAX else 0
         witness = self.witnesses.named([*run, (last,)], told, note=note)
-        return no(tuple(by), witness, f"taken back by {listed(by)}")
+        hint = f"nothing has to be done: the part promises, and then {listed(by)} cannot take its yes back"
+        return no(tuple(by), witness, hint)
 
     def _run(self, witness: Witness) -> list[FiringSet]:
         """A firing sequence by the indexes of its transitions."""

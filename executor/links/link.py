@@ -106,4 +106,5 @@ def objection(ours: Greeting, theirs: Greeting) -> Diagnostic | None:
 def cannot_open(what: str, reason: str) -> InputError:
     """The refusal of a link that does not come up (F5021)."""
     message = f"the link {printable(what)} cannot be opened: {printable(reason)}"
-    return InputError([Diagnostic("F5021", message, "is the address right, and is another program using it?")])
+    hint = "name an address that this host has, and end the program that uses it, if one does"
+    return InputError([Diagnostic("F5021", message, hint)])

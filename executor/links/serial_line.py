@@ -18,6 +18,7 @@ half-duplex converter does not have, and save only the time of empty polls.
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -116,7 +117,7 @@ class SerialLink:
         try:
             self.line = serial.Serial(self.port, self.baud, timeout=0, write_timeout=0, exclusive=True)
         except (OSError, ValueError) as error:  # pyserial's own error is an OSError
-            raise cannot_open(self.port, str(error)) from None
+            raise cannot_open(self.port, _reason(error)) from None
         descriptor = self.line.fileno()
         # It may have run before: whoever was heard then is met anew, and meets somebody else.
         self.instance, self.reader, self.polled = os.urandom(8).hex(), FrameReader(), -1
@@ -317,7 +318,7 @@ class SerialLink:
         try:
             act()
         except OSError as error:
-            self._break(cannot_open(self.port, str(error)))
+            self._break(cannot_open(self.port, _reason(error)))
         except Exception as error:
             self._break(error)
 
@@ -338,6 +339,14 @@ def addresses_on_a_line(coordinators: tuple[str, ...], controllers: tuple[str, .
     {'': 0, 'system': 1, 'robot': 2}
     """
     return {**dict.fromkeys(coordinators, MASTER), **{name: i for i, name in enumerate(controllers, 1)}}
+
+
+def _reason(error: OSError | ValueError) -> str:
+    """Why a port cannot be had, in the words of the system; pyserial says them twice, and the port besides."""
+    number = error.errno if isinstance(error, OSError) else None
+    if number in {errno.EAGAIN, errno.EBUSY}:
+        return "another program has it open"
+    return os.strerror(number) if number else str(error)
 
 
 def _line(sender: str, receiver: str, text: bytes) -> bytes:

@@ -25,7 +25,9 @@ a server process of its own (uvicorn), which takes the signals of the process, C
 
 from __future__ import annotations
 
+import errno
 import ipaddress
+import os
 import secrets
 import ssl
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterable
@@ -148,13 +150,19 @@ async def listening(app: web.Application, endpoint: Endpoint) -> AsyncIterator[s
         try:
             await site.start()
         except OSError as error:
-            message = f"the operator's endpoint cannot be had at {endpoint.host}:{endpoint.port}: {error.strerror}"
+            message = f"the operator's endpoint cannot be had at {endpoint.host}:{endpoint.port}: {_reason(error)}"
             raise InputError([Diagnostic("F5061", message, "name another port; 0 takes a free one")]) from None
         host, port = runner.addresses[0][:2]
         shown = f"[{host}]" if ":" in host else host
         yield f"{'http' if endpoint.tls is None else 'https'}://{shown}:{port}"
     finally:
         await runner.cleanup()
+
+
+def _reason(error: OSError) -> str:
+    """Why, in the words of the system; asyncio says the address in them once more."""
+    number = error.errno or 0
+    return os.strerror(number) if number in errno.errorcode else str(error.strerror or error)
 
 
 def admission(endpoint: Endpoint, public: Collection[str] = ()) -> Middleware:

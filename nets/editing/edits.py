@@ -68,7 +68,7 @@ def disconnect(source: Source, transition: str, part: str, name: str) -> Source:
     """One arc or gate less; raises `InputError` F1020 for a gate that no list of the transition names."""
     text, path = YamlText(source), _of_transition(source, transition)
     if name not in names_in(text.at((*path, _part(part)))):
-        hint = "the completion of a place's command is a gate of all that take its token: see `until`"
+        hint = "what `until` of a place names is a gate of all that take its token: edit `until` there"
         raise _stands_nowhere(f"`{part}: {name}` of '{transition}'", hint)
     return text.without_item(path, part, name).source
 

@@ -51,6 +51,14 @@ def test_a_code_that_the_product_cannot_meet_is_reported_by_the_carrier(code: st
     assert code in codes_in(ROOT / file)
 
 
+def test_no_diagnostic_is_without_a_hint() -> None:
+    for file in (file for room in ROOMS for file in (ROOT / room).rglob("*.py")):
+        for call in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Diagnostic":
+                hints = [*call.args[2:3], *(one.value for one in call.keywords if one.arg == "hint")]
+                assert [ast.unparse(hint) for hint in hints] not in ([], ["''"]), f"{file}:{call.lineno}"
+
+
 def test_only_codes_of_the_table_are_reported(reported: set[str]) -> None:
     assert reported <= set(CODES)
 

@@ -120,6 +120,7 @@ def test_what_is_no_net_is_refused(path: tuple[Any, ...], value: Any, code: str)
     with pytest.raises(InputError) as refused:
         net_from_json(changed(DATA, path, value))
     assert code in {problem.code for problem in refused.value.diagnostics}
+    assert all(problem.hint for problem in refused.value.diagnostics)
 
 
 def test_equal_nets_have_equal_text() -> None:

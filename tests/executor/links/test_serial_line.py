@@ -1,11 +1,14 @@
 """Frames and the bus of the serial line, with noise on it."""
 
 import asyncio
+import os
+import pty
 import random
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import serial
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
@@ -164,6 +167,20 @@ def test_a_port_that_is_none_is_refused() -> None:
                 await link.run(Heard())
 
     asyncio.run(main())
+
+
+def test_a_port_that_another_program_has_open_is_refused_in_plain_words() -> None:
+    ours, theirs = pty.openpty()
+    port = os.ttyname(theirs)
+    try:
+        with serial.Serial(port, exclusive=True), pytest.raises(InputError) as refused:
+            asyncio.run(
+                SerialLink(Greeting("d", ("robot",)), port, addresses_on_a_line(("",), CONTROLLERS), 2).run(Heard())
+            )
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    assert f"error[F5021]: the link {port} cannot be opened: another program has it open\n" in str(refused.value)
 
 
 def test_a_line_that_is_taken_away_ends_the_link() -> None:
