@@ -6,7 +6,7 @@ reported together. The model (`Net`) knows nothing of files: it names the *subje
 its text. So the rules of a well-formed net are written once, for text, PNML and nets built by a program.
 
 To add a diagnostic: one row in `CODES`, the place that reports it, a case in the tests of its room, a page
-in docs/codes.
+in docs/codes with an example that is run (or a row in tests/support/exact_words.py).
 """
 
 from __future__ import annotations

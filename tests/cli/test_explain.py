@@ -1,4 +1,4 @@
-"""Every code has a page, and what its example shows is what is printed."""
+"""Every code has a page, and what is said of it is known word for word: by the page's example, or by `EXACT`."""
 
 import contextlib
 import io
@@ -7,6 +7,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from support.exact_words import EXACT
 from support.sessions import fits, run, session
 
 from firable.cli.main import main
@@ -16,6 +17,12 @@ PAGES = Path(__file__).parents[2] / "docs" / "codes"
 BLOCK = re.compile(r"^(?:In `(?P<file>[^`]+)`:\n\n)?```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 WITH_EXAMPLE = [code for code in CODES if "```console" in (PAGES / f"{code}.md").read_text("utf-8")]
 NEVER_NAMED = {"F3015", "F3016", "F3017", "F3019", "F3022", "F3023"}  # verdicts whose lines need no hint
+
+WITHOUT_HINT = {"F3024"}  # the verdict that the file expects otherwise has its own
+WITH_DOTS = {
+    "F5031",  # it names bundles by their identities, which each release makes anew
+    *("F4011", "F5101"),  # they have dots of their own
+}
 
 
 def page(code: str) -> str:
@@ -51,7 +58,8 @@ def test_what_a_page_shows_is_printed(code: str, tmp_path: Path, monkeypatch: py
     commands = 0
     for block in BLOCK.finditer(page(code)):
         if block["kind"] != "console":
-            (tmp_path / block["file"]).write_text(block["text"], "utf-8")
+            if block["file"]:
+                (tmp_path / block["file"]).write_text(block["text"], "utf-8")
             continue
         for command, shown in session(block["text"]):
             told = printed(command, tmp_path)
@@ -61,8 +69,31 @@ def test_what_a_page_shows_is_printed(code: str, tmp_path: Path, monkeypatch: py
     assert code in page(code).split("```console")[1] or code in NEVER_NAMED
 
 
-def test_most_codes_show_an_example() -> None:
-    assert len(WITH_EXAMPLE) >= 94
+def test_every_code_has_an_exact_output() -> None:
+    """A new code gets an example on its page; where no command shows it, a row in tests/support/exact_words.py."""
+    assert {*WITH_EXAMPLE, *EXACT} == set(CODES)
+
+
+@pytest.mark.parametrize("code", EXACT)
+def test_what_no_command_shows_is_said_word_for_word(code: str, tmp_path: Path) -> None:
+    mistake, words = EXACT[code]
+    assert f"[{code}]" in words
+    assert mistake(tmp_path).rstrip("\n") == words.rstrip("\n").replace("{folder}", str(tmp_path))
+
+
+@pytest.mark.parametrize("code", EXACT)
+def test_what_is_said_word_for_word_has_a_hint(code: str) -> None:
+    assert "hint: " in EXACT[code][1]
+
+
+@pytest.mark.parametrize("code", sorted({*WITH_EXAMPLE} - NEVER_NAMED))
+def test_an_example_shows_the_words_of_its_code_whole_and_the_hint(code: str) -> None:
+    """From the line that bears the code to the hint no words are left out."""
+    lines = page(code).split("```console\n", 1)[1].splitlines()
+    begin = next(i for i, line in enumerate(lines) if f"[{code}]" in line)
+    end = next((i for i in range(begin, len(lines)) if "hint: " in lines[i]), None)
+    assert end is not None or code in WITHOUT_HINT
+    assert "..." not in "\n".join(lines[begin : (begin if end is None else end) + 1]) or code in WITH_DOTS
 
 
 @pytest.mark.parametrize("asked", ["F3011", "f3011", "3011", "[F3011]", "error[F3011]"])
