@@ -24,7 +24,7 @@ from firable.cli.main import firable
 DOCS: Final = Path(__file__).parents[2] / "docs"
 BLOCK: Final = re.compile(r"^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 SAVED: Final = re.compile(r"Save\s+(?:this|it)\s+(?:again\s+)?as\s+`([^`]+)`")
-PAGES: Final = sorted(path for path in DOCS.rglob("*.md") if "codes" not in path.parts)
+PAGES: Final = sorted(path for path in DOCS.rglob("*.md") if path.parent != DOCS / "codes")
 
 
 def _with(kind: str) -> list[str]:
