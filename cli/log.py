@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import errno
 import logging
-import logging.handlers
 import os
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -37,27 +36,26 @@ def log_to(path: str | None) -> Iterator[Log | None]:
         yield None
         return
     from firable.executor.operating.aside import aside
-    from firable.executor.operating.log import JsonLines, Log, logger_to
+    from firable.executor.operating.log import Log, logger_to
 
-    handler = _handler(path)
-    handler.setFormatter(JsonLines())
-    with aside(handler.handle) as tell:
+    with aside(_writer(path)) as tell:
         yield Log(logger_to(_Aside(tell)))
 
 
-def _handler(path: str) -> logging.Handler:
+def _writer(path: str) -> Callable[[str], None]:
+    """What writes lines; no handler that `logging` would wait for at the end of the process, nor a stream's buffer."""
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable
 
     if path == "-":
-        return logging.StreamHandler(sys.stderr)
+        return _on_standard_error
     try:
         _demand_writable(path)
-        return _InFile(path, encoding="utf-8", delay=True)
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         message = f"{printable(path)}: the log cannot be written: {reason}"
         raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
+    return _InFile(path).write
 
 
 def _demand_writable(path: str) -> None:
@@ -71,31 +69,65 @@ def _demand_writable(path: str) -> None:
 
 
 class _Aside(logging.Handler):
-    """Hands each record to what says it elsewhere."""
+    """Hands each line to what says it elsewhere, and never fails: a log that breaks ends no run."""
 
-    def __init__(self, tell: Callable[[logging.LogRecord], None]) -> None:
+    def __init__(self, tell: Callable[[str], None]) -> None:
         super().__init__()
         self.tell = tell
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Have it said."""
-        self.tell(record)
+        """Have it said, and after it how many were not."""
+        from firable.executor.operating.aside import UntoldError
 
-
-class _InFile(logging.handlers.WatchedFileHandler):
-    """A log that breaks is told once, and ends no run: a cell does not stop because a disk for logs is full."""
-
-    is_broken = False
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Write a line, to the file that has the name now."""
         try:
-            self.reopenIfNeeded()
-            stream = self.stream or self._open()  # none where it could not be opened anew before
-            self.stream = stream
-            stream.write(f"{self.format(record)}\n")
-            stream.flush()
+            self.tell(f"{self.format(record)}\n")
+        except UntoldError as error:
+            missing = logging.makeLogRecord({"msg": "untold", "levelname": "WARNING", "args": {"message": str(error)}})
+            self.tell(f"{self.format(missing)}\n")
+
+
+def _on_standard_error(line: str) -> None:
+    with suppress(OSError, ValueError):  # a terminal that is gone
+        try:
+            descriptor = sys.stderr.fileno()
+        except OSError:  # it stands for something in this process
+            sys.stderr.write(line)
+        else:
+            _write_whole(descriptor, line)
+
+
+def _write_whole(descriptor: int, line: str) -> None:
+    rest = memoryview(line.encode())
+    while rest:
+        rest = rest[os.write(descriptor, rest) :]
+
+
+class _InFile:
+    """A log in the file that has the name now: it may be rotated. One that breaks is told once."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        self.descriptor: int | None = None
+        self.is_broken = False
+
+    def write(self, line: str) -> None:
+        """Write a line with its end."""
+        try:
+            _write_whole(self._opened(), line)
         except (OSError, ValueError) as error:
             if not self.is_broken:
                 self.is_broken = True
-                click.echo(f"  the log {self.baseFilename} cannot be written any more: {error}", err=True)
+                with suppress(OSError, ValueError):
+                    click.echo(f"  the log {self.path} cannot be written any more: {error}", err=True)
+
+    def _opened(self) -> int:
+        if self.descriptor is not None:
+            try:
+                if os.path.samestat(Path(self.path).stat(), os.fstat(self.descriptor)):
+                    return self.descriptor
+            except FileNotFoundError:
+                pass  # it was moved, and is begun anew
+            os.close(self.descriptor)
+            self.descriptor = None
+        self.descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        return self.descriptor

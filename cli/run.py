@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ from firable.cli.sign import trust_option
 from firable.cli.watched import machines_verdict
 
 if TYPE_CHECKING:
-    from firable.executor import Answer, RunReport
+    from firable.executor import Answer, Operator, RunReport
     from firable.nets.bundle import Bundle
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
@@ -147,7 +148,11 @@ def run(
         _refuse_to_overwrite(trace, log, *read, *_files_beside(options.journal))
         model = None if plant_file is None else read_plant(plant_file)
         service = served.service(bundle, model)
-        with log_to(log) as told_to:
+        pace = 1.0 if options.bind is not None else _SPEEDS[speed]
+        stepped: AbstractContextManager[Operator | None] = nullcontext()
+        if step:
+            stepped = stepping(pace, to_stderr=format_ == "json")
+        with log_to(log) as told_to, stepped as operator:
             if options.is_one_of_several:
                 said = _said(loaded.net, say, options.journal)
                 return run_host_of(
@@ -159,7 +164,7 @@ def run(
                     loaded,
                     options.bind,
                     trace,
-                    stepping(1.0, to_stderr=format_ == "json") if step else None,
+                    operator,
                     options.journal,
                     _said(loaded.net, say, options.journal),
                     resume=options.resume,
@@ -183,7 +188,7 @@ def run(
                     service=service,
                     log=told_to,
                     tell=tell,
-                    operator=stepping(_SPEEDS[speed], to_stderr=format_ == "json") if step else None,
+                    operator=operator,
                 )
         return Report(
             "run",

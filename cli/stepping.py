@@ -18,13 +18,15 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Collection
-from contextlib import suppress
-from typing import Protocol
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from typing import Protocol, TypeAlias
 
 import click
 
 from firable.executor import Answer, Host, Operator
+from firable.executor.operating.aside import aside
 from firable.executor.operating.restart import uncertain
 
 _PROMPT = "  [Enter] next, [r] run on, [e] stop at the end of the cycle, [s] stop now: "
@@ -32,6 +34,8 @@ _TAKE_UP = "  [r] take the run up, [s] stop now: "
 _RESET = "  type reset when nobody is in the way any more, [s] end the run: "
 _SAY = "  what did the machine do? PLACE=done, =working or =not-received, [s] stop now: "
 _POLL_SECONDS = 0.05
+Say: TypeAlias = Callable[..., object]
+"""Says a line as `click.echo` does."""
 
 
 class _MootError(Exception):
@@ -53,15 +57,15 @@ class _Typed(Protocol):
 class _TypedAtPrompt:
     """Lines that everything waits for."""
 
-    def __init__(self, *, to_stderr: bool) -> None:
-        self.to_stderr = to_stderr
+    def __init__(self, say: Say) -> None:
+        self.say = say
 
     async def asked(self, prompt: str, is_moot: Callable[[], bool]) -> str | None:
         """The next line, after a prompt; None at the end of the input and at Ctrl-C. Nothing becomes moot meanwhile."""
         del is_moot
         handler = signal.signal(signal.SIGINT, signal.default_int_handler)
         try:
-            click.echo(prompt, nl=False, err=self.to_stderr)
+            self.say(prompt, nl=False)
             return input()
         except (EOFError, KeyboardInterrupt):
             return None
@@ -76,8 +80,8 @@ class _TypedAtPrompt:
 class _TypedMeanwhile:
     """Lines that are read beside the run."""
 
-    def __init__(self, *, to_stderr: bool) -> None:
-        self.to_stderr = to_stderr
+    def __init__(self, say: Say) -> None:
+        self.say = say
         self.lines: deque[str] = deque()
         self.ended = threading.Event()
         threading.Thread(target=self._read, daemon=True).start()
@@ -86,14 +90,14 @@ class _TypedMeanwhile:
         """The next line, after a prompt; None at the end of the input."""
         if is_moot():
             raise _MootError
-        click.echo(prompt, nl=False, err=self.to_stderr)
+        self.say(prompt, nl=False)
         while not is_moot():
             if self.lines:
                 return self.lines.popleft()
             if self.ended.is_set() and not self.lines:  # the last lines come before the end
                 return None
             await asyncio.sleep(_POLL_SECONDS)
-        click.echo(err=self.to_stderr)
+        self.say()
         raise _MootError
 
     def unasked(self) -> bool:
@@ -111,8 +115,21 @@ class _TypedMeanwhile:
         self.ended.set()
 
 
-def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
-    """The operator of a run at a speed (None: virtual time), who talks on standard output or on standard error."""
+@contextmanager
+def stepping(speed: float | None, *, to_stderr: bool) -> Iterator[Operator]:
+    """The operator of a run at a speed (None: virtual time), who is talked to on standard output or on standard error.
+
+    Beside a run that goes on nobody waits for the terminal to take what is said.
+    """
+    echo = partial(click.echo, err=to_stderr)
+    if speed is None:
+        yield _operator(speed, echo)
+        return
+    with aside(echo) as say:
+        yield _operator(speed, say)
+
+
+def _operator(speed: float | None, say: Say) -> Operator:
 
     async def key(typed: _Typed, prompt: str, keys: Collection[str], is_moot: Callable[[], bool]) -> str | None:
         """One of the keys; None where the question is moot."""
@@ -122,7 +139,7 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
             except _MootError:
                 return None
             if line is None:
-                click.echo(err=to_stderr)
+                say()
                 return "s"
             if line.strip().lower() in keys:
                 return line.strip().lower()
@@ -144,7 +161,7 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
                 return False
             await asyncio.sleep(_POLL_SECONDS)
         description = host.net.transition(fired).description
-        click.echo(f"{host.now_seconds():8.1f} s  {fired}  {description}", err=to_stderr)
+        say(f"{host.now_seconds():8.1f} s  {fired}  {description}")
         return True
 
     async def paused_again(host: Host, typed: _Typed) -> bool:
@@ -152,7 +169,7 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
         host.resume()
         if speed is None:
             return False
-        click.echo("  running on; Enter pauses", err=to_stderr)
+        say("  running on; Enter pauses")
         while not is_held(host) and not host.paused:
             if host.at_rest:
                 return False
@@ -174,7 +191,7 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
                     forget(typed)
                     was_stopped = False
                 for line in host.situation().message.split("; "):
-                    click.echo(f"  {line}", err=to_stderr)
+                    say(f"  {line}")
                 await (said(host, typed) if uncertain(host) else resumed(host, typed))
             if host.is_to_end:
                 return False
@@ -194,7 +211,7 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
                 host.stop()
             case "reset":
                 for why in host.reset():
-                    click.echo(f"  not reset: {why}", err=to_stderr)
+                    say(f"  not reset: {why}")
 
     async def resumed(host: Host, typed: _Typed) -> None:
         """Take a run up that is held, or end it."""
@@ -220,7 +237,7 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Operator:
             host.say(place, Answer(word.replace("-", " ")))
 
     async def operate(host: Host) -> None:
-        typed: _Typed = (_TypedAtPrompt if speed is None else _TypedMeanwhile)(to_stderr=to_stderr)
+        typed: _Typed = (_TypedAtPrompt if speed is None else _TypedMeanwhile)(say)
         if not await taken_up(host, typed):
             return
         host.pause()

@@ -22,11 +22,19 @@ LAST_WORDS_SECONDS: Final = 1.0
 """So long the end waits for what is not said yet."""
 
 
+LINES_MAX: Final = 10_000
+"""So many may wait: who sleeps for days fills no memory."""
+
+
+class UntoldError(Exception):
+    """So many lines were told to nobody, because too many waited."""
+
+
 @contextmanager
 def aside(say: Callable[P, object], seconds: float = LAST_WORDS_SECONDS) -> Iterator[Callable[P, None]]:
     """What calls `say` on a thread of its own, as long as this lasts; in the end all is said, or `seconds` are over.
 
-    Where `say` has failed, the next call raises its error, and is said all the same.
+    A later call raises what an earlier one has failed with, or `UntoldError`; what it tells is said all the same.
 
     >>> heard = []
     >>> with aside(heard.append) as tell:
@@ -44,8 +52,17 @@ def aside(say: Callable[P, object], seconds: float = LAST_WORDS_SECONDS) -> Iter
             except Exception as error:  # of whoever is told: it is the caller's to know
                 failed.put(error)
 
+    untold = 0
+
     def tell(*arguments: P.args, **named: P.kwargs) -> None:
+        nonlocal untold
+        if waiting.qsize() >= LINES_MAX:
+            untold += 1
+            return
         waiting.put(lambda: say(*arguments, **named))
+        if untold:
+            some, untold = untold, 0
+            raise UntoldError(f"{some:,} lines were told to nobody: too many waited")
         if not failed.empty():
             raise failed.get()
 

@@ -1,6 +1,6 @@
 """The disk of journal and trace, watched while it stores: one that stands still is told of while it does.
 
-Nothing leaves before the journal has it (`groups.py`). So a disk that stands still stops a cell that nobody has
+Nothing leaves before journal and trace have it (`groups.py`). So a disk that stands still stops a cell that nobody has
 stopped: no command is sent, no vote is given, and whoever looks sees machines at rest and transitions that have fired.
 After `HANGS_SECONDS`, of which a disk that works needs some thousandths, the operator is told, and the log and the
 figures are; the situation says it until the disk has answered, which is told as well. The trace has it with what is
@@ -78,6 +78,6 @@ class DiskWatch:
         self._tell(HANGS, self.sentence())
 
     def _tell(self, kind: str, sentence: str) -> None:
-        """Tell the operator, and then the log: it may be kept on the same disk."""
+        """Tell the operator, the log and the figures."""
         self.run.tell_operator(kind, sentence)
         self.run.recorder.note(self.run.now_seconds(), kind, message=sentence)

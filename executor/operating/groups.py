@@ -111,9 +111,11 @@ class Groups:
         if self.storing is not None and not self.is_given_up:
             self.is_given_up = True
             message = f"{self.run.acts.stored_in} cannot be written: the disk does not answer"
-            hint = "look at the machines, then at the disk; what the journal holds, the same command takes up"
+            hint, code = "look at the machines, then at the disk", "F1017"
+            if self.run.acts.stored_in != "the trace":
+                hint, code = f"{hint}; what the journal holds, the same command takes up", "F5034"
             self.run.told("fault", f"{message}; {hint}")
-            self.run.broken(InputError([Diagnostic("F5034", message, hint)]))
+            self.run.broken(InputError([Diagnostic(code, message, hint)]))
 
     def _in_turn(self) -> None:
         self.turn = None

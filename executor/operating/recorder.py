@@ -69,11 +69,13 @@ class TraceFile:
     def write(self, lines: str, /) -> None:
         """Write lines with their ends, whole; on any thread."""
         self.is_writing = True
-        with self._failures():
-            rest = memoryview(lines.encode())
-            while rest:
-                rest = rest[self.file.write(rest) or 0 :]
-        self.is_writing = False
+        try:
+            with self._failures():
+                rest = memoryview(lines.encode())
+                while rest:
+                    rest = rest[self.file.write(rest) or 0 :]
+        finally:
+            self.is_writing = False
 
     def flush(self) -> None:
         """Nothing is buffered."""
@@ -218,7 +220,7 @@ class Recorder:
     def writing(self) -> Callable[[], None] | None:
         """Begin to write the lines so far: what writes them to a file, on any thread; None where nothing does.
 
-        `written` follows when it is done. Raises `InputError` F1017 where the file cannot be written.
+        `written` follows when it is done. What is returned raises `InputError` F1017 where the file cannot be written.
         """
         self.begun = len(self.unwritten)
         if self.begun == 0 or not isinstance(self.stream, TraceFile):

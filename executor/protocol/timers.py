@@ -3,8 +3,8 @@
 Time is an input, like a signal: whoever hosts the controller says what its clock shows (`tick`), and asks when the
 next time will be over (`deadline`). A time begins with the first tick after the token has entered, so a host gives
 none before the command has left it (`begins_with`), and is over when its limit has gone by and the token is still there
-without its completion. Then the timer is set in the process image, as a
-driver would set a sensor, and the fault transition is a local one like any other.
+without its completion. Then the timer is set in the process image, as a driver would set a sensor, and the fault
+transition is a local one like any other.
 
 A late tick is a late timeout and nothing worse: no proof says when a time is over. A clock that jumps makes timeouts
 early or late, never wrong. Nothing of it is kept: after a restart each command is asked after first, and its time
@@ -52,7 +52,8 @@ class Timers:
 
     def begins_with(self, places: Iterable[str]) -> bool:
         """Whether the next tick would begin the time of one of these places."""
-        return any(self.running.get(place) == -inf for place in places)
+        unbegun = {place for place, due in self.running.items() if due == -inf}
+        return bool(unbegun) and not unbegun.isdisjoint(places)
 
     def begin_anew(self, word: Word) -> None:
         """Begin the time of every place that waits for its completion: after a restart."""

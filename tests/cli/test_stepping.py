@@ -79,11 +79,11 @@ def run(monkeypatch: pytest.MonkeyPatch, *acts: Act) -> tuple[Situation, list[tu
         return Silent(DECOMPOSITION.subnets, 10.0)
 
     recorder = Recorder(NET, net_digest(NET), stream)
-    operator = stepping.stepping(1.0, to_stderr=False)
-    host = Host(DECOMPOSITION, driver(), recorder, operator=operator, latched=driver)
-    terminal = Terminal(host, acts)
-    monkeypatch.setattr(stepping, "_TypedMeanwhile", lambda **_: terminal)
-    situation = run_in_virtual_time(host.main())
+    with stepping.stepping(1.0, to_stderr=False) as operator:
+        host = Host(DECOMPOSITION, driver(), recorder, operator=operator, latched=driver)
+        terminal = Terminal(host, acts)
+        monkeypatch.setattr(stepping, "_TypedMeanwhile", lambda _: terminal)
+        situation = run_in_virtual_time(host.main())
     assert replay(NET, parse_trace(stream.getvalue())).complete
     return situation, terminal.asked_for
 

@@ -1,13 +1,21 @@
 """What is told aside is told in order, and keeps nobody waiting who tells it."""
 
 import os
+import subprocess
+import sys
+import threading
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from threading import Event
 
+import pytest
+
 from firable.cli.log import log_to
+from firable.cli.main import main
 from firable.executor.drivers.bench import PATIENCE_S
-from firable.executor.operating.aside import LAST_WORDS_SECONDS, aside
+from firable.executor.operating.aside import LINES_MAX, UntoldError, aside
 
 
 def test_all_is_said_in_order_before_the_end() -> None:
@@ -57,12 +65,67 @@ def test_a_log_whose_reader_sleeps_keeps_no_run_waiting(tmp_path: Path) -> None:
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     begun = time.monotonic()
+    before = threading.active_count()
     with log_to(str(pipe)) as log:
         assert log is not None
         for _ in range(200):  # more than a pipe holds
             log.began("n" * 1000, ["robot"])
         assert time.monotonic() - begun < PATIENCE_S
-    os.set_blocking(reader, True)
     assert b'"event": "began"' in os.read(reader, 10_000)
+    while threading.active_count() > before:  # until all is said, and nobody writes into what is closed
+        with suppress(BlockingIOError):
+            os.read(reader, 100_000)
     os.close(reader)
-    assert LAST_WORDS_SECONDS < PATIENCE_S
+
+
+def test_more_than_a_memory_holds_is_not_kept_and_how_much_that_was_is_said() -> None:
+    listens = Event()
+    heard: list[int] = []
+
+    def slow(number: int) -> None:
+        assert listens.wait(PATIENCE_S)
+        heard.append(number)
+
+    with aside(slow) as tell:
+        for number in range(LINES_MAX + 100):
+            tell(number)
+        listens.set()
+        wait_until(lambda: len(heard) >= LINES_MAX)
+        with pytest.raises(UntoldError, match=r"^\d+ lines were told to nobody"):
+            tell(-1)
+    assert heard[-1] == -1
+    assert len(heard) < LINES_MAX + 10
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("log", ["pipe", "-"])
+def test_a_log_whose_reader_sleeps_keeps_no_process_from_its_end(tmp_path: Path, log: str) -> None:
+    bundle, pipe = str(tmp_path / "cell.bundle"), tmp_path / "pipe"
+    assert main(["bundle", "catalogue:one_robot", "-o", bundle]) == 0
+    if log != "-":
+        os.mkfifo(pipe)
+    reader, writer = (os.open(pipe, os.O_RDONLY | os.O_NONBLOCK), None) if log != "-" else os.pipe()
+    full = os.open(pipe, os.O_WRONLY | os.O_NONBLOCK) if writer is None else os.dup(writer)
+    os.set_blocking(full, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(full, b"x" * 4096)
+    os.set_blocking(full, True)  # which both ends of it have in common
+    command = [sys.executable, "-m", "firable.cli.main", "run", bundle, "--workpieces", "1", "--log"]
+    done = subprocess.run(
+        [*command, log if log == "-" else str(pipe)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE if writer is None else writer,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert done.returncode == 0
+    assert b"1 workpiece" in done.stdout
+    for descriptor in (reader, full, *([] if writer is None else [writer])):
+        os.close(descriptor)

@@ -89,18 +89,25 @@ class Slow(MemoryJournal):
         return None
 
 
+class SlowFile(io.FileIO):
+    """A file on a disk that takes what is written when it is let."""
+
+    answers = Semaphore(0)
+    is_slow = False
+
+    def write(self, data: Any, /) -> int:
+        if self.is_slow:
+            assert self.answers.acquire(timeout=PATIENCE_S)
+        return super().write(data)
+
+
 class Waiting(TraceFile):
-    """A trace on a disk that takes lines when it is let."""
+    """A trace in such a file."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self.answers = Semaphore(0)
-        self.is_slow = False
-
-    def write(self, lines: str, /) -> None:
-        if self.is_slow:
-            assert self.answers.acquire(timeout=PATIENCE_S)
-        super().write(lines)
+        self.file = self.disk = SlowFile(path, "w")
+        self.disk.answers = Semaphore(0)
 
 
 class Rig:
@@ -434,7 +441,7 @@ def test_a_trace_on_a_disk_that_stands_still_keeps_no_stop_from_the_machines(tmp
     async def main() -> None:
         rig = Rig(trace=(trace := Waiting(tmp_path / "trace.jsonl")))
         async with rig.running() as ending:
-            trace.is_slow = True
+            trace.disk.is_slow = True
             rig.host.signal("a.s", value=True, entry=None)
             await turns()
             assert rig.host.acts.stored_in == "the trace"
@@ -445,7 +452,7 @@ def test_a_trace_on_a_disk_that_stands_still_keeps_no_stop_from_the_machines(tmp
             await turns()
             assert rig.machines.is_stopped
             assert not ending.done()
-            trace.answers.release(1000)
+            trace.disk.answers.release(1000)
             assert (await ended_within(ending, PATIENCE_S)).state is State.STOPPED
         lines = (tmp_path / "trace.jsonl").read_text("utf-8").splitlines()
         assert [name for line in lines for name in json.loads(line).get("fired", ())] == ["up", "begin"]
@@ -459,16 +466,17 @@ def test_a_trace_whose_disk_never_answers_ends_a_stop_as_an_error(tmp_path: Path
         rig = Rig(trace=(trace := Waiting(tmp_path / "trace.jsonl")))
         rig.host.patience = Patience(0.1)
         async with rig.running() as ending:
-            trace.is_slow = True
+            trace.disk.is_slow = True
             rig.host.signal("a.s", value=True, entry=None)
             await turns()
             rig.host.stop()
-            with pytest.raises(InputError, match="the trace cannot be written: the disk does not answer"):
+            with pytest.raises(InputError, match=r"F1017.*the trace cannot be written: the disk does not answer"):
                 await ended_within(ending, PATIENCE_S)
             assert rig.machines.is_stopped
             assert rig.machines.sent == []
-            trace.close()  # which does not wait either
-            trace.answers.release(1000)
+            trace.close()  # which neither waits nor pulls the file from under who writes
+            assert not trace.disk.closed
+            trace.disk.answers.release(1000)
 
     asyncio.run(main())
 
