@@ -26,7 +26,7 @@ from typing import Protocol, TypeAlias
 import click
 
 from firable.executor import Answer, Host, Operator
-from firable.executor.operating.aside import aside
+from firable.executor.operating.aside import UntoldError, aside
 from firable.executor.operating.restart import uncertain
 
 _PROMPT = "  [Enter] next, [r] run on, [e] stop at the end of the cycle, [s] stop now: "
@@ -126,7 +126,12 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Iterator[Operator]:
         yield _operator(speed, echo)
         return
     with aside(echo) as say:
-        yield _operator(speed, say)
+
+        def said(*words: str, nl: bool = True) -> None:
+            with suppress(UntoldError):  # a terminal that slept for so long ends no run
+                say(*words, nl=nl)
+
+        yield _operator(speed, said)
 
 
 def _operator(speed: float | None, say: Say) -> Operator:

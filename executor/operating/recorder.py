@@ -22,6 +22,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
+from io import FileIO
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -54,8 +55,7 @@ class TraceFile:
         self.path = path
         self.is_writing = False
         with self._failures():
-            # As long as this object, and without a buffer, whose lock a write that hangs would hold.
-            self.file = Path(path).open("r+b" if size_bytes else "wb", buffering=0)  # noqa: SIM115
+            self.file = FileIO(path, "r+" if size_bytes else "w")  # no buffer, whose lock a write that hangs would hold
             if size_bytes:
                 self._cut(size_bytes)
 
