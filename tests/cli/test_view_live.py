@@ -71,6 +71,8 @@ def test_a_run_is_followed_paused_stepped_resumed_and_stopped(chromium: Browser,
         expect(page.locator(".topview .piece").first).to_be_visible()
         page.get_by_role("button", name="Pause").click()
         state(page, "paused")
+        # The list is drawn less often than the state: once it tells of the pause, it tells of all that fired before.
+        expect(page.locator(".events .note").filter(has_text="paused")).to_be_visible()
         fired = page.locator(".events .fired").count()
         for _ in range(500):  # the machines end what they are at, and then something is enabled
             with page.expect_response("**/step") as answered:
