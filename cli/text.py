@@ -101,7 +101,7 @@ def show_verdicts(net: Net, verdicts: Sequence[Verdict], *, verbose: bool = Fals
     told: dict[tuple[object, ...], str] = {}
     width = max((len(verdict.name) for verdict in verdicts), default=0)
     for weight, title in _HEADINGS.items():
-        some = [v for v in verdicts if ("required" if v.expected is not None else v.weight.value) == weight]
+        some = [verdict for verdict in verdicts if verdict.told_as.value == weight]
         if some:
             click.echo(f"\n{click.style(title, bold=True)}")
         for verdict in some:
@@ -146,16 +146,13 @@ def reasons(
 
     `told` holds the sequences that were told before, by the verdict that told them.
     """
-    from firable.nets.rules import rule_of
+    from firable.nets.rules import hints_of
 
     status = verdict.status.value
     told = {} if told is None else told
-    if verdict.expected is not None and verdict.outcome.value != "unknown":
-        changed = verdict.outcome.value == "violated"
-        yield (
-            f"[F3024] the file expects {verdict.expected}, and it is {status}" if changed else f"{status}, as expected"
-        )
-        if not verbose and not (changed and status == "violated"):
+    if verdict.expected is not None and verdict.outcome.value == "proved":
+        yield f"{status}, as expected"
+        if not verbose:
             return
     if verbose:
         yield f"by {verdict.method}{_cost(verdict.cost)}"
@@ -166,8 +163,8 @@ def reasons(
         yield f"about: {', '.join(verdict.subjects[:12])}{more}"
     if verdict.witness is not None and (verbose or (status == "violated" and verdict.weight.value == "required")):
         yield from _witness(net, verdict.name, verdict.witness, told)
-    if status != "proved" and verdict.hint:
-        yield f"hint: [{rule_of(verdict)}] {verdict.hint}"
+    for code, hint in hints_of(verdict):
+        yield f"hint: [{code}] {hint}"
     if verdict.cures and (verbose or verdict.weight.value == "required"):
         key = tuple(cure.changes for cure in verdict.cures)
         if key in told:
@@ -226,22 +223,31 @@ _OUTCOMES: Final = {"violated": "changed", "unknown": "unknown though expected",
 
 def show_summary(report: Report) -> None:
     """Print the last line: how it ended, and how many verdicts there are of each kind."""
-    expected = [verdict for verdict in report.verdicts if verdict.expected]
-    others = [verdict for verdict in report.verdicts if not verdict.expected]
-    parts = []
-    for status in ("violated", "unknown", "proved"):
-        if n := sum(verdict.status.value == status and verdict.matters for verdict in others):
-            parts.append(f"{n} {status}")
-    for outcome, word in _OUTCOMES.items():
-        if n := sum(verdict.outcome.value == outcome for verdict in expected):
-            parts.append(f"{n} {word}")
-    warnings = sum(verdict.weight.value == "warning" and verdict.status.value != "proved" for verdict in others)
-    if warnings:
-        parts.append(counted(warnings, "warning"))
-    good = "all as expected" if any(verdict.status.value == "violated" for verdict in expected) else "all hold"
-    word, colour = {0: (good, "green"), 1: ("violated", "red")}.get(report.exit_code, ("not decided", "yellow"))
+    word, colour = {0: (good_end(report.verdicts), "green"), 1: ("violated", "red")}.get(
+        report.exit_code, ("not decided", "yellow")
+    )
+    parts = [f"{n:,} {kind}" for n, kind in endings(report.verdicts)]
     click.echo(f"\n{click.style(word, fg=colour, bold=True)}: {', '.join(parts) or 'there is nothing to hold'}")
     show_page(report)
+
+
+def good_end(verdicts: Iterable[Verdict]) -> str:
+    """The words for a report of which nothing fails."""
+    return "all as expected" if any(one.expected and one.status.value == "violated" for one in verdicts) else "all hold"
+
+
+def endings(verdicts: Sequence[Verdict]) -> Iterator[tuple[int, str]]:
+    """How many verdicts ended in each way, of those that must hold or are held to an end, and how many warnings."""
+    expected = [verdict for verdict in verdicts if verdict.expected]
+    others = [verdict for verdict in verdicts if not verdict.expected]
+    for status in ("violated", "unknown", "proved"):
+        if n := sum(verdict.status.value == status and verdict.matters for verdict in others):
+            yield n, status
+    for outcome, word in _OUTCOMES.items():
+        if n := sum(verdict.outcome.value == outcome for verdict in expected):
+            yield n, word
+    if n := sum(verdict.weight.value == "warning" and verdict.status.value != "proved" for verdict in others):
+        yield n, "warning" if n == 1 else "warnings"
 
 
 def columns() -> int:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from typing import Final
 
+from firable.nets.rules import hints_of
 from firable.nets.verdict import Status, Verdict, Weight, Witness
 
 _SIGNS: Final = {Status.PROVED: ("✓", "#11693a"), Status.VIOLATED: ("✗", "#b3123b"), Status.UNKNOWN: ("?", "#a25b00")}
@@ -48,8 +49,8 @@ def _more(verdict: Verdict, picture: str) -> Iterator[str]:
             yield from _told(verdict.witness)
         if verdict.witness.note:
             yield verdict.witness.note
-    if verdict.hint:
-        yield f"[{verdict.code}] {verdict.hint}" if verdict.code else verdict.hint
+    for code, hint in hints_of(verdict):
+        yield f"[{code}] {hint}"
     for cure in verdict.cures:
         yield f"cured by: {'; and '.join(cure.changes)}"
 

@@ -152,6 +152,11 @@ class Verdict:
         return self.weight is Weight.REQUIRED or self.expected is not None
 
     @property
+    def told_as(self) -> Weight:
+        """The weight under which it is told: what the file says the end of has to end so."""
+        return self.weight if self.expected is None else Weight.REQUIRED
+
+    @property
     def outcome(self) -> Status:
         """What the verdict means for the whole: where the file expects one, whether it ended so."""
         if self.expected is None or self.status is Status.UNKNOWN:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from firable.cli.page.markup import Markup, tag, together
-from firable.cli.page.pieces import badge
+from firable.cli.page.pieces import badge, hints_said
 from firable.cli.text import counted
 from firable.nets.verdict import Status, Verdict, Weight
 
@@ -85,7 +85,6 @@ def _verdict(verdict: Verdict) -> Markup:
     how = ", ".join(["by " + verdict.method, *cost])
     about = verdict.subjects if verdict.status is not Status.PROVED else ()
     listed = ", ".join(about[:40]) + (f" and {len(about) - 40:,} more" if len(about) > 40 else "")
-    code = f"[{verdict.code}] " if verdict.code else ""
     return tag(
         "div",
         tag("div", badge(verdict)),
@@ -95,7 +94,7 @@ def _verdict(verdict: Verdict) -> Markup:
             tag("p", f"{verdict.name}; {how}", cls="code"),
             tag("p", "about: ", listed) if listed else None,
             tag("p", "reached: ", verdict.bound) if verdict.bound and verdict.status is Status.UNKNOWN else None,
-            tag("p", code, verdict.hint, cls="hint") if verdict.hint and not verdict.holds else None,
+            hints_said(verdict),
             tag("p", "evidence: ", ", ".join(verdict.evidence), cls="code") if verdict.evidence else None,
         ),
         cls="verdict",

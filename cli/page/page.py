@@ -6,7 +6,7 @@ same report gives the same bytes: there is no date and no measured time in it, s
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from firable.cli.page.markup import Markup, raw, tag, together
@@ -15,8 +15,8 @@ from firable.cli.page.protocol import wrong_told
 from firable.cli.page.sections import refuted, sections
 from firable.cli.page.style import STYLE
 from firable.cli.report import Report
-from firable.cli.text import counted
-from firable.nets.verdict import Status, Verdict, Weight, overall
+from firable.cli.text import counted, endings, good_end
+from firable.nets.verdict import Status, Verdict, overall
 
 _ASKED: Final = {
     "prove": "Proof of the decomposition",
@@ -59,7 +59,7 @@ def page_of(report: Report) -> str:
 def _masthead(report: Report) -> Markup:
     net = report.net
     sizes = [(len(net.places), "place"), (len(net.transitions), "transition"), (len(net.controllers), "controller")]
-    counts = [tag("li", tag("b", f"{n:,}"), f" {word}") for n, word in _counts_of(report.verdicts)]
+    counts = [tag("li", tag("b", f"{n:,}"), f" {word}") for n, word in endings(report.verdicts)]
     counts += [tag("li", told)] if (told := wrong_told(report)) else []
     return tag(
         "header",
@@ -85,14 +85,18 @@ def _explored(report: Report) -> str:
 
 
 def _failing(report: Report) -> Markup | None:
-    """What must hold and does not, each with the way to its run."""
-    some = [(anchor, verdict) for anchor, verdict in refuted(report) if verdict.weight is Weight.REQUIRED]
+    """What must hold and does not, or ends otherwise than the file expects, each with the way to its run."""
+    anchors = {verdict.name: f"#{anchor}" for anchor, verdict in refuted(report)}
+    failing = [verdict for verdict in report.verdicts if verdict.matters and verdict.outcome is Status.VIOLATED]
+    some = [verdict for verdict in failing if verdict.name in anchors or verdict.expected is not None]
     if not some:
         return None
-    lines = [
-        tag("li", tag("span", "✗ ", aria_hidden="true"), tag("a", verdict.statement, href=f"#{anchor}"))
-        for anchor, verdict in some[:_FAILING_MAX]
-    ]
+    lines = []
+    for verdict in some[:_FAILING_MAX]:
+        where = anchors.get(verdict.name)
+        said = tag("a", verdict.statement, href=where) if where else verdict.statement
+        told = "" if verdict.expected is None else f": {verdict.status}, where the file expects {verdict.expected}"
+        lines.append(tag("li", tag("span", "✗ ", aria_hidden="true"), said, told))
     if len(some) > _FAILING_MAX:
         lines.append(tag("li", f"and {len(some) - _FAILING_MAX:,} more"))
     return tag("ul", lines, cls="failing", aria_label="what does not hold")
@@ -107,21 +111,10 @@ def _foot(report: Report) -> Markup:
     return tag("footer", together(*notes), tag("p", words))
 
 
-def _counts_of(verdicts: Sequence[Verdict]) -> Iterator[tuple[int, str]]:
-    """How many verdicts that must hold ended in each way, and how many warnings there are."""
-    required = [verdict for verdict in verdicts if verdict.weight is Weight.REQUIRED]
-    for status in (Status.VIOLATED, Status.UNKNOWN, Status.PROVED):
-        if n := sum(verdict.status is status for verdict in required):
-            yield n, str(status)
-    warnings = sum(v.weight is Weight.WARNING and not v.holds for v in verdicts)
-    if warnings:
-        yield warnings, "warning" if warnings == 1 else "warnings"
-
-
 def _overall_badge(verdicts: Sequence[Verdict]) -> Markup:
     """How all together ended; a report that only tells what follows has nothing that could fail."""
     if not any(verdict.matters for verdict in verdicts):
         return tag("span", "· for information: nothing has to hold", cls=classes(TONES["·"]))
-    status = overall(verdicts)
-    word = {Status.PROVED: "✓ all hold", Status.VIOLATED: "✗ violated", Status.UNKNOWN: "? not decided"}[status]
+    good = f"✓ {good_end(verdicts)}"
+    word = {Status.PROVED: good, Status.VIOLATED: "✗ violated", Status.UNKNOWN: "? not decided"}[overall(verdicts)]
     return tag("span", word, cls=classes(TONES[word[0]]))

@@ -11,17 +11,23 @@ from typing import Final
 
 from firable.cli.page.markup import Content, Markup, tag, together
 from firable.cli.text import SIGNS, mark
+from firable.nets.rules import hints_of
 from firable.nets.verdict import Status, Verdict
 
 ROWS_MAX: Final = 400
 _NAMES_MAX: Final = 200
-TONES: Final = {"✓": "good", "✗": "bad", "?": "open", "!": "open", "·": None}
+TONES: Final = {"✓": "good", "✗": "bad", "?": "open", "!": "open", "·": None, "=": "good"}
 
 
 def badge(verdict: Verdict) -> Markup:
     """How a verdict ended, as a sign and a word."""
     sign, word, _ = mark(verdict)
     return tag("span", f"{sign} {word}", cls=classes(TONES[sign]))
+
+
+def hints_said(verdict: Verdict) -> Markup:
+    """What to write instead, a paragraph with its code each; nothing where the verdict holds."""
+    return together(*(tag("p", f"[{code}] {hint}", cls="hint") for code, hint in hints_of(verdict)))
 
 
 def status_badge(status: Status) -> Markup:

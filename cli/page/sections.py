@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 from firable.cli.page.listed import family_line, listed
 from firable.cli.page.markup import Content, Markup, raw, tag, together
-from firable.cli.page.pieces import ROWS_MAX, badge, classes, names, status_badge, table
+from firable.cli.page.pieces import ROWS_MAX, badge, classes, hints_said, names, status_badge, table
 from firable.cli.page.protocol import is_of_protocol, lives_on, one_fault, while_dead
 from firable.cli.page.runs import strip
 from firable.cli.page.swimlanes import swimlanes
@@ -118,7 +118,7 @@ def _others(report: Report) -> Markup | None:
     rest = [verdict for verdict in report.verdicts if id(verdict) not in shown and not _told_apart(verdict)]
     parts: list[Markup] = []
     for weight, title in _HEADINGS.items():
-        some = [verdict for verdict in rest if verdict.weight is weight]
+        some = [verdict for verdict in rest if verdict.told_as is weight]
         if some:
             parts.append(tag("h3", title))
             parts.append(listed(some))
@@ -160,10 +160,10 @@ def _loop(report: Report) -> Markup | None:
 
 
 def refuted(report: Report) -> list[tuple[str, Verdict]]:
-    """The verdicts whose counterexamples are drawn, each with its anchor; those that must hold come first."""
+    """The verdicts whose runs are drawn, each with its anchor: what must hold comes first, what is as expected last."""
     some = [v for v in report.verdicts if v.status is Status.VIOLATED and v.witness is not None]
     some = [v for v in some if not _told_apart(v)]
-    some.sort(key=lambda verdict: list(_HEADINGS).index(verdict.weight))
+    some.sort(key=lambda verdict: (verdict.outcome is Status.PROVED, list(_HEADINGS).index(verdict.told_as)))
     return [(f"run-{n}", verdict) for n, verdict in enumerate(some, start=1)]
 
 
@@ -194,10 +194,10 @@ def _counterexamples(report: Report) -> Markup | None:
             parts.append(tag("div", head, same, cls="counter", id=anchor))
             continue
         told[key] = (verdict.name, anchor)
-        hint = tag("p", verdict.hint, cls="hint") if verdict.hint else None
+        hints = hints_said(verdict)
         drawn = _drawn(report, verdict, witness)
         story = _story(report.net_of(verdict), verdict, told, anchor)
-        parts.append(tag("div", head, drawn, story, hint, cls="counter", id=anchor))
+        parts.append(tag("div", head, drawn, story, hints, cls="counter", id=anchor))
     if not parts:
         return None
     if len(some) > COUNTEREXAMPLES_MAX:

@@ -16,6 +16,7 @@ from typing import Any, Final
 from firable.cli.story import outcome_told
 from firable.cli.view.scene import Stage
 from firable.nets.net import Net
+from firable.nets.rules import hints_of
 from firable.nets.verdict import Status, Verdict, Weight
 from firable.semantics.replaying import Replayer
 from firable.semantics.trace import CommandSent, Discipline, Fired, Noted, SignalChanged, Trace
@@ -149,6 +150,6 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         "status": verdict.status.value,
         "weight": verdict.weight.value,
         "says": verdict.statement,
-        "hint": verdict.hint,
+        "hint": "; ".join(hint for _, hint in hints_of(verdict)),
         "cures": [{"changes": list(cure.changes), "checked": outcome_told(cure)} for cure in verdict.cures],
     }

@@ -142,7 +142,7 @@ def test_what_the_file_expects_passes_and_a_change_fails(pytester: pytest.Pytest
     path.write_text(f"{LATE}{KNOWN}  home-markings: violated\n  loop.live: violated\n", "utf-8")
     found, told = outcomes(pytester)
     assert found == {"passed": 9, "failed": 1}
-    assert "[F3024] the file expects violated, and it is proved" in told
+    assert "hint: [F3024] the file expects violated, and it is proved; where that is right, write `" in told
 
 
 def test_a_net_that_cannot_be_read_is_an_error_of_the_collection(pytester: pytest.Pytester) -> None:

@@ -52,7 +52,9 @@ def test_a_verdict_that_has_become_proved_fails(tmp_path: Path, capsys: pytest.C
     code, told = checked(capsys, written(tmp_path, **known))
     assert code == 1
     assert "✗ changed   contact-free" in told
-    assert "[F3024] the file expects violated, and it is proved" in told
+    told = " ".join(told.split())
+    assert "hint: [F3024] the file expects violated, and it is proved; where that is right, write" in told
+    assert "write `contact-free: proved` under `expect`, or take its line out" in told
 
 
 def test_what_is_only_told_may_be_held_to_its_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -60,7 +62,8 @@ def test_what_is_only_told_may_be_held_to_its_verdict(tmp_path: Path, capsys: py
     code, told = checked(capsys, written(tmp_path, **known))
     assert code == 1
     assert "1 changed, 4 as expected" in told
-    assert "[F3024] the file expects proved, and it is violated" in told
+    assert "hint: [F3024] the file expects proved, and it is violated; where that is right, write `live: vio" in told
+    assert "hint: [F3014] right for what happens only at start-up" in told
 
 
 def test_unknown_never_passes_as_expected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

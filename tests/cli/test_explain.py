@@ -16,9 +16,6 @@ from firable.nets.diagnostics import CODES
 PAGES = Path(__file__).parents[2] / "docs" / "codes"
 BLOCK = re.compile(r"^(?:In `(?P<file>[^`]+)`:\n\n)?```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 WITH_EXAMPLE = [code for code in CODES if "```console" in (PAGES / f"{code}.md").read_text("utf-8")]
-NEVER_NAMED = {"F3015", "F3016", "F3017", "F3019", "F3022", "F3023"}  # verdicts whose lines need no hint
-
-WITHOUT_HINT = {"F3024"}  # the verdict that the file expects otherwise has its own
 WITH_DOTS = {
     "F5031",  # it names bundles by their identities, which each release makes anew
     *("F4011", "F5101"),  # they have dots of their own
@@ -66,7 +63,7 @@ def test_what_a_page_shows_is_printed(code: str, tmp_path: Path, monkeypatch: py
             assert fits(shown, told), f"$ {command}\n{told}"
             commands += 1
     assert commands
-    assert code in page(code).split("```console")[1] or code in NEVER_NAMED
+    assert code in page(code).split("```console")[1]
 
 
 def test_every_code_has_an_exact_output() -> None:
@@ -86,14 +83,13 @@ def test_what_is_said_word_for_word_has_a_hint(code: str) -> None:
     assert "hint: " in EXACT[code][1]
 
 
-@pytest.mark.parametrize("code", sorted({*WITH_EXAMPLE} - NEVER_NAMED))
+@pytest.mark.parametrize("code", WITH_EXAMPLE)
 def test_an_example_shows_the_words_of_its_code_whole_and_the_hint(code: str) -> None:
     """From the line that bears the code to the hint no words are left out."""
     lines = page(code).split("```console\n", 1)[1].splitlines()
     begin = next(i for i, line in enumerate(lines) if f"[{code}]" in line)
-    end = next((i for i in range(begin, len(lines)) if "hint: " in lines[i]), None)
-    assert end is not None or code in WITHOUT_HINT
-    assert "..." not in "\n".join(lines[begin : (begin if end is None else end) + 1]) or code in WITH_DOTS
+    end = next(i for i in range(begin, len(lines)) if "hint: " in lines[i])
+    assert "..." not in "\n".join(lines[begin : end + 1]) or code in WITH_DOTS
 
 
 @pytest.mark.parametrize("asked", ["F3011", "f3011", "3011", "[F3011]", "error[F3011]"])

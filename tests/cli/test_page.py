@@ -334,3 +334,19 @@ def test_the_head_says_that_the_protocol_that_runs_holds_and_wrong_ones_do_not(t
     assert re.search(
         r"all hold \d+ proved this is of the protocol that runs; of the \d+ known to be wrong, \d+ go wrong", words
     )
+
+
+def test_what_the_file_expects_is_no_failure_and_a_change_is_told() -> None:
+    witness = Witness((("t1",),))
+    known = Verdict("k", Status.VIOLATED, "it is known to fail", "m", witness=witness, expected=Status.VIOLATED)
+    held = Verdict("h", Status.PROVED, "it is known to hold", "m", Weight.INFORMATION, expected=Status.PROVED)
+    words = Reading(page_of(report_with(known, held))).words
+    assert "✓ all as expected 2 as expected" in words
+    assert "✗" not in words
+    mended = replace(known, status=Status.PROVED, witness=None)
+    other = Verdict("o", Status.VIOLATED, "it fails", "m", witness=Witness((("t2",),)))
+    words = Reading(page_of(report_with(held, mended, known, other))).words
+    assert "✗ violated 1 violated 1 changed 2 as expected" in words
+    assert "✗ it is known to fail : proved, where the file expects violated" in words
+    assert words.index("✗ violated it fails") < words.index("= expected it is known to fail")  # the runs
+    assert "[F3024] the file expects violated, and it is proved; where that is right, write `k: proved`" in words
