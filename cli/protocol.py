@@ -148,10 +148,10 @@ def _packed(file: str, document: Document) -> tuple[str, bytes]:
 
 
 def _interrupted() -> Verdict:
-    from firable.nets.verdict import Status, Verdict
+    from firable.nets.verdict import NOTHING, Status, Verdict
 
     says, hint = "all that was asked of the protocol is answered", "--timeout bounds each exploration"
-    return Verdict("explored.asked", Status.UNKNOWN, says, "nothing", hint=hint, bound="interrupted")
+    return Verdict("explored.asked", Status.UNKNOWN, says, NOTHING, hint=hint, bound="interrupted")
 
 
 def show(answered: Answered) -> None:

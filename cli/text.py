@@ -147,6 +147,7 @@ def reasons(
     `told` holds the sequences that were told before, by the verdict that told them.
     """
     from firable.nets.rules import hints_of
+    from firable.nets.verdict import NOTHING
 
     status = verdict.status.value
     told = {} if told is None else told
@@ -154,7 +155,7 @@ def reasons(
         yield f"{status}, as expected"
         if not verbose:
             return
-    if verbose:
+    if verbose and verdict.method != NOTHING:
         yield f"by {verdict.method}{_cost(verdict.cost)}"
     if status == "unknown" and verdict.bound:
         yield f"reached: {verdict.bound}"

@@ -148,7 +148,7 @@ def _report(file: str, asked: _Asked) -> Report:
 
 def _verdict(document: Document, checked: CheckedRecord) -> Verdict:
     """What is said of a record: that it is shown, whether it says that something holds or that it is violated."""
-    from firable.nets.verdict import Status, Verdict
+    from firable.nets.verdict import NOTHING, Status, Verdict
 
     record = checked.record
     said = f"it {'holds' if record.proved else 'is violated'}{_of(record)}: " if record.name else ""
@@ -157,7 +157,7 @@ def _verdict(document: Document, checked: CheckedRecord) -> Verdict:
         record.name or "evidence",
         Status.PROVED if checked.shown else Status.UNKNOWN,
         f"{said}{_claimed(record)}".removesuffix(": "),
-        "; ".join(checked.methods) or "nothing",
+        "; ".join(checked.methods) or NOTHING,
         bound=checked.only_claimed,
         hint="allow more time" if late else "",
         discipline=document.discipline.value,

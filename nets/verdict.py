@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from firable.nets.changes import Change
 
+NOTHING: Final = "nothing"
+"""The method of what nothing has shown."""
 TOKENS_MAX: Final = 200
 """Of a marking with more tokens a witness may tell none: thousands of runs of a large net would fill a report."""
 

@@ -42,6 +42,7 @@ from firable.decompose.verification.solvers import SOLVERS, Answers
 from firable.nets.bundle import Bundle
 from firable.nets.diagnostics import InputError
 from firable.nets.right_to_run import unproved
+from firable.nets.verdict import NOTHING
 
 TIMEOUT_MS: Final = 60_000
 
@@ -82,7 +83,7 @@ def _checked(
         if not left:  # what follows the last verdict was not seen to its end, and nothing would say so
             raise
         for verdict in left:
-            examination.judge(verdict, shown=False, method="nothing", only_claimed="interrupted")
+            examination.judge(verdict, shown=False, method=NOTHING, only_claimed="interrupted")
     return tuple(examination.checked[verdict.name] for verdict in bundle.verdicts)
 
 

@@ -36,7 +36,7 @@ from firable.nets.diagnostics import InputError
 from firable.nets.formula import Formula as StateFormula
 from firable.nets.interchange import net_to_json
 from firable.nets.net import Net
-from firable.nets.verdict import Status, Verdict, Weight
+from firable.nets.verdict import NOTHING, Status, Verdict, Weight
 from firable.semantics.trace import Discipline
 
 SUFFIX: Final = ".evidence.json"
@@ -232,7 +232,7 @@ def _judge(
     if found is None:
         undecided = status is Status.UNKNOWN
         said = "undecided: the bundle itself does not say" if undecided else "only claimed: no evidence is on it"
-        examination.judge(verdict, shown=False, method="nothing", only_claimed=said)
+        examination.judge(verdict, shown=False, method=NOTHING, only_claimed=said)
         return
     method = "; ".join(found[0].methods) or "the net itself"
     examination.judge(verdict, shown=found[0].shown, method=method, only_claimed=found[0].only_claimed)

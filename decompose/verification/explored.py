@@ -17,7 +17,7 @@ from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import Answers, SolverError, gave_up
 from firable.decompose.verification.voting import Voting
 from firable.decompose.verification.voting_obligations import Obligations
-from firable.nets.verdict import Status, Verdict
+from firable.nets.verdict import NOTHING, Status, Verdict
 
 TITLES: Final = {
     "explored": "the protocol of this very net does what the net does, and nothing is lost by it",
@@ -123,5 +123,5 @@ def _judge(examination: Examination, stated: Obligations, solver: str, open_: se
             message = f"the verdict on '{verdict.name}' is not what its proof shows"
             raise NotShownError(message, "verdicts", verdict.name)
         shown = open_.isdisjoint(_RESTS_ON[name])
-        method = f"{solver}, of an inductive invariant of the protocol's net, made anew" if shown else "nothing"
+        method = f"{solver}, of an inductive invariant of the protocol's net, made anew" if shown else NOTHING
         examination.judge(verdict, shown=shown, method=method, only_claimed="" if shown else f"{solver} gave up")

@@ -26,7 +26,7 @@ from firable.nets.bundle import file_stem
 from firable.nets.formula import And, Firable, Holds, format_formula
 from firable.nets.net import Property, PropertyKind, TemporalProperty
 from firable.nets.temporal import Logic, parse_temporal
-from firable.nets.verdict import Status, Verdict, Weight
+from firable.nets.verdict import NOTHING, Status, Verdict, Weight
 
 TITLE: Final = "while somebody is dead, what is said to go on does, whatever the crash has left"
 METHOD: Final = "the central net, without what the dead may hold up"
@@ -54,7 +54,7 @@ def check_outages(examination: Examination, cut: Cut, answers: Answers, timeout_
                     f"the verdict on '{wake.name}' says more than that it is open", "verdicts", wake.name
                 )
             said = "undecided: the bundle itself does not say"
-            examination.judge(verdict, shown=False, method="nothing", only_claimed=said)
+            examination.judge(verdict, shown=False, method=NOTHING, only_claimed=said)
             continue
         if found is None:  # a file that nothing rests on is none of ours
             found = answered(examination, stated, answers, timeout_ms)

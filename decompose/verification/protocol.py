@@ -16,7 +16,7 @@ from typing import Final
 from firable.decompose.verification.checked import Examination
 from firable.decompose.verification.refusal import NotShownError
 from firable.decompose.verification.solvers import Answers, SolverError, gave_up
-from firable.nets.verdict import Status, Verdict
+from firable.nets.verdict import NOTHING, Status, Verdict
 
 FILE: Final = "protocol.smt2"
 TITLE: Final = "whatever is lost or crashes, what runs is a run of the net"
@@ -50,7 +50,7 @@ def check_protocol(examination: Examination, solver: str, answers: Answers, time
             raise NotShownError(f"'{name}' is refuted: the solver says {answer}", "verdicts", name)
         shown = answer == "unsat"
         demanded = Verdict(name, Status.PROVED, sentence, _METHOD, evidence=(FILE,))
-        method = f"{solver}, of the theorem as it is published" if shown else "nothing"
+        method = f"{solver}, of the theorem as it is published" if shown else NOTHING
         verdict = examination.verdict(name)
         if verdict != demanded:
             raise NotShownError(f"the verdict on '{name}' is not what its proof shows", "verdicts", name)

@@ -39,7 +39,7 @@ from firable.nets.net import Net
 from firable.nets.tasks.model import Catalogue, Task
 from firable.nets.tasks.printing import as_written
 from firable.nets.tasks.text import parse_tasks
-from firable.nets.verdict import Status, Verdict, Weight
+from firable.nets.verdict import NOTHING, Status, Verdict, Weight
 
 PREFIX: Final = "refinement."
 CONCEPTUAL: Final = "conceptual.json"
@@ -244,13 +244,13 @@ def _judge(
             key = (task, CONDITIONS[condition][1])
         method, late = _OPENED + " anew", ""
         if kind in {"task", "conceptual"}:
-            method, late = records.methods.get(key, "nothing"), records.late.get(key, "")
+            method, late = records.methods.get(key, NOTHING), records.late.get(key, "")
             if verdict.status is Status.UNKNOWN:
                 late = "undecided: the bundle itself does not say"
         elif kind != "opened":
             method = f"{solver}, of a relation between the markings of both nets, stated anew"
             late = f"{solver} gave up" if open_ else every
-        examination.judge(verdict, shown=not late, method="nothing" if late else method, only_claimed=late)
+        examination.judge(verdict, shown=not late, method=NOTHING if late else method, only_claimed=late)
 
 
 def without_the_rest(net: Net) -> Net:

@@ -167,6 +167,7 @@ def test_a_verdict_that_nothing_shows_is_only_claimed(tmp_path: Path, capsys: py
     assert "? claimed  live        from every reachable marking" in told
     assert "✓ shown    self-loops" in told
     assert "only claimed: nobody has looked" in told
+    assert "by nothing" not in told
     assert "1 shown, 1 not shown" in told
 
 
