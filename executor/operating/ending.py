@@ -109,8 +109,7 @@ def with_hanging(ended: Situation, hanging: Collection[str]) -> Situation:
     """The end of a run of which that much did not end: a fault, whatever it was before."""
     if not hanging:
         return ended
-    message = f"{' and '.join(hanging)} did not end in time: look at the machines, they may not be safe"
-    return replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, message))))
+    return with_fault(ended, f"{' and '.join(hanging)} did not end in time: look at the machines, they may not be safe")
 
 
 def with_unconfirmed(ended: Situation, devices: Collection[str]) -> Situation:
@@ -118,10 +117,10 @@ def with_unconfirmed(ended: Situation, devices: Collection[str]) -> Situation:
     if not devices:
         return ended
     have = "have" if len(devices) > 1 else "has"
-    message = (
-        f"{' and '.join(devices)} {have} not confirmed the safe outputs: look at the machines, they may not be safe"
+    return with_fault(
+        ended,
+        f"{' and '.join(devices)} {have} not confirmed the safe outputs: look at the machines, they may not be safe",
     )
-    return replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, message))))
 
 
 def with_failed(ended: Situation, driver: asyncio.Task[None]) -> Situation:
@@ -130,7 +129,11 @@ def with_failed(ended: Situation, driver: asyncio.Task[None]) -> Situation:
         return ended
     named = f"{type(error).__name__}: {error}"
     failed = "the driver has failed" if named in ended.message else f"the driver failed at the end, {named}"
-    message = f"{failed}: look at the machines, they may not be safe"
+    return with_fault(ended, f"{failed}: look at the machines, they may not be safe")
+
+
+def with_fault(ended: Situation, message: str) -> Situation:
+    """The end of a run at which this was found besides: a fault, whatever it was before."""
     return replace(ended, state=State.FAULT, message="; ".join(filter(None, (ended.message, message))))
 
 

@@ -18,6 +18,9 @@ long as for anything that hangs: what it was given is as open as after a failed 
 
 Rejected: to wait for the disk in the callback. It is the shortest text and, on a disk that answers at once, the
 quickest; but one that stands still for a second would keep a stop from the machines for that second.
+
+The last lines of the trace tell what was done when nothing leaves any more, and no group is behind them. They are
+written on the thread like all others, and waited for as long as whatever else the end waits for.
 """
 
 from __future__ import annotations
@@ -116,6 +119,19 @@ class Groups:
                 hint, code = f"{hint}; what the journal holds, the same command takes up", "F5034"
             self.run.told("fault", f"{message}; {hint}")
             self.run.broken(InputError([Diagnostic(code, message, hint)]))
+
+    async def write_last(self, patience: Patience) -> str:
+        """Write the lines of the trace that are left; returns a sentence where that had to be given up.
+
+        Raises `InputError` F1017 where it fails.
+        """
+        if (writing := self.run.recorder.writing()) is not None:
+            storing = asyncio.get_running_loop().run_in_executor(None, writing)
+            if await uncut([storing], patience):
+                return "the last lines of the trace are not written: the disk does not answer"
+            storing.result()
+        self.run.recorder.written()
+        return ""
 
     def _in_turn(self) -> None:
         self.turn = None

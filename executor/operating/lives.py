@@ -16,6 +16,7 @@ from firable.executor.operating.clock import RunClock
 from firable.executor.operating.latch import Latch
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.uncut import uncut
+from firable.nets.diagnostics import InputError
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
@@ -38,8 +39,14 @@ async def to_the_end(run: Host) -> Situation:
     ended = ending.with_hanging(ended, hanging)
     if run.left_nothing_open:
         run.recorder.end(run.now_seconds(), run.marking, ended.state.value)
-    else:
-        run.recorder.flush()
+    try:
+        if unwritten := await run.groups.write_last(run.patience):
+            run.tell_operator("fault", unwritten)  # before anybody waits for its thread
+            ended = ending.with_fault(ended, unwritten)
+    except InputError as error:
+        if run.log is not None:
+            run.log.broke(error)
+        raise
     if run.log is not None:
         run.log.ended(ended)
     return ended
@@ -82,8 +89,7 @@ async def _outcome(run: Host, outcome: asyncio.Future[Situation]) -> Situation:
 
 
 def _stay(run: Host, driver: Latched) -> None:
-    """Begin the next life, latched by the emergency stop that has ended this one."""
-    run.recorder.flush()
+    """Begin the next life, latched by the emergency stop that has ended this one; what it has noted the next writes."""
     run.begin_seconds = run.now_seconds()
     run.driver, run.latch, run.said = driver, Latch(run.emergency or "", driver), {}
     if run.watching is not None:  # it knows of no machines in the middle of their work

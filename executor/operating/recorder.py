@@ -212,9 +212,11 @@ class Recorder:
         self._write(Noted(at_seconds, note, data))
 
     def end(self, at_seconds: float, marking: tuple[str, ...], reason: str) -> None:
-        """The last line; what happens afterwards, while links are closed, is none."""
+        """The last line, which no journal keeps: a run that is taken up again goes on before it.
+
+        What happens afterwards, while links are closed, is none.
+        """
         self._write(End(at_seconds, marking, reason))
-        self.flush()  # not kept: a run that is taken up again goes on before it
         self.is_ended = True
 
     def writing(self) -> Callable[[], None] | None:
@@ -238,12 +240,6 @@ class Recorder:
             self.stream.flush()
         self.size_bytes += sum(map(len, lines))
         del self.unwritten[: len(lines)]
-
-    def flush(self) -> None:
-        """Write the lines so far, and wait for that."""
-        if (writing := self.writing()) is not None:
-            writing()
-        self.written()
 
     def _is_told(self, at_seconds: float) -> bool:
         """Whether anybody is shown what happens now: an event that nobody is shown is not made."""

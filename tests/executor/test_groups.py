@@ -3,178 +3,26 @@
 from __future__ import annotations
 
 import asyncio
-import io
 import json
-from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import Callable
 from math import inf
 from pathlib import Path
-from threading import Semaphore, Thread
-from typing import Any
+from threading import Thread
 
 import pytest
 from support.hosts import ended_within
+from support.slow_disks import CELL, Rig, Waiting, turns
 
-from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import PATIENCE_S, until
-from firable.executor.drivers.dry_run import DryRunDriver
-from firable.executor.journal.journal import MemoryJournal, Storing
 from firable.executor.journal.outbox import Outbox
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.operating import acts, stopping
 from firable.executor.operating.host import Host
-from firable.executor.operating.recorder import Recorder, TraceFile
-from firable.executor.operating.situation import Situation, State
+from firable.executor.operating.situation import State
 from firable.executor.operating.uncut import Patience
-from firable.executor.protocol.messages import Keep, Stored
-from firable.nets.diagnostics import Diagnostic, InputError
-from firable.nets.interchange import net_digest
-from firable.nets.net import Place
-from firable.nets.text import parse_net
-
-CELL = """\
-firable: 1
-cell: cell
-controllers:
-  a:
-    start: low
-    inputs: s
-    places: {low: {send: {machine: A, command: LOW}}, high: {send: {machine: A, command: HIGH}}}
-  b:
-    start: free
-    inputs: key
-    places: {free: , working: {send: {machine: B, command: WORK}, until: worked}, waiting: }
-transitions:
-  up: {from: a.low, to: a.high, if: a.s}
-  down: {from: a.high, to: a.low, unless: a.s}
-  begin: {from: b.free, to: b.working, if: b.key}
-  leave: {from: b.working, to: b.waiting}
-"""
-
-
-class Machines(DryRunDriver):
-    """Machines that note what they are sent, and complete nothing by themselves."""
-
-    sent: list[str]
-
-    def send(self, place: Place, entry: int) -> None:
-        self.sent.append(place.name)
-        if place.completion is None and self.listener is not None:
-            self.listener.taken(place.name, entry)
-
-
-class Slow(MemoryJournal):
-    """A journal whose disk answers to each sync when it is let, or fails then."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.answers = Semaphore(0)
-        self.is_slow = False
-        self.fails = False
-        self.durable: Mapping[str, Mapping[str, Stored]] = {}
-
-    def sync(self) -> Storing | None:
-        kept = {machine: self.kept(machine) for machine in self.of}
-
-        def store() -> None:
-            assert self.answers.acquire(timeout=PATIENCE_S)
-            if self.fails:
-                raise InputError([Diagnostic("F5034", "the disk is full", "make room")])
-            self.durable = kept
-
-        if self.is_slow:
-            return store
-        self.durable = kept
-        return None
-
-
-class SlowFile(io.FileIO):
-    """A file on a disk that takes what is written when it is let."""
-
-    answers = Semaphore(0)
-    is_slow = False
-
-    def write(self, data: Any, /) -> int:
-        if self.is_slow:
-            assert self.answers.acquire(timeout=PATIENCE_S)
-        return super().write(data)
-
-
-class Waiting(TraceFile):
-    """A trace in such a file."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
-        self.file = self.disk = SlowFile(path, "w")
-        self.disk.answers = Semaphore(0)
-
-
-class Rig:
-    """A host of the cell with such a disk."""
-
-    def __init__(self, cell: str = CELL, trace: TraceFile | None = None) -> None:
-        net = parse_net(cell)
-        decomposition = split(net)
-        self.journal = Slow()
-        self.stream = io.StringIO()
-        self.machines = Machines(decomposition.subnets, 1.0, {"a.s": False, "b.key": False})
-        self.machines.sent = []
-
-        async def present(_: Host) -> None:
-            await asyncio.get_running_loop().create_future()
-
-        recorder = Recorder(net, net_digest(net), trace or self.stream)
-        self.host = Host(decomposition, self.machines, recorder, journal=self.journal, operator=present)
-
-    @asynccontextmanager
-    async def running(self) -> AsyncIterator[asyncio.Task[Situation]]:
-        ending = asyncio.create_task(self.host.main())
-        await turns()
-        try:
-            yield ending
-        finally:
-            self.journal.answers.release(1000)
-            self.host.stop()
-            await asyncio.wait([ending], timeout=PATIENCE_S)
-            assert ending.done()
-
-    async def slow_from_now_on(self) -> None:
-        """The next sync begins, and does not end."""
-        self.journal.is_slow = True
-        self.host.signal("a.s", value=True, entry=None)
-        await turns()
-        assert self.host.groups.storing is not None
-
-    async def answer(self) -> None:
-        """Let the disk answer to one sync."""
-        storing = self.host.groups.storing
-        assert storing is not None
-        self.journal.answers.release()
-        await asyncio.wait([storing], timeout=PATIENCE_S)
-        assert storing.done()
-        await turns()
-
-    async def answer_all(self) -> None:
-        """Let it answer until nothing waits for it."""
-        for _ in range(1000):
-            if self.host.groups.storing is None:
-                return
-            await self.answer()
-        pytest.fail("each sync is followed by another")
-
-    @property
-    def lines(self) -> list[dict[str, Any]]:
-        return [json.loads(line) for line in self.stream.getvalue().splitlines()]
-
-    @property
-    def fired(self) -> list[str]:
-        return [name for line in self.lines for name in line.get("fired", ())]
-
-
-async def turns() -> None:
-    for _ in range(20):
-        await asyncio.sleep(0)
+from firable.executor.protocol.messages import Keep
+from firable.nets.diagnostics import InputError
 
 
 def test_what_is_told_together_is_acted_upon_when_all_is_told_and_else_in_a_turn_of_the_loop() -> None:
