@@ -117,7 +117,7 @@ class Acts:
         self.ticks: dict[str, asyncio.TimerHandle] = {}
         """For each controller with a time that runs, when it is told the time next."""
         self.unbegun: set[str] = set()
-        """The controllers with a time that begins when its command has left."""
+        """The controllers with a time that begins when its command has left; their other times go on."""
         self.messages = 0
         self.repeats = 0
         self.heard = False
@@ -282,18 +282,18 @@ class Acts:
     def _tick(self, machine: str) -> None:
         """Tell a controller the time, and see to it that it is told again when the next of its times is over.
 
-        A time begins with that, so not before its command has left: a machine is not accused of a disk that is slow.
+        A time begins with that, but not before its command has left: a machine is not accused of a disk that is slow.
         """
         controller = self.controllers[machine]
         if not controller.timers.running and machine not in self.ticks:
             return  # most machines have no time limits, and this is on the way of each signal
-        if controller.timers.begins_with(one.place for one in self.outbox if isinstance(one, Sending)):
+        held = controller.timers.unbegun(one.place for one in self.outbox if isinstance(one, Sending))
+        if held:
             self.unbegun.add(machine)  # `let_go` has it told
-            return
-        self.act(machine, controller.tick(self.now_seconds()))
+        self.act(machine, controller.tick(self.now_seconds(), held))
         if (earlier := self.ticks.pop(machine, None)) is not None:
             earlier.cancel()
-        if self.clock is not None and (due := controller.deadline()) is not None:
+        if self.clock is not None and (due := controller.deadline(held)) is not None:
             delay = self.clock.loop_delay_seconds(due)
             self.ticks[machine] = self.clock.loop.call_later(delay, self.hear, machine, None)
 

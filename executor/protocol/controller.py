@@ -224,18 +224,24 @@ class LocalController:
             self.unsent &= ~(1 << self.subnet.place_index[place])
         return effects
 
-    def tick(self, now_seconds: float) -> list[Effect]:
-        """Take what the clock shows: set the timers whose time is over; a controller that is held times nothing."""
+    def tick(self, now_seconds: float, held: Collection[str] = ()) -> list[Effect]:
+        """Take what the clock shows: set the timers whose time is over; a controller that is held times nothing.
+
+        The commands of the places `held` have not left the host: their times do not begin.
+        """
         if self.held or not self.timers.running:
             return []
         effects: list[Effect] = []
-        for place in self.timers.over(now_seconds, self.word):
+        for place in self.timers.over(now_seconds, self.word, held):
             effects += self.read(self.subnet.place(place).cleared[-1], value=True)
         return effects
 
-    def deadline(self) -> float | None:
-        """When it has to be told the time next; minus infinity for at once, None while nothing is timed."""
-        return self.timers.deadline(self.word) if self.timers.running and not self.held else None
+    def deadline(self, held: Collection[str] = ()) -> float | None:
+        """When it has to be told the time next; minus infinity for at once, None while nothing is timed.
+
+        The times of the places `held` begin when the host says that they are not.
+        """
+        return self.timers.deadline(self.word, held) if self.timers.running and not self.held else None
 
     @property
     def may_fire(self) -> bool:

@@ -1,9 +1,10 @@
 """The times of one controller: how long each command under a time limit has been under way, and whether that is over.
 
 Time is an input, like a signal: whoever hosts the controller says what its clock shows (`tick`), and asks when the
-next time will be over (`deadline`). A time begins with the first tick after the token has entered, so a host gives
-none before the command has left it (`begins_with`), and is over when its limit has gone by and the token is still there
-without its completion. Then the timer is set in the process image, as a driver would set a sensor, and the fault
+next time will be over (`deadline`). A time begins with the first tick after the token has entered and its command has
+left the host, which says with each tick what has not (`held`): no machine is accused of a command that it has not had,
+and the other times of its controller do not wait for it. It is over when its limit has gone by and the token is still
+there without its completion. Then the timer is set in the process image, as a driver would set a sensor, and the fault
 transition is a local one like any other.
 
 A late tick is a late timeout and nothing worse: no proof says when a time is over. A clock that jumps makes timeouts
@@ -16,7 +17,7 @@ left, and come again after another has entered, and so needs numbers and a test 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from math import inf
 from typing import Final
 
@@ -50,10 +51,10 @@ class Timers:
         if place in self.places:
             self.running[place] = -inf
 
-    def begins_with(self, places: Iterable[str]) -> bool:
-        """Whether the next tick would begin the time of one of these places."""
-        unbegun = {place for place, due in self.running.items() if due == -inf}
-        return bool(unbegun) and not unbegun.isdisjoint(places)
+    def unbegun(self, places: Iterable[str]) -> frozenset[str]:
+        """Those of these places whose time would begin with the next tick."""
+        found = frozenset(place for place, due in self.running.items() if due == -inf)
+        return found.intersection(places) if found else found
 
     def begin_anew(self, word: Word) -> None:
         """Begin the time of every place that waits for its completion: after a restart."""
@@ -64,12 +65,16 @@ class Timers:
         token, both = self._waits[place]
         return word & both == token
 
-    def deadline(self, word: Word) -> float | None:
-        """When the next time is over, by the clock of the ticks; minus infinity for at once, None for never."""
-        return min((due for name, due in self.running.items() if self.waits(name, word)), default=None)
+    def deadline(self, word: Word, held: Collection[str] = ()) -> float | None:
+        """When the next time is over, by the clock of the ticks; minus infinity for at once, None for never.
 
-    def over(self, now_seconds: float, word: Word) -> Iterator[str]:
-        """The places whose time is over, each once; times that have not begun begin now."""
+        The commands of the places `held` have not left: times that have not begun do not begin there.
+        """
+        times = ((name, due) for name, due in self.running.items() if due != -inf or name not in held)
+        return min((due for name, due in times if self.waits(name, word)), default=None)
+
+    def over(self, now_seconds: float, word: Word, held: Collection[str] = ()) -> Iterator[str]:
+        """The places whose time is over, each once; times that have not begun begin now, unless they are `held`."""
         for name, due in list(self.running.items()):
             limit = self.places[name].within
             if limit is None or not word & self._waits[name][0]:
@@ -77,7 +82,8 @@ class Timers:
             elif not self.waits(name, word):
                 continue  # another command may share the completion, and clear it before the token has gone on
             elif due == -inf:
-                self.running[name] = now_seconds + limit.milliseconds / 1000
+                if name not in held:
+                    self.running[name] = now_seconds + limit.milliseconds / 1000
             elif due <= now_seconds + RESOLUTION_SECONDS:
                 del self.running[name]
                 yield name

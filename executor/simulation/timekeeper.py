@@ -4,10 +4,11 @@ The reference player knows no times: it says in which markings a timer may be se
 controller's own clock is looked at here, with the tokens and signals of its image before and after each act:
 
 - a timer is set only where the token has stood for its whole limit by that clock, from its entry or, after a restart,
-  from when the operator resumed; a token of the initial marking has no time, and a controller that is held times none;
+  from when the operator resumed, and where its command has been out of the process as long: no machine is accused of a
+  command that it has not had. A token of the initial marking has no time, and a controller that is held times none;
 - a token enters with its timer cleared;
-- when the controller has been told the time, each timer whose limit has gone by since it was first told is set, or
-  waits behind a promise, unless the completion has come.
+- when the controller has been told the time, each timer whose limit has gone by since it was first told after its
+  command had left is set, or waits behind a promise, unless the completion has come; whatever else has not left.
 
 How soon the controller is told the time after `deadline` is its host's affair. Nothing here is shared with `timers`,
 which is what is judged: that one counts down, this one remembers when tokens have come.
@@ -15,7 +16,7 @@ which is what is judged: that one counts down, this one remembers when tokens ha
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from firable.executor.protocol.controller import LocalController
@@ -63,12 +64,12 @@ class Timekeeper:
         self.word = 0
         self.held = False
         self.entered: dict[str, float] = {}
-        """When the token of each place that is timed has come, or its controller was resumed."""
+        """When the token of each place that is timed has come, its controller was resumed, or its command held back."""
         self.told: dict[str, float] = {}
         """When the controller was first told the time after that."""
 
-    def acted(self, machine: LocalController, now_seconds: float) -> None:
-        """See what an act has changed; raises `TimeLimitError`."""
+    def acted(self, machine: LocalController, now_seconds: float, held: Collection[str]) -> None:
+        """See what an act has changed; the commands of the places `held` have not left. Raises `TimeLimitError`."""
         if machine is not self.machine:
             self.machine, self.word, self.held = machine, machine.word, machine.held
             self.entered.clear()
@@ -84,13 +85,15 @@ class Timekeeper:
                 raise TimeLimitError(f"'{each.place}' is entered, and '{each.timer}' is set")
             if not machine.held and (enters or (resumed and self._waits(each))):
                 self.entered[each.place] = now_seconds
+            if each.place in held and each.place in self.entered:
+                self.entered[each.place] = now_seconds
             if self.word & each.over and not before & each.over:
                 self._check_over(each, now_seconds)
 
-    def ticked(self, machine: LocalController, now_seconds: float) -> None:
+    def ticked(self, machine: LocalController, now_seconds: float, held: Collection[str]) -> None:
         """Check what a controller has made of the time that it was just told; raises `TimeLimitError`."""
         for each in self.places:
-            if each.place in self.entered and self._waits(each):
+            if each.place in self.entered and each.place not in held and self._waits(each):
                 told = self.told.setdefault(each.place, now_seconds)
                 is_over = now_seconds >= told + each.seconds + _RESOLUTION_SECONDS
                 if is_over and not self.word & each.over and each.timer not in machine.latched:
@@ -110,4 +113,4 @@ class Timekeeper:
         if since is None:
             raise TimeLimitError(f"'{each.timer}' is set, and no time of '{each.place}' has begun")
         if now_seconds - since < each.seconds - _RESOLUTION_SECONDS:
-            raise TimeLimitError(f"'{each.timer}' is set {now_seconds - since:.3f} s after '{each.place}' was entered")
+            raise TimeLimitError(f"'{each.timer}' is set {now_seconds - since:.3f} s after '{each.place}' was sent")

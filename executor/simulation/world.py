@@ -151,15 +151,16 @@ class World:
         """Let a process do what its machine wants done: behind a sync now, or one that it shares with later acts."""
         if not effects:
             return
-        if (timekeeper := self.timekeepers.get(process.name)) is not None and process.machine is not None:
-            timekeeper.acted(process.machine, process.clock.shown_seconds)
         if self.paused:
             self._check_pause(effects)
         if process.name in self.controllers:
             for effect in effects:
                 if isinstance(effect, Firing):
                     give_up(self, process, effect.transition)
-        if not process.act(effects):
+        has_done = process.act(effects)
+        if (timekeeper := self.timekeepers.get(process.name)) is not None and process.machine is not None:
+            timekeeper.acted(process.machine, process.clock.shown_seconds, set(process.held_back))
+        if not has_done:
             return
         if process.leaving:  # what is done by what leaves comes behind all of that
             process.has_acted = True
@@ -317,19 +318,18 @@ class World:
     def tick(self, process: Process[LocalController]) -> None:
         """Tell a controller the time if it wants to know; sometimes also if it does not, as its host does.
 
-        Nobody is told while that would begin the time of a command that has not left.
+        The time of a command that has not left does not begin with that.
         """
         timekeeper = self.timekeepers.get(process.name)
         if timekeeper is None or process.machine is None:
             return
-        if process.machine.timers.begins_with(process.held_back):
-            return
-        now, due = process.clock.shown_seconds, process.machine.deadline()
+        held = set(process.held_back)
+        now, due = process.clock.shown_seconds, process.machine.deadline(held)
         if (due is not None and due <= now) or self.draw.random() < 0.5:
-            effects = process.machine.tick(now)
+            effects = process.machine.tick(now, held)
             self.note("is told the time", (process.name, round(now, 3)))
-            timekeeper.acted(process.machine, now)
-            timekeeper.ticked(process.machine, now)
+            timekeeper.acted(process.machine, now, held)
+            timekeeper.ticked(process.machine, now, held)
             self.counts["timers set"] += sum(isinstance(effect, Taken) for effect in effects)
             self.act(process, effects)
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
-from math import inf
 from pathlib import Path
 from threading import Thread
 
 import pytest
 from support.hosts import ended_within
-from support.slow_disks import CELL, Rig, Waiting, turns
+from support.slow_disks import Rig, Waiting, turns
 
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import PATIENCE_S, until
@@ -325,29 +324,5 @@ def test_a_trace_whose_disk_never_answers_ends_a_stop_as_an_error(tmp_path: Path
             trace.close()  # which neither waits nor pulls the file from under who writes
             assert not trace.disk.closed
             trace.disk.answers.release(1000)
-
-    asyncio.run(main())
-
-
-TIMED = CELL.replace("until: worked}", "until: worked, within: 20ms}")
-
-
-def test_a_time_begins_when_its_command_has_left_and_not_while_that_waits_for_the_disk() -> None:
-    async def main() -> None:
-        rig = Rig(TIMED)
-        async with rig.running():
-            await rig.slow_from_now_on()
-            rig.host.signal("b.key", value=True, entry=None)
-            await turns()
-            running = rig.host.acts.controllers["b"].timers.running
-            assert running == {"b.working": -inf}
-            await rig.answer()  # to what was done before
-            assert running == {"b.working": -inf}
-            assert "b.working" not in rig.machines.sent
-            await rig.answer()
-            assert "b.working" in rig.machines.sent
-            await until(lambda: not running, "the end of the time")
-            await rig.answer_all()
-            assert '"b.working_overdue"' in rig.stream.getvalue()
 
     asyncio.run(main())

@@ -35,9 +35,9 @@ class GoesOnCounting(WithTimers):
             if place not in self.running:
                 super().enter(place)
 
-        def over(self, now_seconds: float, word: Word) -> Iterator[str]:
+        def over(self, now_seconds: float, word: Word, held: Collection[str] = ()) -> Iterator[str]:
             left = {name: due for name, due in self.running.items() if not self.waits(name, word)}
-            yield from super().over(now_seconds, word)
+            yield from super().over(now_seconds, word, held)
             self.running = {**left, **self.running}
 
     kind = Running
@@ -61,8 +61,8 @@ class TakesSecondsForMinutes(WithTimers):
     class Hasty(Timers):
         """Times that run fast."""
 
-        def over(self, now_seconds: float, word: Word) -> Iterator[str]:
-            yield from super().over(now_seconds * 60, word)
+        def over(self, now_seconds: float, word: Word, held: Collection[str] = ()) -> Iterator[str]:
+            yield from super().over(now_seconds * 60, word, held)
 
     kind = Hasty
 
@@ -73,8 +73,8 @@ class ForgetsOthers(WithTimers):
     class One(Timers):
         """One time."""
 
-        def over(self, now_seconds: float, word: Word) -> Iterator[str]:
-            found = list(super().over(now_seconds, word))
+        def over(self, now_seconds: float, word: Word, held: Collection[str] = ()) -> Iterator[str]:
+            found = list(super().over(now_seconds, word, held))
             if found:
                 self.running.clear()
             yield from found
@@ -117,11 +117,27 @@ class TimesTheOutage(WithTimers):
 class AsksForNoTime(LocalController):
     """The host is never asked to tell the time."""
 
-    def deadline(self) -> float | None:
+    def deadline(self, held: Collection[str] = ()) -> float | None:
+        del held
         return None
 
-    def tick(self, now_seconds: float) -> list[Effect]:
-        return super().tick(now_seconds) if self.promises else []
+    def tick(self, now_seconds: float, held: Collection[str] = ()) -> list[Effect]:
+        return super().tick(now_seconds, held) if self.promises else []
+
+
+class TimesWhatHasNotLeft(LocalController):
+    """The time of a command begins while the disk still holds it back."""
+
+    def tick(self, now_seconds: float, held: Collection[str] = ()) -> list[Effect]:
+        del held
+        return super().tick(now_seconds)
+
+
+class WaitsForAllToLeave(LocalController):
+    """While the disk holds one command back, the times of the others go on, and none is over."""
+
+    def tick(self, now_seconds: float, held: Collection[str] = ()) -> list[Effect]:
+        return [] if self.timers.unbegun(held) else super().tick(now_seconds, held)
 
 
 class LeavesTimersSet(LocalController):
@@ -171,6 +187,8 @@ TIMES: tuple[type[LocalController], ...] = (
     TimesNothingAnew,
     TimesTheOutage,
     AsksForNoTime,
+    TimesWhatHasNotLeft,
+    WaitsForAllToLeave,
     LeavesTimersSet,
     TakesTimersBlindly,
     DropsTimersAtPromises,
@@ -186,6 +204,8 @@ PROVOKED_TIMES: dict[str, tuple[str, ...]] = {
     "LeavesTimersSet": ("stuck",),
     "ForgetsOthers": ("stuck", "standstill"),
     "GivesNothingUp": ("queued",),
+    "TimesWhatHasNotLeft": ("unsynced",),
+    "WaitsForAllToLeave": ("unsynced", "stuck", "slow"),
     "TakesTimersBlindly": ("slow", "delay", "late"),
 }
 """The kinds of faults that bring some of them out soonest."""

@@ -20,6 +20,7 @@ from firable.executor.journal.journal import MemoryJournal, Storing
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder, TraceFile
 from firable.executor.operating.situation import Situation
+from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.messages import Stored
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.interchange import net_digest
@@ -50,6 +51,12 @@ class Machines(DryRunDriver):
     """Machines that note what they are sent, and complete nothing by themselves."""
 
     sent: list[str]
+    says: Mapping[str, Answer] = {}
+    """What they say of the commands of places, asked after a restart."""
+
+    async def ask(self, place: Place, entry: int) -> Answer:
+        assert entry
+        return self.says.get(place.name, Answer.DONE)
 
     def send(self, place: Place, entry: int) -> None:
         self.sent.append(place.name)
@@ -60,8 +67,9 @@ class Machines(DryRunDriver):
 class Slow(MemoryJournal):
     """A journal whose disk answers to each sync when it is let, or fails then."""
 
-    def __init__(self) -> None:
+    def __init__(self, durable: Mapping[str, Mapping[str, Stored]] | None = None) -> None:
         super().__init__()
+        self.of = {machine: dict(kept) for machine, kept in (durable or {}).items()}
         self.answers = Semaphore(0)
         self.is_slow = False
         self.fails = False
@@ -104,14 +112,20 @@ class Waiting(TraceFile):
 
 
 class Rig:
-    """A host of the cell with such a disk."""
+    """A host of the cell with such a disk, which begins with what another one has left `durable` there."""
 
-    def __init__(self, cell: str = CELL, trace: TraceFile | None = None) -> None:
+    def __init__(
+        self,
+        cell: str = CELL,
+        trace: TraceFile | None = None,
+        durable: Mapping[str, Mapping[str, Stored]] | None = None,
+    ) -> None:
         net = parse_net(cell)
         decomposition = split(net)
-        self.journal = Slow()
+        self.journal = Slow(durable)
         self.stream = io.StringIO()
-        self.machines = Machines(decomposition.subnets, 1.0, {"a.s": False, "b.key": False})
+        off = {signal.name: False for signal in net.signals}
+        self.machines = Machines(decomposition.subnets, 1.0, off)
         self.machines.sent = []
 
         async def present(_: Host) -> None:
