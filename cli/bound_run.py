@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
+from firable.cli.log import told_aside
 from firable.cli.report import Report
 from firable.cli.watched import machines_verdict
 
@@ -40,10 +41,9 @@ def run_bound_of(
 ) -> Report:
     """Run until the operator stops it or nothing can go on, and report how it ended."""
     from firable.executor.drivers.binding import read_binding
-    from firable.executor.operating.aside import aside
     from firable.executor.operating.running import run_bound
 
-    with aside(_told) as tell:
+    with told_aside(_told, log) as tell:
         report = run_bound(
             bundle,
             read_binding(bind),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 import click
 
 from firable.cli import text
+from firable.cli.log import told_aside
 from firable.cli.report import Report
 from firable.cli.watched import machines_verdict
 from firable.nets.source import printable
@@ -158,7 +159,6 @@ def run_host_of(
     watch: Watch,
 ) -> Report:
     """Run this host until it is stopped or fails, and report how it ended."""
-    from firable.executor.operating.aside import aside
     from firable.executor.operating.hosting import machines_of, run_host
 
     machines = machines_of(bundle.net, options.controller, coordinator=options.coordinator)
@@ -166,7 +166,7 @@ def run_host_of(
     link, warnings = _link(bundle, machines, options)
     for warning in warnings:
         text.show_diagnostic(warning)
-    with aside(_told) as tell:
+    with told_aside(_told, log) as tell:
         report = run_host(
             bundle,
             machines,

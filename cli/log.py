@@ -6,7 +6,7 @@ import errno
 import logging
 import os
 import sys
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -40,6 +40,15 @@ def log_to(path: str | None) -> Iterator[Log | None]:
 
     with aside(_writer(path)) as tell:
         yield Log(logger_to(_Aside(tell)))
+
+
+def told_aside(say: Callable[[str, str], None], log: Log | None) -> AbstractContextManager[Callable[[str, str], None]]:
+    """What tells an operator a kind and a sentence, on a thread of its own; the log hears of what nobody was told."""
+    from firable.executor.operating.aside import aside
+
+    if log is None:
+        return aside(say, named=lambda kind, _: kind)
+    return aside(say, named=lambda kind, _: kind, left=log.untold)
 
 
 def _writer(path: str) -> Callable[[str], None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from click.core import ParameterSource
 from firable.cli import text
 from firable.cli.bound_run import run_bound_of, show_bound
 from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
-from firable.cli.log import log_option, log_to
+from firable.cli.log import log_option, log_to, told_aside
 from firable.cli.operate import ServeOptions, serve_options
 from firable.cli.options import CATALOGUE, answer, catalogue_file, format_option, refuse_a_net
 from firable.cli.report import Report
@@ -20,6 +21,8 @@ from firable.cli.sign import trust_option
 from firable.cli.watched import machines_verdict
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from firable.executor import Answer, Operator, RunReport
     from firable.nets.bundle import Bundle
     from firable.nets.net import Net
@@ -137,7 +140,6 @@ def run(
         from firable.cli.stepping import stepping
         from firable.executor import Watch, load, read_plant
         from firable.executor import run as run_bundle
-        from firable.executor.operating.aside import aside
 
         loaded = load(bundle, trust)
         plant_file = None
@@ -173,7 +175,7 @@ def run(
                     service=service,
                     log=told_to,
                 )
-            with aside(_told) as tell:
+            with told_aside(_told, told_to) as tell:
                 report = run_bundle(
                     loaded,
                     model or read_plant(_plant_file(loaded, plant)),
@@ -187,7 +189,7 @@ def run(
                     watch=Watch(watch),
                     service=service,
                     log=told_to,
-                    tell=tell,
+                    tell=partial(_if_not_reported, tell),
                     operator=operator,
                 )
         return Report(
@@ -202,14 +204,19 @@ def run(
     return answer("run", format_, make, _show)
 
 
-def _told(kind: str, sentence: str) -> None:
-    """What the report does not tell: a word of no use, an emergency stop that can be reset, a disk that hangs."""
+def _told(_kind: str, sentence: str) -> None:
+    """One line of what happens, as it happens."""
+    click.echo(f"  {sentence}", err=True)
+
+
+def _if_not_reported(tell: Callable[[str, str], None], kind: str, sentence: str) -> None:
+    """Tell what the report does not: a word of no use, an emergency stop that can be reset, a disk that hangs."""
     from firable.executor.operating.disk_watch import ANSWERS, HANGS
     from firable.executor.operating.latch import LATCHED
     from firable.executor.operating.restart import UNASKED
 
     if kind in {UNASKED, LATCHED, HANGS, ANSWERS}:
-        click.echo(f"  {sentence}", err=True)
+        tell(kind, sentence)
 
 
 def _files_beside(journal: str | None) -> tuple[str, ...]:

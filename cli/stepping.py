@@ -128,8 +128,11 @@ def stepping(speed: float | None, *, to_stderr: bool) -> Iterator[Operator]:
     with aside(echo) as say:
 
         def said(*words: str, nl: bool = True) -> None:
-            with suppress(UntoldError):  # a terminal that slept for so long ends no run
+            try:
                 say(*words, nl=nl)
+            except UntoldError as error:  # a terminal that slept for so long ends no run, but one that is gone does
+                if error.errors:
+                    raise error.errors[0] from None
 
         yield _operator(speed, said)
 

@@ -30,6 +30,7 @@ from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.link import Link
 from firable.executor.operating import ending, latch, lives, restart, stopping
 from firable.executor.operating.acts import Acts
+from firable.executor.operating.aside import UntoldError
 from firable.executor.operating.clock import RunClock
 from firable.executor.operating.dispatch import Dispatch
 from firable.executor.operating.figures import Figures
@@ -391,9 +392,15 @@ class Host:
         self.tell_operator(kind, sentence)
 
     def tell_operator(self, kind: str, sentence: str) -> None:
-        """Tell who follows the run; one that cannot be told (a terminal that is gone) stops no stop on its way."""
+        """Tell who follows the run; one that cannot be told (a terminal that is gone) stops no stop on its way.
+
+        The trace notes what was told to nobody, this line or earlier ones.
+        """
         if self.tell is not None:
             try:
                 self.tell(kind, sentence)
+            except UntoldError as error:
+                for what, why in error.untold:
+                    self.note("untold", message=error.sentence((what, why)), what=what)
             except Exception as error:
                 self.note("untold", message=f"{type(error).__name__}: {error}", what=kind)

@@ -19,6 +19,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
 
+from firable.executor.operating.aside import UntoldError
 from firable.executor.operating.disk_watch import HANGS
 from firable.executor.operating.situation import Situation, State
 from firable.semantics.joining import APPLIED, STANDS, VOTED
@@ -79,6 +80,11 @@ class Log:
     def broke(self, error: BaseException) -> None:
         """The host ends by an error: a disk is full, a link cannot be opened, or the program is wrong."""
         self._tell(logging.ERROR, "broke", {"message": str(error)})
+
+    def untold(self, error: UntoldError) -> None:
+        """Lines for the operator that were told to nobody, of which the run did not know before its end."""
+        for what, why in error.untold:
+            self._tell(logging.WARNING, "untold", {"message": error.sentence((what, why)), "what": what})
 
     def _tell(self, level: int, event: str, data: Mapping[str, object]) -> None:
         # One mapping as the only argument: `logging` hands it to the formatter as it is.

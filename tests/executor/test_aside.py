@@ -1,5 +1,9 @@
 """What is told aside is told in order, and keeps nobody waiting who tells it."""
 
+import asyncio
+import io
+import json
+import logging
 import os
 import subprocess
 import sys
@@ -11,11 +15,18 @@ from pathlib import Path
 from threading import Event
 
 import pytest
+from support.slow_disks import CELL
 
-from firable.cli.log import log_to
+from firable.cli.log import log_to, told_aside
 from firable.cli.main import main
-from firable.executor.drivers.bench import PATIENCE_S
-from firable.executor.operating.aside import LINES_MAX, UntoldError, aside
+from firable.decompose.splitting.cut import split
+from firable.executor.drivers.bench import PATIENCE_S, until
+from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.operating.aside import LINES_MAX, UNSAID, UntoldError, aside
+from firable.executor.operating.host import Host
+from firable.executor.operating.log import Log, logger_to
+from firable.executor.operating.recorder import Recorder
+from firable.nets.text import parse_net
 
 
 def test_all_is_said_in_order_before_the_end() -> None:
@@ -41,23 +52,93 @@ def test_who_does_not_listen_keeps_nobody_waiting_and_the_end_only_so_long() -> 
     listens.set()
 
 
-def test_an_error_of_whoever_is_told_is_raised_by_a_later_call_once_and_what_that_tells_is_said() -> None:
-    said = {word: Event() for word in ("first", "second", "third")}
+def test_errors_of_whoever_is_told_are_raised_by_a_later_call_once_by_the_names_of_their_lines() -> None:
+    said = {word: Event() for word in ("first", "second", "third", "fourth")}
 
     def say(word: str) -> None:
         said[word].set()
-        if word == "first":
+        if word in {"first", "second"}:
             raise BrokenPipeError(32, "Broken pipe")
 
-    raised = 0
-    with aside(say) as tell:
+    raised: list[UntoldError] = []
+    with aside(say, named=lambda word: word) as tell:
         for word, heard in said.items():
             try:
                 tell(word)
-            except BrokenPipeError:
-                raised += 1
-            assert heard.wait(PATIENCE_S)  # when the second is said, the error of the first is known
-    assert raised == 1
+            except UntoldError as error:
+                raised.append(error)
+            assert heard.wait(PATIENCE_S)  # when the next is said, the error of the one before is known
+    assert [list(error.untold) for error in raised] == [
+        [(word, "BrokenPipeError: [Errno 32] Broken pipe")] for word in ("first", "second")
+    ]
+    assert str(raised[0]) == "1 line was told to nobody (first): BrokenPipeError: [Errno 32] Broken pipe"
+    assert [type(one) for error in raised for one in error.errors] == [BrokenPipeError, BrokenPipeError]
+
+
+def test_the_error_of_the_last_line_is_left_and_so_is_what_is_not_said_in_time() -> None:
+    listens, asleep, left = Event(), Event(), list[UntoldError]()
+
+    def say(word: str) -> None:
+        if word == "sleep":
+            asleep.set()
+            assert listens.wait(PATIENCE_S)
+        raise ValueError(word)
+
+    with aside(say, named=lambda word: word, left=left.append) as tell:
+        tell("last")
+    with aside(say, 0.05, named=lambda word: word, left=left.append) as tell:
+        tell("sleep")
+        tell("on")
+        assert asleep.wait(PATIENCE_S)
+    assert [list(error.untold) for error in left] == [
+        [("last", "ValueError: last")],
+        [("sleep", UNSAID), ("on", UNSAID)],
+    ]
+    with aside(print, left=left.append):
+        pass
+    assert len(left) == 2
+    listens.set()
+
+
+def test_the_trace_names_the_line_that_was_told_to_nobody_and_not_the_next() -> None:
+    net = parse_net(CELL)
+    stream = io.StringIO()
+    drawn = split(net)
+    host = Host(drawn, DryRunDriver(drawn.subnets, 1.0), Recorder(net, "", stream))
+
+    def gone(kind: str, _: str) -> None:
+        if kind == "lost":
+            raise BrokenPipeError(32, "Broken pipe")
+
+    async def main() -> None:
+        with told_aside(gone, None) as host.tell:
+            ending = asyncio.create_task(host.main())
+            await asyncio.sleep(0)
+            host.tell_operator("lost", "'robot' is lost")
+            await until(lambda: is_noted("connected"), "the note")
+            host.stop()
+            await ending
+
+    def is_noted(kind: str) -> bool:
+        host.tell_operator(kind, "'robot' is connected")
+        return '"untold"' in stream.getvalue()
+
+    asyncio.run(main())
+    noted = [json.loads(line) for line in stream.getvalue().splitlines()]
+    (untold,) = [line for line in noted if line.get("note") == "untold"]
+    assert untold["what"] == "lost"
+    assert untold["message"] == "1 line was told to nobody (lost): BrokenPipeError: [Errno 32] Broken pipe"
+
+
+def test_a_log_hears_of_the_last_words_that_an_operator_was_not_told() -> None:
+    def gone(_kind: str, _sentence: str) -> None:
+        raise BrokenPipeError(32, "Broken pipe")
+
+    lines = io.StringIO()
+    with told_aside(gone, Log(logger_to(logging.StreamHandler(lines)))) as tell:
+        tell("fault", "the trace cannot be written")
+    (line,) = [json.loads(one) for one in lines.getvalue().splitlines()]
+    assert (line["level"], line["event"], line["what"]) == ("warning", "untold", "fault")
 
 
 def test_a_log_whose_reader_sleeps_keeps_no_run_waiting(tmp_path: Path) -> None:
