@@ -13,6 +13,7 @@ import pytest
 from support.cells import decomposition_of, plant_of
 from support.examples import seeds
 
+from firable.cli.main import main
 from firable.executor import State, execute
 from firable.executor.cell.plant import Plant
 from firable.executor.cell.virtual_time import run_in_virtual_time
@@ -31,9 +32,9 @@ from firable.semantics.trace import CommandSent, Fired, Noted, Trace, read_trace
 TESTS = Path(__file__).parent.parent
 
 
-def lives(folder: Path, cell: str, workpieces: int, seed: int) -> dict[str, Any]:
+def lives(folder: Path, cell: str, workpieces: int, seed: int, *speed: str) -> dict[str, Any]:
     """What `support/killing.py` says at the end of many processes."""
-    arguments = [str(folder), cell, str(workpieces), str(seed)]
+    arguments = [str(folder), cell, str(workpieces), str(seed), *speed]
     command = [sys.executable, str(TESTS / "support" / "killing.py"), *arguments]
     path = {"PYTHONPATH": ":".join([str(TESTS), *sys.path])}
     ended = subprocess.run(command, capture_output=True, text=True, env=path, check=False, timeout=300)
@@ -44,13 +45,20 @@ def lives(folder: Path, cell: str, workpieces: int, seed: int) -> dict[str, Any]
 
 
 @pytest.mark.seeds
-@pytest.mark.parametrize("cell", ["one_robot", "two_robots_shared"])
-def test_cell_whose_controllers_are_killed_again_and_again_does_all_its_work_once(cell: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("cell", "speed"), [("one_robot", ()), ("two_robots_shared", ()), ("one_robot", ("200",))], ids=str
+)
+def test_cell_whose_controllers_are_killed_again_and_again_does_all_its_work_once(
+    cell: str, speed: tuple[str, ...], tmp_path: Path
+) -> None:
+    """In virtual time, and with a speed on an event loop whose thread stores while the acts go on."""
+    while_storing = 0
     for seed in seeds(2):
         folder = tmp_path / str(seed)
         folder.mkdir()
-        ended = lives(folder, cell, 4, seed)
+        ended = lives(folder, cell, 4, seed, *speed)
         assert ended["killed"] > 2
+        while_storing += ended["while storing"]
         assert (ended["state"], ended["delivered"], ended["lost"], ended["doubled"]) == ("done", [1, 2, 3, 4], [], [])
         trace = read_trace(folder / "trace.jsonl")
         replayed = replay(decomposition_of(cell).net, trace)  # each command once for each entry, too
@@ -62,6 +70,8 @@ def test_cell_whose_controllers_are_killed_again_and_again_does_all_its_work_onc
         received = [(place, entry) for _, what, *rest in inputs if what == "send" for place, entry in [rest]]
         assert len(set(received)) == len(received), "a machine was commanded twice for one entry"
         assert Counter(place for place, _ in received) == Counter(told)
+        assert main(["replay", str(folder / "trace.jsonl"), "--net", f"catalogue:{cell}"]) == 0
+    assert bool(while_storing) == bool(speed)
 
 
 def run_here(
