@@ -306,9 +306,13 @@ def byte_by_byte(port: int, count: int) -> list[float]:
 async def over_modbus(every_s: float, count: int) -> list[float]:
     """The reactions of the executor over Modbus TCP."""
 
-    async def serve(port: int) -> None:
+    async def serve(port: int, over: asyncio.Event) -> None:
         driver = bound_driver(parse_binding(BINDING.format(port=port, every=every_s)), NET)
-        await execution_with(driver).main()
+        execution = execution_with(driver)
+        running = asyncio.create_task(execution.main())
+        await asyncio.wait((running, asyncio.create_task(over.wait())), return_when=asyncio.FIRST_COMPLETED)
+        execution.stop()
+        await running
 
     return await at_server(serve, count)
 
@@ -317,13 +321,13 @@ async def bare_modbus(every_s: float, count: int) -> list[float]:
     """The reactions of a loop over a bare client of pymodbus."""
     from pymodbus.client import AsyncModbusTcpClient
 
-    async def poll(port: int) -> None:
+    async def poll(port: int, over: asyncio.Event) -> None:
         client = AsyncModbusTcpClient("127.0.0.1", port=port, retries=0)
         await client.connect()
         loop = asyncio.get_running_loop()
         shown, number, due = 0, 0, 0.0
         try:
-            while True:
+            while not over.is_set():  # to be cancelled would leave a question open, and pymodbus warns of its answer
                 await asyncio.sleep(max(0.0, due - loop.time()))
                 due = loop.time() + every_s
                 answer = await client.read_input_registers(0, count=2)
@@ -336,12 +340,17 @@ async def bare_modbus(every_s: float, count: int) -> list[float]:
     return await at_server(poll, count)
 
 
-async def at_server(client: Callable[[int], Awaitable[None]], count: int) -> list[float]:
-    """The times that a Modbus server takes to which a client reacts."""
+async def at_server(client: Callable[[int, asyncio.Event], Awaitable[None]], count: int) -> list[float]:
+    """The times that a Modbus server takes to which a client reacts, until it is told that it is over."""
     async with plant("modbus", str(count)) as lines:
-        running = asyncio.ensure_future(client(int(await lines.readline())))
-        times: list[float] = json.loads(await lines.readline())
-        await ended([running])
+        over = asyncio.Event()
+        running = asyncio.ensure_future(client(int(await lines.readline()), over))
+        try:
+            times: list[float] = json.loads(await lines.readline())
+            over.set()
+            await running
+        finally:
+            await ended([running])
     return times
 
 

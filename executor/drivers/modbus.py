@@ -10,6 +10,10 @@ A request that is not answered in time ends the connection (`retries=0`). Frames
 pymodbus looks at it, frames of RTU carry none: there a late answer *is* the answer to the next question. The time is
 watched here (`Watch`), by one timer for all requests of a connection: pymodbus would set one for each, and wait for its
 answer in two more turns of the event loop, which is a good part of what a reaction takes.
+
+pymodbus does not tell who waits for an answer that the connection is gone: it would be waited for until its time is
+over. So this is told here. And what comes when nobody asks any more, as where a stop has broken off a question, is
+nobody's answer: it is dropped before pymodbus warns of it.
 """
 
 from __future__ import annotations
@@ -153,6 +157,9 @@ class ModbusConnection:
         from pymodbus.exceptions import ModbusException
 
         self.client = client
+        self.closed = partial(ModbusException, "the connection was closed")
+        client.ctx.trace_connect = self._told
+        client.ctx.trace_packet = self._passed
         self.unit = unit
         self.every_s = every_s
         self.watch = Watch(timeout_s)
@@ -221,6 +228,16 @@ class ModbusConnection:
         """Close the client, which is not used again."""
         self.watch.close()
         self.client.close()
+
+    def _told(self, is_connected: bool) -> None:
+        """The connection is made, or it is gone: then nobody will answer what was asked."""
+        answer = self.client.ctx.response_future
+        if not is_connected and self.watch.asking is not None and not answer.done():
+            answer.set_exception(self.closed())
+
+    def _passed(self, is_sent: bool, data: bytes) -> bytes:
+        """What goes out, and what comes in as long as somebody asks."""
+        return data if is_sent or not self.client.ctx.response_future.done() else b""
 
     async def _block(self, block: _Block) -> Sequence[int]:
         what = f"{block.table} {block.first}"

@@ -1,10 +1,19 @@
 """Modbus over TCP and over a serial line, against servers of pymodbus."""
 
-from collections.abc import AsyncIterator
+import asyncio
+import os
+import pty
+import tty
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 
-from firable.executor.drivers.bench import Far
+import pytest
+
+from firable.executor.drivers import modbus
+from firable.executor.drivers.bench import PATIENCE_S, Far, until
 from firable.executor.drivers.conformance import DriverConformance
+from firable.executor.drivers.device import Connection, LinkError, Wanted
 from firable.executor.drivers.far_side.modbus_server import ModbusRtuEnd, ModbusTcpEnd
 
 POINTS = {
@@ -41,3 +50,100 @@ class TestModbusRtu(DriverConformance):
         end = ModbusRtuEnd()
         end.line.open()
         yield Far(end, f"driver: modbus-rtu, port: {end.line.near}, baud: 115200, parity: N, every_s: 0.002", POINTS)
+
+
+WANTED = Wanted(read=("input 0",), timeout_s=10 * PATIENCE_S)
+"""Who waits for the time of a question waits longer than the test."""
+ANSWER = bytes.fromhex("0000 0005 01 04 02 0007")
+"""To a question for one register, without the number of the question."""
+
+
+async def line_that_is_gone(has_asked: asyncio.Event, end: Callable[[int], object]) -> Connection:
+    """A connection over a serial line of which the far side is ended when it has been asked something."""
+    far, near = pty.openpty()
+    tty.setraw(near)
+
+    def asked() -> None:
+        os.read(far, 256)
+        asyncio.get_running_loop().remove_reader(far)
+        has_asked.set()
+        end(far)
+
+    asyncio.get_running_loop().add_reader(far, asked)
+    options = modbus.RtuOptions(port=os.ttyname(near), parity="N", every_s=0)
+    connection = await modbus.RTU.connect(options, WANTED)
+    os.close(near)
+    return connection
+
+
+async def device_that_goes(has_asked: asyncio.Event, end: Callable[[asyncio.StreamWriter], object]) -> Connection:
+    """A connection in the network of which the far side is ended when it has been asked something."""
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.readexactly(12)
+        has_asked.set()
+        end(writer)
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    options = modbus.TcpOptions(host="127.0.0.1", port=server.sockets[0].getsockname()[1], every_s=0)
+    return await modbus.TCP.connect(options, WANTED)
+
+
+@pytest.mark.parametrize(
+    "connected",
+    [
+        partial(device_that_goes, end=asyncio.StreamWriter.close),
+        partial(device_that_goes, end=lambda writer: writer.transport.abort()),
+        partial(line_that_is_gone, end=os.close),
+    ],
+    ids=["closed", "reset", "serial line"],
+)
+def test_a_question_under_way_fails_at_once_when_the_connection_is_closed(
+    connected: Callable[[asyncio.Event], Awaitable[Connection]],
+) -> None:
+    async def main() -> None:
+        has_asked = asyncio.Event()
+        connection = await connected(has_asked)
+        with pytest.raises(LinkError, match="input 0: the connection was closed"):
+            await asyncio.wait_for(connection.read(), PATIENCE_S)
+        assert has_asked.is_set()
+        with pytest.raises(LinkError, match="Not connected"):
+            await asyncio.wait_for(connection.read(), PATIENCE_S)
+        await connection.close()
+
+    asyncio.run(main())
+
+
+def test_an_answer_to_a_question_that_was_broken_off_is_nobodys_and_nothing_is_said_of_it(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def main() -> None:
+        questions: list[bytes] = []
+        far: list[asyncio.StreamWriter] = []
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            far.append(writer)
+            while question := await reader.read(12):
+                questions.append(question)
+
+        async def asked(count: int) -> None:
+            await until(lambda: len(questions) >= count, "the question")
+
+        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        options = modbus.TcpOptions(host="127.0.0.1", port=server.sockets[0].getsockname()[1], every_s=0)
+        connection = await modbus.TCP.connect(options, WANTED)
+        assert isinstance(connection, modbus.ModbusConnection)
+        for number in range(2):
+            reading = asyncio.create_task(connection.read())
+            await asked(number + 1)
+            if not number:
+                reading.cancel()
+                await asyncio.wait([reading])
+            far[0].write(questions[number][:2] + ANSWER)
+            if not number:
+                await until(lambda: connection.client.ctx.recv_buffer, "the answer")
+        assert list(await asyncio.wait_for(reading, PATIENCE_S)) == [("input 0", 7)]
+        await connection.close()
+
+    asyncio.run(main())
+    assert not [record for record in caplog.records if record.name.startswith("pymodbus")]
