@@ -13,7 +13,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from support.served_cells import unhurried
+from support.served_cells import halved, unhurried
 from support.waiting import PATIENCE_SECONDS, heard_in_time
 
 from firable.cli.main import main
@@ -186,6 +186,23 @@ def test_device_that_cannot_be_served_here_is_refused(tmp_path: Path, capsys: py
         bind.write_text(binding_text(NET, {"modbus": str(taken.getsockname()[1])}, SENSORS))
         assert main(["sim", "catalogue:one_robot", "--bind", str(bind)]) == 2
     assert "error[F5104]: the cell cannot be served: " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("was", "is_now", "why"),
+    [
+        ("driver: modbus-tcp", "driver: mqtt", "and another protocol is spoken"),
+        ("host: 127.0.0.1", "host: 127.0.0.2", "and another host is named"),
+    ],
+)
+def test_devices_at_one_port_that_no_server_can_be_are_refused(
+    was: str, is_now: str, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bind = tmp_path / "c.bind.yaml"
+    first, _, second = halved(binding_text(NET, {"modbus": "15020"}, SENSORS)).rpartition(was)
+    bind.write_text(f"{first}{is_now}{second}")
+    assert main(["sim", "catalogue:one_robot", "--bind", str(bind)]) == 2
+    assert f"error[F5104]: 'second' is at port 15020, where 'modbus' is served, {why}" in capsys.readouterr().err
 
 
 def test_a_binding_that_is_not_of_the_simulation_is_not_written_over(

@@ -2,10 +2,12 @@
 
 import asyncio
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from copy import deepcopy
 from dataclasses import dataclass, field
 
+import yaml
 from support.cells import decomposition_of, plant_of
 from support.link_rigs import free_port
 
@@ -26,6 +28,19 @@ def unhurried(text: str) -> str:
     return re.sub(r"( *)(heartbeat: .*every_s: )[\d.]+", r"\1timeout_s: 2\n\1\g<2>4", text)
 
 
+def halved(text: str, **keys: int) -> str:
+    """A binding with two devices at the address of its one, which have the machines in turn; `keys` of the second."""
+    document = yaml.safe_load(text)
+    ((_, device),) = document["devices"].items()
+    channels = device["channels"]
+    second = {m: channels.pop(m) for m in list(channels)[1::2]}
+    document["devices"]["second"] = deepcopy(device) | keys | {"channels": second}
+    for command in document["commands"].values():
+        if command["channel"] not in channels:
+            command["device"] = "second"
+    return yaml.safe_dump(document, sort_keys=False)
+
+
 @dataclass
 class Served:
     """A cell that is served, and what it said."""
@@ -38,20 +53,27 @@ class Served:
 
 @asynccontextmanager
 async def served(
-    workpieces: int, *disturbances: Disturbance, speed: float = 50.0, knows_numbers: bool = True
+    workpieces: int,
+    *disturbances: Disturbance,
+    speed: float = 50.0,
+    knows_numbers: bool = True,
+    at_one_address: Callable[[int], str] | None = None,
 ) -> AsyncIterator[Served]:
-    """The one-robot cell over Modbus and a serial line, fifty times as fast as it would be."""
+    """The one-robot cell over Modbus and a serial line, fifty times as fast as it would be, or by another binding."""
     line = SerialEnd()
-    line.line.open()
-    ports = {"modbus": str(free_port()), "serial": line.line.near}
-    text = unhurried(binding_text(NET, ports, plant_of("one_robot").sensors))
+    if at_one_address is not None:
+        text = at_one_address(free_port())
+    else:
+        line.line.open()
+        ports = {"modbus": str(free_port()), "serial": line.line.near}
+        text = unhurried(binding_text(NET, ports, plant_of("one_robot").sensors))
     if not knows_numbers:
         numbers = r"number: holding (\d+), taken: input (\d+), done: input (\d+), failed: input (\d+)"
         bits = r"request: coil \1, taken: discrete 1\2, done: discrete 1\3, failed: discrete 1\4"
         text, count = re.subn(numbers, bits, text)
         assert count
     binding = parse_binding(text)
-    ends: dict[str, FarEnd] = {**ends_of(binding.without({"serial"})), "serial": line}
+    ends: dict[str, FarEnd] = {"serial": line, **ends_of(binding.without({"serial"}))}
     model = plant_of("one_robot")
     # Its last sensor would show a workpiece for 20 ms, which no busy machine sees.
     departures = model.departures.model_copy(update={"after_s": 25.0})

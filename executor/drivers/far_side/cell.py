@@ -10,7 +10,7 @@ commands of its places, and learns of no firing.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Final
@@ -91,8 +91,9 @@ class CellServer:
 
     async def start(self) -> None:
         """Begin to serve."""
+        for end, devices in self._ends():
+            await end.start(partial(self._written_to, devices))
         for device in self.devices.values():
-            await device.end.start(partial(self._written, device))
             for channel in device.channels.values():
                 self._clear(device, channel)
             if device.document.heartbeat is not None and device.document.heartbeat.tripped is not None:
@@ -112,7 +113,8 @@ class CellServer:
         for device in self.devices.values():
             if device.watchdog is not None:
                 device.watchdog.cancel()
-            await device.end.stop()
+        for end, _ in self._ends():
+            await end.stop()
 
     async def run(self) -> None:
         """Let the plant's events happen when they are due, until cancelled; none does once something has collided."""
@@ -127,8 +129,19 @@ class CellServer:
             except TimeoutError:
                 continue
 
+    def _ends(self) -> Iterator[tuple[FarEnd, list[_Device]]]:
+        """Each end, with the devices that are reached by it."""
+        ends = {id(device.end): device.end for device in self.devices.values()}
+        for end in ends.values():
+            yield end, [device for device in self.devices.values() if device.end is end]
+
+    def _written_to(self, devices: list[_Device], point: Point, value: Value) -> None:
+        """A client has written something at an end."""
+        for device in devices:
+            self._written(device, point, value)
+
     def _written(self, device: _Device, point: Point, value: Value) -> None:
-        """A client has written something."""
+        """It is of a device, if it has such a point."""
         document = device.document
         device.last[point] = _plain(value)
         if document.heartbeat is not None and point == document.heartbeat.write:

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from firable.executor.drivers.binding import Binding, DeviceDocument, writes
+from firable.executor.drivers.binding import Binding, writes
 from firable.executor.drivers.device import Point, Value
 from firable.executor.drivers.far_side.end import FarEnd
 from firable.nets.diagnostics import InputError
@@ -125,30 +125,66 @@ def _commands(
 
 
 def ends_of(binding: Binding) -> dict[str, FarEnd]:
-    """The servers to which a binding leads, on this host; raises `InputError` F5104 for a device that has none."""
-    return {name: _end(binding, name, device) for name, device in binding.document.devices.items()}
+    """The servers to which a binding leads, on this host; raises `InputError` F5104 for a device that has none.
+
+    Devices at one address have one server: that of a Modbus gateway where they are several units, one device or one
+    broker that is reached by several connections else.
+    """
+    at: dict[int, list[str]] = {}
+    for name in binding.document.devices:
+        at.setdefault(_address(binding, name)[1], []).append(name)
+    return {name: end for port, names in at.items() for name, end in _ends(binding, port, names).items()}
 
 
-def _end(binding: Binding, name: str, device: DeviceDocument) -> FarEnd:
+def _address(binding: Binding, name: str) -> tuple[str, int]:
+    """The host and the port of a device."""
     options = binding.options[name].model_dump()
-    points = _points(binding, name)
-    match device.driver:
+    host = options.get("host")
+    match driver := binding.document.devices[name].driver:
+        case "modbus-tcp" | "mqtt":
+            port = options["port"]
+        case "opcua":
+            host, _, port = str(options["url"]).rpartition("/" * 2)[2].partition("/")[0].rpartition(":")
+        case _:
+            message = f"`driver: {driver}` leads to nothing that can be served on this host"
+            hint = "let the binding be made: name the protocols, such as --modbus --opcua"
+            raise InputError([binding.problem("F5104", ("devices", name, "driver"), message, hint)])
+    return "127.0.0.1" if host == "localhost" else str(host), int(port)
+
+
+def _ends(binding: Binding, port: int, names: Sequence[str]) -> dict[str, FarEnd]:
+    """The ends of the devices at a port, of which each may be the end of several."""
+    first, *others = names
+    documents = binding.document.devices
+    for name in others:
+        if documents[name].driver != documents[first].driver:
+            why = "another protocol is spoken"
+        elif _address(binding, name) != _address(binding, first):
+            why = "another host is named"
+        else:
+            continue
+        message = f"'{name}' is at port {port}, where '{first}' is served, and {why}"
+        raise InputError([binding.problem("F5104", ("devices", name), message, "give each a port of its own")])
+    points = {point: value for name in names for point, value in _points(binding, name).items()}
+    end: FarEnd
+    match documents[first].driver:
         case "modbus-tcp":
             from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
 
-            return ModbusTcpEnd(options["port"])
+            units = {name: int(binding.options[name].model_dump()["unit"]) for name in names}
+            if len(set(units.values())) > 1:
+                gateway = ModbusTcpEnd(port, set(units.values()))
+                return {name: gateway.units[unit] for name, unit in units.items()}
+            end = ModbusTcpEnd(port)
         case "opcua":
             from firable.executor.drivers.far_side.opcua_server import OpcUaEnd
 
-            return OpcUaEnd(points, int(options["url"].rstrip("/").rpartition(":")[2]))
-        case "mqtt":
+            end = OpcUaEnd(points, port)
+        case _:
             from firable.executor.drivers.far_side.mqtt_device import MqttEnd
 
-            return MqttEnd(list(points), options["port"])
-        case other:
-            message = f"`driver: {other}` leads to nothing that can be served on this host"
-            hint = "let the binding be made: name the protocols, such as --modbus --opcua"
-            raise InputError([binding.problem("F5104", ("devices", name, "driver"), message, hint)])
+            end = MqttEnd(list(points), port)
+    return dict.fromkeys(names, end)
 
 
 def _points(binding: Binding, name: str) -> dict[Point, Value]:

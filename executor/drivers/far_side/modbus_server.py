@@ -7,7 +7,7 @@ seen by the next request and not by the one after it. What was never shown or wr
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Collection
 
 from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
@@ -44,11 +44,11 @@ class ModbusServer:
             mask = 1 << one.bit
             self.shown[key] = self.shown.get(key, 0) & ~mask | mask * bool(value)
 
-    def device(self) -> SimDevice:
-        """The tables, which are filled as they are asked for."""
+    def device(self, unit: int = 0) -> SimDevice:
+        """The tables of a unit, 0 for whichever is asked, which are filled as they are asked for."""
         bits = [SimData(0, count=REGISTERS // 16, values=0, datatype=DataType.BITS)]
         registers = [SimData(0, count=REGISTERS, values=0, datatype=DataType.REGISTERS)]
-        return SimDevice(0, (bits, bits, registers, registers), action=self._asked)
+        return SimDevice(unit, (bits, bits, registers, registers), action=self._asked)
 
     def garble(self, sending: bool, data: bytes) -> bytes:
         """What goes out instead of a frame, where answers are garbled."""
@@ -82,11 +82,15 @@ class ModbusServer:
 
 
 class ModbusTcpEnd(ModbusServer):
-    """A Modbus server in the network of this host; `port` 0 takes a free one."""
+    """A Modbus server in the network of this host; `port` 0 takes a free one.
 
-    def __init__(self, port: int = 0) -> None:
+    It is the device itself, or what stands before the devices of these `units`.
+    """
+
+    def __init__(self, port: int = 0, units: Collection[int] = ()) -> None:
         super().__init__()
         self.port = port
+        self.units = {unit: ModbusUnit(self) for unit in units}
         self.server: ModbusTcpServer | None = None
 
     async def start(self, written: Callable[[Point, Value], None]) -> None:
@@ -107,12 +111,41 @@ class ModbusTcpEnd(ModbusServer):
 
     async def mend(self) -> None:
         """Take connections again, at the same port."""
-        self.server = ModbusTcpServer(self.device(), address=("127.0.0.1", self.port), trace_packet=self.garble)
+        if self.server is not None:
+            return
+        devices = [one.device(unit) for unit, one in self.units.items()] or self.device()
+        self.server = ModbusTcpServer(devices, address=("127.0.0.1", self.port), trace_packet=self.garble)
         await self.server.serve_forever(background=True)
         transport = self.server.transport
         if not isinstance(transport, asyncio.Server):
             raise AssertionError("a server that listens has its sockets")
         self.port = transport.sockets[0].getsockname()[1]
+
+
+class ModbusUnit(ModbusServer):
+    """One of several devices behind one address, each with tables of its own."""
+
+    def __init__(self, before: ModbusTcpEnd) -> None:
+        super().__init__()
+        self.before = before
+        self.faults = before.faults
+
+    async def start(self, written: Callable[[Point, Value], None]) -> None:
+        """Begin to serve, all that are behind the address."""
+        self.written = written
+        await self.before.mend()
+
+    async def stop(self) -> None:
+        """End, and close all connections."""
+        await self.before.cut()
+
+    async def cut(self) -> None:
+        """Close all connections, and take no new ones."""
+        await self.before.cut()
+
+    async def mend(self) -> None:
+        """Take connections again."""
+        await self.before.mend()
 
 
 class ModbusRtuEnd(ModbusServer):

@@ -3,12 +3,17 @@
 import asyncio
 import io
 from collections.abc import Callable
+from functools import partial
 
-from support.served_cells import DECOMPOSITION, NET, Served, served
+import pytest
+from support.cells import plant_of
+from support.served_cells import DECOMPOSITION, NET, Served, halved, served, unhurried
 
 from firable.executor.cell.disturbances import Drops, NeverCompletes
 from firable.executor.drivers.bench import until
 from firable.executor.drivers.bound import bound_driver
+from firable.executor.drivers.far_side.ends import binding_text
+from firable.executor.drivers.far_side.mqtt_device import mosquitto
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.service import patience_with
@@ -53,6 +58,35 @@ def test_machines_that_know_no_numbers_lose_and_double_no_workpiece_either() -> 
             assert situation.state is State.STOPPED
             assert [workpiece.processed for workpiece in one.plant.delivered] == [1, 1]
             assert not one.cell.fault
+
+    asyncio.run(main())
+
+
+def at_one_address(protocol: str, port: int, **keys: int) -> str:
+    """A binding of the cell to two devices of a protocol at a port."""
+    return halved(unhurried(binding_text(NET, {protocol: str(port)}, plant_of("one_robot").sensors)), **keys)
+
+
+@pytest.mark.parametrize(
+    ("binding", "servers"),
+    [
+        (partial(at_one_address, "modbus", unit=2), 2),
+        (partial(at_one_address, "modbus"), 1),
+        (partial(at_one_address, "opcua"), 1),
+        pytest.param(
+            partial(at_one_address, "mqtt"), 1, marks=pytest.mark.skipif(not mosquitto(), reason="mosquitto is missing")
+        ),
+    ],
+    ids=["two units", "one unit", "OPC UA", "MQTT"],
+)
+def test_two_devices_at_one_address_are_served(binding: Callable[[int], str], servers: int) -> None:
+    async def main() -> None:
+        async with served(2, at_one_address=binding) as one:
+            situation = await executed(one, lambda: len(one.plant.delivered) == 2)
+            assert situation.state is State.STOPPED
+            assert [workpiece.processed for workpiece in one.plant.delivered] == [1, 1]
+            assert not one.cell.fault
+            assert len({device.end for device in one.cell.devices.values()}) == servers
 
     asyncio.run(main())
 
