@@ -122,8 +122,20 @@ class Report:
             data["faults"] = [_fault_to_json(fault) for fault in self.faults]
         if self.notes:
             data["notes"] = [diagnostic_to_json(note) for note in self.notes]
-        data["verdicts"] = [verdict.to_json() for verdict in self.verdicts]
+        data["verdicts"] = [_verdict_to_json(verdict) for verdict in self.verdicts]
         return data
+
+
+def _verdict_to_json(verdict: Verdict) -> dict[str, Any]:
+    """A verdict, and of what is not as it should be the code and the hints that the text shows."""
+    from firable.nets.rules import hints_of, rule_of
+
+    data, hints = verdict.to_json(), [hint for _, hint in hints_of(verdict)]
+    if hints or not verdict.holds:
+        data["code"] = rule_of(verdict)
+    if hints:
+        data["hint"] = "; ".join(hints)
+    return data
 
 
 def _row_to_json(row: Coordinated) -> dict[str, Any]:

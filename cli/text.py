@@ -162,11 +162,11 @@ def reasons(
     if status == "violated" and verdict.subjects:
         more = f" and {len(verdict.subjects) - 12} more" if len(verdict.subjects) > 12 else ""
         yield f"about: {', '.join(verdict.subjects[:12])}{more}"
-    if verdict.witness is not None and (verbose or (status == "violated" and verdict.weight.value == "required")):
+    if verdict.witness is not None and (verbose or (status == "violated" and verdict.told_as.value == "required")):
         yield from _witness(net, verdict.name, verdict.witness, told)
     for code, hint in hints_of(verdict):
         yield f"hint: [{code}] {hint}"
-    if verdict.cures and (verbose or verdict.weight.value == "required"):
+    if verdict.cures and (verbose or verdict.told_as.value == "required"):
         key = tuple(cure.changes for cure in verdict.cures)
         if key in told:
             yield f"cured by the same change as {told[key]}"

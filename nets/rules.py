@@ -56,12 +56,12 @@ _FAMILIES: Final[Mapping[str, str]] = {
 _OTHERWISE: Final = "F3024"
 """The rule that a verdict is as the file expects it."""
 _SAID_OF_ALL: Final[Mapping[str, str]] = {
-    "F3015": "where the cell has to come back, state it in the file: `expect: {{{name}: proved}}` fails until it does",
+    "F3015": "where the cell has to come back, give it a way to; `{name}: proved` under `expect` holds `check` to that",
     "F3016": "the cell divides for good: where it must not, give one of the ways a transition back to the other",
     "F3017": "where they must not compete, give each a place of its own; `effective-conflicts` tells of those that do",
     "F3018": "an arbiter of the file decides between all of these; gates that exclude each other take the choice away",
     "F3019": "where the order of the two matters, make one wait for the other by a place",
-    "F3022": "mend the net or the property; while it is known to fail, write `{name}: violated` under `expect`",
+    "F3022": "mend the net or the property; till then `{name}: violated` under `expect` passes `check`, not `bundle`",
     "F3023": "mend the net or the query; a formula that has to hold belongs under `properties` of the file",
 }
 

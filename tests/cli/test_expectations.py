@@ -1,6 +1,7 @@
 """`expect:` in a net file: a verdict that is known to end so, of which any change fails."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,36 @@ def test_what_is_only_told_may_be_held_to_its_verdict(tmp_path: Path, capsys: py
     assert "1 changed, 4 as expected" in told
     assert "hint: [F3024] the file expects proved, and it is violated; where that is right, write `live: vio" in told
     assert "hint: [F3014] right for what happens only at start-up" in told
+    assert "G1 can never fire after this" in told, "what fails has its run, whatever it would weigh by itself"
+
+
+def test_json_tells_the_code_and_the_hints_that_the_text_shows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = {**dict.fromkeys(KNOWN[:2], "violated"), "reversible": "proved", "contact-free": "violated"}
+    path = written(tmp_path, **known)
+    told = checked(capsys, path)[1]
+    (report,) = json.loads(checked(capsys, path, "--format", "json")[1])["reports"]
+    verdicts = {verdict["name"]: verdict for verdict in report["verdicts"]}
+    codes = {name: verdicts[name].get("code") for name in (*known, "property.restart", "structural-conflicts", "live")}
+    assert codes == {
+        "deadlock-free": "F3011",
+        "property.no_deadlock": "F3022",
+        "reversible": "F3024",
+        "contact-free": "F3024",
+        "property.restart": "F3022",
+        "structural-conflicts": "F3017",
+        "live": "F3014",
+    }
+    shown = re.findall(r"hint: \[F\d+\] (.*)", told)
+    assert len(shown) >= 8
+    hints = "; ".join(verdict.get("hint", "") for verdict in verdicts.values())
+    assert all(hint in hints for hint in shown)
+    assert all(
+        verdict.get("hint")
+        for verdict in verdicts.values()
+        if verdict["status"] != "proved" and not known.get(verdict["name"])
+    )
 
 
 def test_unknown_never_passes_as_expected(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
