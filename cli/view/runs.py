@@ -13,7 +13,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
+from firable.cli.page.pieces import TONES
 from firable.cli.story import outcome_told
+from firable.cli.text import mark
 from firable.cli.view.scene import Stage
 from firable.nets.net import Net
 from firable.nets.rules import hints_of
@@ -122,7 +124,7 @@ def runs_of(net: Net, verdicts: tuple[Verdict, ...], discipline: Discipline) -> 
     found = []
     for verdict in verdicts:
         witness = verdict.witness
-        if verdict.status is not Status.VIOLATED or verdict.weight is Weight.INFORMATION or witness is None:
+        if verdict.status is not Status.VIOLATED or verdict.told_as is Weight.INFORMATION or witness is None:
             continue
         if firings := (*witness.firings, *witness.cycle):
             cycle_at = len(witness.firings) if witness.cycle else None
@@ -144,12 +146,16 @@ def checked(net: Net) -> tuple[tuple[Verdict, ...], tuple[Run, ...]]:
 
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
-    """A verdict as the page lists it."""
+    """A verdict as the page lists it, in the words and with the sign of `firable check`."""
+    sign, word, _ = mark(verdict)
     return {
         "name": verdict.name,
-        "status": verdict.status.value,
-        "weight": verdict.weight.value,
+        "sign": sign,
+        "word": word,
+        "tone": TONES[sign],
+        "fails": verdict.matters and verdict.outcome is Status.VIOLATED,
+        "listed": verdict.matters or (verdict.told_as is not Weight.INFORMATION and not verdict.holds),
         "says": verdict.statement,
-        "hint": "; ".join(hint for _, hint in hints_of(verdict)),
+        "hints": [{"code": code, "says": hint} for code, hint in hints_of(verdict)],
         "cures": [{"changes": list(cure.changes), "checked": outcome_told(cure)} for cure in verdict.cures],
     }

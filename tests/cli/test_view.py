@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 from support.browser import PATIENCE_MS, browser, command, done, needs_browser, page_at
 
 from firable.cli.main import main
 from firable.cli.view.moment import Moment, fired, told
-from firable.nets.catalogue import catalogue_net
+from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.net import Net, Place, Transition
 from firable.semantics.player import Player
 
@@ -172,6 +172,33 @@ def test_a_counterexample_is_played_with_a_slider(chromium: Browser, late: str) 
         expect(page.locator(".own .circle li").first).to_contain_text("waits in G4 for mc.free")
         page.get_by_role("button", name="Undo").click()
         assert "robot.free" in tokens(page)
+
+
+@needs_browser
+def test_a_check_tells_codes_hints_and_what_the_file_expects(chromium: Browser, tmp_path: Path) -> None:
+    path = tmp_path / "cell.firable.yaml"
+    known = "expect: {deadlock-free: violated, contact-free: violated, live: proved, home-markings: proved}"
+    path.write_text(catalogue_path("one_robot_mc_late").read_text("utf-8") + f"\n{known}\n", "utf-8")
+    with command("view", str(path), "--no-browser") as (address, _), page_at(chromium, address) as page:
+        page.get_by_role("button", name="Check this net").click()
+        rows, codes = page.locator(".verdicts > li"), ".soft > code:first-child"
+
+        def row(name: str) -> Locator:
+            return rows.filter(has=page.locator("b", has_text=re.compile(f"^. {name}$")))
+
+        expect(row("deadlock-free")).to_contain_text("= deadlock-freeexpected: in every reachable marking")
+        expect(row("deadlock-free")).to_contain_class("good")
+        expect(row("home-markings")).to_contain_text("expected: some marking")
+        expect(row("contact-free")).to_contain_text("✗ contact-freechanged: no transition is held back")
+        expect(row("contact-free")).to_contain_class("bad")
+        expect(row("contact-free")).to_contain_text("F3024 the file expects violated, and it is proved; where")
+        expect(row("live").locator(codes)).to_have_text(["F3024", "F3014"])
+        expect(row("property.restart").locator(codes)).to_have_text(["F3022"])
+        expect(row("doomed-markings")).to_contain_class("open")
+        expect(row("reversible")).to_have_count(0)  # for information, and nothing is expected of it
+        expect(page.locator("#said")).to_have_text("Of what must hold, 4 do not.")
+        page.get_by_role("button", name="▶ Play deadlock-free").click()  # also what is expected has its run
+        expect(page.get_by_role("slider", name="Steps of deadlock-free")).to_be_focused()
 
 
 @needs_browser

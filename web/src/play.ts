@@ -26,6 +26,9 @@ interface Leaving {
 const KEPT = "firable-at";
 const STEPS_SHOWN = 200;
 
+/** Words of which those between backticks are what stands in a net file. */
+const inCode = (words: string): (Node | string)[] => words.split("`").map((part, i) => (i % 2 === 1 ? h("code", {}, part) : part));
+
 export class Play {
   private readonly picture: Picture;
   private readonly top: TopView;
@@ -315,17 +318,18 @@ export class Play {
     const played = (name: string): HTMLElement =>
       h("button", { type: "button", class: "go small", click: () => void this.playRun(name) }, h("b", {}, "▶ Play"), h("span", { class: "unseen" }, ` ${name}`));
     const known = new Set(runs.map((run) => run.name));
-    const rows = (verdicts ?? []).filter((one) => one.weight !== "information" && (one.status !== "proved" || one.weight === "required"));
-    const sign = { proved: "✓", violated: "✗", unknown: "?" };
-    const bad = (one: Verdict): string => (one.status === "proved" ? "good" : one.status === "unknown" || one.weight === "warning" ? "open" : "bad");
+    const rows = (verdicts ?? []).filter((one) => one.listed);
+    const order = ["bad", "open", "good"];
+    const rank = (one: Verdict): number => order.indexOf(one.tone ?? "open");
+    const hint = (one: Verdict["hints"][number]): HTMLElement => h("span", { class: "soft" }, h("code", {}, one.code), " ", ...inCode(one.says));
     const mine = new Set(rows.map((one) => one.name));
     this.checks.replaceChildren(
       verdicts === null ? check : "",
       h("ul", { class: "list verdicts" },
         ...runs.filter((run) => !mine.has(run.name)).map((run) => h("li", {}, h("div", {}, h("b", {}, run.name), h("span", {}, `${run.says}, ${counted(run.firings, "firing")}`)), played(run.name))),
-        ...rows.sort((a, b) => Number(a.status === "proved") - Number(b.status === "proved")).map((one) =>
-          h("li", { class: bad(one) },
-            h("div", {}, h("b", {}, h("i", { "aria-hidden": "true" }, sign[one.status]), ` ${one.name}`), h("span", {}, `${one.status}: ${one.says}`), one.hint && one.status !== "proved" ? h("span", { class: "soft" }, one.hint) : null),
+        ...rows.sort((a, b) => rank(a) - rank(b)).map((one) =>
+          h("li", { class: one.tone ?? "" },
+            h("div", {}, h("b", {}, h("i", { "aria-hidden": "true" }, one.sign), ` ${one.name}`), h("span", {}, `${one.word}: ${one.says}`), ...one.hints.map(hint)),
             known.has(one.name) ? played(one.name) : null, this.cures(one))),
       ),
     );
@@ -334,7 +338,6 @@ export class Play {
   /** What to write so that a verdict holds; each was checked before it is offered. */
   private cures(verdict: Verdict): HTMLElement | null {
     if (verdict.cures.length === 0) return null;
-    const inCode = (words: string): (Node | string)[] => words.split("`").map((part, i) => (i % 2 === 1 ? h("code", {}, part) : part));
     const write = (words: string, number: number): HTMLElement =>
       h("button", { type: "button", class: "small", "aria-label": `Write into the file: ${words}`, click: () => void this.cure(verdict.name, number, words) }, "Write into the file");
     return h("details", { class: "cures" }, h("summary", {}, `${counted(verdict.cures.length, "cure")} of ${verdict.name}`), h("ul", { class: "list" }, ...verdict.cures.map((cure, i) => {
@@ -375,8 +378,8 @@ export class Play {
       try {
         const { verdicts, runs } = await ask<{ verdicts: Verdict[]; runs: RunSummary[] }>("api/check", {});
         this.showChecks(verdicts, runs);
-        const violated = verdicts.filter((one) => one.status === "violated" && one.weight === "required").length;
-        announce(violated > 0 ? `${counted(violated, "property")} violated.` : "Nothing that is required is violated.");
+        const failing = verdicts.filter((one) => one.fails).length;
+        announce(failing > 0 ? `Of what must hold, ${failing} do${failing === 1 ? "es" : ""} not.` : "Nothing that must hold is violated.");
       } finally {
         button.disabled = false;
         button.textContent = "Check this net";

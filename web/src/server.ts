@@ -97,10 +97,16 @@ export interface Run extends RunSummary {
 
 export interface Verdict {
   name: string;
-  status: "proved" | "violated" | "unknown";
-  weight: "required" | "warning" | "information";
+  /** How it ended, as `firable check` tells it: also whether as the file expects. */
+  sign: string;
+  word: string;
+  tone: "good" | "bad" | "open" | null;
+  /** Whether it fails the whole. */
+  fails: boolean;
+  listed: boolean;
   says: string;
-  hint: string;
+  /** What to write instead, where something is not as it should be. */
+  hints: { code: string; says: string }[];
   /** Changes that make it hold, each with what checking the changed net has shown. */
   cures: { changes: string[]; checked: string }[];
 }
