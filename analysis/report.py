@@ -118,7 +118,8 @@ class CheckReport:
         raise KeyError(name)
 
     def _repr_html_(self) -> str:
-        """In a notebook: every verdict, and the runs of those that must hold and do not, step by step."""
+        """In a notebook: every verdict, the runs of those that must hold and do not, and who waits for whom."""
+        from firable.analysis.cures.finding import with_circle
         from firable.nets.drawing import draw_strip
         from firable.nets.notebook import told_apart, verdicts_html
         from firable.semantics.frames import frames
@@ -128,7 +129,8 @@ class CheckReport:
             for verdict in told_apart(self.verdicts, _PICTURES_MAX)
             if verdict.witness is not None
         }
-        return verdicts_html(f"{self.net.name}, {self.discipline}", self.verdicts, pictures)
+        told = (with_circle(self.net, verdict) for verdict in self.verdicts)
+        return verdicts_html(f"{self.net.name}, {self.discipline}", told, pictures)
 
 
 def report_on(

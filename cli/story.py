@@ -15,11 +15,7 @@ if TYPE_CHECKING:
 
 def waits_told(net: Net, waits: Sequence[Wait]) -> Iterator[str]:
     """A circle of tokens that wait for each other, a sentence for each."""
-    for wait in waits:
-        what = f"{wait.lacks}, which comes from {wait.holder} by" if wait.wanted else f"{wait.lacks} to be emptied by"
-        description = net.place(wait.place).description
-        told = f"{wait.place} ({description})" if description else wait.place
-        yield f"{told} waits in {wait.transition} for {what} {' and '.join(wait.by)}"
+    return (wait.told(net.place(wait.place).description) for wait in waits)
 
 
 def cures_told(verdict: Verdict) -> Iterator[str]:

@@ -25,9 +25,12 @@ def verdict_html(verdict: Verdict, picture: str = "") -> str:
     >>> verdict_html(Verdict("live", Status.PROVED, "every transition is live", "exploration")).count("✓ proved")
     1
     """
-    sign, colour = _SIGNS[verdict.status]
+    sign, colour = _SIGNS[verdict.outcome]
+    expected = f", where {verdict.expected} is expected" if verdict.expected is not None else ""
+    if verdict.expected is verdict.status:
+        expected = ", as expected"
     lines = [
-        f'<b style="color:{colour}">{sign} {verdict.status}</b> {escape(verdict.statement)} '
+        f'<b style="color:{colour}">{sign} {verdict.status}{expected}</b> {escape(verdict.statement)} '
         f"<small>({escape(verdict.name)}, {_OF_WEIGHT[verdict.weight]}, by {escape(verdict.method)})</small>"
     ]
     lines += [_paragraph(line) for line in _more(verdict, picture)]
@@ -39,9 +42,17 @@ def _paragraph(text: str) -> str:
 
 
 def _more(verdict: Verdict, picture: str) -> Iterator[str]:
-    """What is to be said of a verdict that is not proved."""
-    if verdict.holds:
-        return
+    """What is to be said of a verdict that is not proved, or ends otherwise than is expected."""
+    if not verdict.holds:
+        yield from _story(verdict, picture)
+    for code, hint in hints_of(verdict):
+        yield f"[{code}] {hint}"
+    for cure in verdict.cures:
+        yield f"cured by: {'; and '.join(cure.changes)}"
+
+
+def _story(verdict: Verdict, picture: str) -> Iterator[str]:
+    """How far was looked, the run or the values, and who waits for whom where it ends."""
     if verdict.bound and verdict.status is Status.UNKNOWN:
         yield f"reached: {verdict.bound}"
     if verdict.witness is not None:
@@ -49,10 +60,7 @@ def _more(verdict: Verdict, picture: str) -> Iterator[str]:
             yield from _told(verdict.witness)
         if verdict.witness.note:
             yield verdict.witness.note
-    for code, hint in hints_of(verdict):
-        yield f"[{code}] {hint}"
-    for cure in verdict.cures:
-        yield f"cured by: {'; and '.join(cure.changes)}"
+        yield from (wait.told() for wait in verdict.witness.waits)
 
 
 def _told(witness: Witness) -> Iterator[str]:

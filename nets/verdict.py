@@ -54,6 +54,16 @@ class Wait:
     holder: str
     by: tuple[str, ...] = ()
 
+    def told(self, description: str = "") -> str:
+        """The wait as a sentence, with what its place is described as.
+
+        >>> Wait("hand.full", "put", "table.free", True, "table.taken", ("clear",)).told("hand with a part")
+        'hand.full (hand with a part) waits in put for table.free, which comes from table.taken by clear'
+        """
+        what = f"{self.lacks}, which comes from {self.holder} by" if self.wanted else f"{self.lacks} to be emptied by"
+        place = f"{self.place} ({description})" if description else self.place
+        return f"{place} waits in {self.transition} for {what} {' and '.join(self.by)}"
+
     def to_json(self) -> dict[str, Any]:
         """The wait as JSON data."""
         return {

@@ -64,7 +64,7 @@ def explained(report: CheckReport) -> tuple[Verdict, ...]:
 
     Cures are looked for where all markings are known and at most `MARKINGS_MAX`, under interleaving.
     """
-    told = tuple(_with_circle(report.net, verdict) for verdict in report.verdicts)
+    told = tuple(with_circle(report.net, verdict) for verdict in report.verdicts)
     space = report.space
     if report.discipline is not Discipline.INTERLEAVING or not space.complete or space.n_markings > MARKINGS_MAX:
         return told
@@ -72,7 +72,7 @@ def explained(report: CheckReport) -> tuple[Verdict, ...]:
     return tuple(replace(verdict, cures=search.cures(verdict)) for verdict in told)
 
 
-def _with_circle(net: Net, verdict: Verdict) -> Verdict:
+def with_circle(net: Net, verdict: Verdict) -> Verdict:
     """The verdict on deadlock with the circle where its sequence ends."""
     if verdict.name != "deadlock-free" or verdict.status is not Status.VIOLATED or verdict.witness is None:
         return verdict

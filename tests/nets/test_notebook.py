@@ -1,6 +1,7 @@
 """What notebooks show: nets and decompositions as pictures, verdicts as sentences, reports with the runs drawn."""
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 from firable.analysis import explore, report_on
 from firable.decompose.splitting.cut import split
@@ -32,12 +33,22 @@ def test_a_verdict_shows_how_it_ended_and_its_run_with_every_name_escaped() -> N
     assert "reached: 9 markings" in unknown
 
 
+def test_a_verdict_shows_whether_it_ended_as_expected() -> None:
+    known = Verdict("live", Status.VIOLATED, "s", "m", expected=Status.VIOLATED)
+    assert "✓ violated, as expected</b>" in known._repr_html_()
+    mended = replace(known, status=Status.PROVED)._repr_html_()
+    assert "✗ proved, where violated is expected</b>" in mended
+    assert "[F3024] the file expects violated, and it is proved" in mended
+
+
 def test_a_report_shows_what_is_violated_first_with_its_run_as_a_strip() -> None:
     shown = report_on(explore(catalogue_net("one_robot_mc_late")))._repr_html_()
     strips = shown.split('<svg xmlns="http://www.w3.org/2000/svg" class="strip"')[1:]
     assert strips
     first = ET.fromstring('<svg xmlns="http://www.w3.org/2000/svg"' + strips[0].partition("</svg>")[0] + "</svg>")
     assert {one.get("id") for one in first.iter() if one.get("id")} >= {"step:0", "fired:1:G1"}
+    circle = "robot.put_mc waits in G4 for mc.free, which comes from mc.release by G6 and G7"
+    assert shown.index("1 marking of the net is a deadlock") < shown.index(circle) < shown.index("[F3011]")
     assert shown.index("✗ violated") < shown.index("<details>") < shown.index("✓ proved")
     quiet = report_on(explore(catalogue_net("one_robot")))._repr_html_()
     assert "<svg" not in quiet
