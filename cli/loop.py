@@ -64,6 +64,7 @@ def loop_report(
     argument: str, machines: str, allowed: Budget, loop_file: str | None, evidence_dir: str | None
 ) -> Report:
     """The report on one net with its machines; the evidence on each of its loops goes into a folder."""
+    from firable.analysis.cures.finding import with_circle
     from firable.analysis.loop.faults import ask_faults
     from firable.analysis.loop.verdicts import check_loop
     from firable.nets.verdict import held_to
@@ -81,7 +82,8 @@ def loop_report(
         files += write_folder(evidence_dir, _documents(loaded.net.name, loops, allowed))
     figures = report.closed.figures
     with loaded.placing():
-        verdicts = held_to(loaded.net.expected, (*report.verdicts, *faults.verdicts()))
+        told = (with_circle(loaded.net, verdict) for verdict in report.verdicts)
+        verdicts = held_to(loaded.net.expected, (*told, *faults.verdicts()))
     return Report(
         "check",
         argument,

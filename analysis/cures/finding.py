@@ -42,11 +42,13 @@ from firable.nets.formula import Or
 from firable.nets.net import Arbiter, Net, Property, PropertyKind
 from firable.nets.verdict import Cure, Status, Verdict, Weight
 from firable.semantics.conflict import conflicts
+from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
 from firable.semantics.waiting import circle
 
 MARKINGS_MAX: Final = 20_000
 """Of how many markings a net may be that a cure is looked for."""
+_DEADLOCKS: Final = ("deadlock-free", "loop.deadlock-free")
 _SEARCHES_MAX: Final = 4  # verdicts for which a cure of their own is looked for, each with the following room
 _EXPLORED_MAX: Final = 1_000_000  # markings of all candidates together
 _CHECKED_MAX: Final = 100_000  # markings of those that are checked whole
@@ -73,11 +75,16 @@ def explained(report: CheckReport) -> tuple[Verdict, ...]:
 
 
 def with_circle(net: Net, verdict: Verdict) -> Verdict:
-    """The verdict on deadlock with the circle where its sequence ends."""
-    if verdict.name != "deadlock-free" or verdict.status is not Status.VIOLATED or verdict.witness is None:
+    """The verdict on deadlock with the circle where its sequence ends.
+
+    Of the loop with machines it is that of the cell itself, and none where the cell waits for its machines alone.
+    """
+    if verdict.name not in _DEADLOCKS or verdict.status is not Status.VIOLATED or verdict.witness is None:
         return verdict
-    waits = circle(net, net.marking(verdict.witness.marking))
-    return replace(verdict, witness=replace(verdict.witness, waits=waits))
+    marking = net.marking(name for name in verdict.witness.marking if name in net.place_index)
+    if not Player(net).deadlocked(marking):
+        return verdict
+    return replace(verdict, witness=replace(verdict.witness, waits=circle(net, marking)))
 
 
 @dataclass(frozen=True, slots=True)

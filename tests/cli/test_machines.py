@@ -34,6 +34,28 @@ def test_the_loop_is_told_beside_the_net_with_gates_free(capsys: pytest.CaptureF
     assert told.endswith("all hold: 17 proved\n")
 
 
+def test_a_deadlock_of_the_cell_among_its_machines_tells_who_waits_for_whom(
+    wrong_plant: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    late = "catalogue:one_robot_mc_late"
+    assert main(["check", late, "--machines", late]) == 1
+    told = capsys.readouterr().out
+    circle = "robot.put_mc (putting on MC) waits in G4 for mc.free, which comes from mc.release by G6 and G7"
+    said = (
+        "✗ violated  loop.deadlock-free",
+        "in a circle, each waiting",
+        circle,
+        "waits in G6 for robot.free",
+        "hint: [F3011] the machines",
+    )
+    at = [told.index(words) for words in said]
+    assert at == sorted(at)
+    assert main(["check", CELL, "--machines", wrong_plant]) == 1
+    told = capsys.readouterr().out
+    assert "✗ violated  loop.deadlock-free" in told
+    assert "in a circle" not in told, "a transition of the cell waits for a gate, and no machine will open it"
+
+
 def test_why_nothing_is_asked_of_faults_where_nothing_is_live_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -350,3 +350,15 @@ def test_what_the_file_expects_is_no_failure_and_a_change_is_told() -> None:
     assert "✗ it is known to fail : proved, where the file expects violated" in words
     assert words.index("✗ violated it fails") < words.index("= expected it is known to fail")  # the runs
     assert "[F3024] the file expects violated, and it is proved; where that is right, write `k: proved`" in words
+
+
+def test_a_deadlock_tells_who_waits_for_whom_and_what_would_cure_it(tmp_path: Path) -> None:
+    path = tmp_path / "late.html"
+    assert main(["check", "catalogue:one_robot_mc_late", "--no-cache", "--report", str(path)]) == 1
+    words = Reading(path.read_text("utf-8")).words
+    first = "robot.put_mc (putting on MC) waits in G4 for mc.free, which comes from mc.release by G6 and G7"
+    second = "waits in G6 for robot.free, which comes from robot.put_mc by G4 and G5"
+    cure = "give G2 the gate `unless: system.processing` checked: 40 markings; cures doomed-markings, live"
+    at = [words.index(said) for said in ("in a circle, each for the next", first, second, "What would cure it", cure)]
+    assert at == sorted(at)
+    assert "Cured by the same change as deadlock-free" in words
