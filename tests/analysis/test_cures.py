@@ -13,7 +13,7 @@ from support.examples import seeds
 from support.lively_nets import lively_net
 
 from firable.analysis.check import check
-from firable.analysis.cures.finding import explained
+from firable.analysis.cures.finding import explained, with_circle
 from firable.nets.catalogue import catalogue_net
 from firable.nets.changes import Arbitration, CapacityPlace, Change, Gate, capacity, changed, free_name
 from firable.nets.editing import edits
@@ -21,7 +21,7 @@ from firable.nets.net import Arbiter, Net, Place, Transition
 from firable.nets.printing import format_net, in_file_order
 from firable.nets.source import Source
 from firable.nets.text import parse_net
-from firable.nets.verdict import Cure, Status, Verdict, Weight
+from firable.nets.verdict import Cure, Status, Verdict, Weight, Witness
 
 _CAPACITY_PLACE: Final = r"add the place `(\S+)`, marked at the start, to `from` of (.+) and to `to` of (.+)"
 
@@ -161,3 +161,23 @@ def test_a_capacity_place_belongs_to_the_coordinator_and_has_a_free_name() -> No
 def test_an_arbiter_counts_by_what_it_names() -> None:
     assert Arbitration(Arbiter("a", ("t", "u", "v"))).size == 3
     assert CapacityPlace("c", None, ("t",), ("u", "v")).size == 4
+
+
+def test_tokens_that_a_gate_may_still_free_are_told_to_wait_in_no_circle() -> None:
+    text = """
+firable: 1
+cell: c
+start: [a, b]
+inputs: [s]
+places: {a: , b: , fa: , fb: }
+transitions:
+  take_a: {from: [a, fb], to: fa}
+  take_b: {from: [b, fa], to: fb}
+"""
+    stuck = Verdict(
+        "loop.deadlock-free", Status.VIOLATED, "...", "explicit", witness=Witness(marking=("a", "b", "R.idle"))
+    )
+    told = with_circle(parse_net(text.replace("inputs: [s]\n", "")), stuck).witness
+    assert told is not None
+    assert [(wait.place, wait.holder) for wait in told.waits] == [("a", "b"), ("b", "a")]
+    assert with_circle(parse_net(f"{text}  open_b: {{from: b, to: fb, if: s}}\n"), stuck) == stuck
