@@ -221,7 +221,12 @@ SCHEMA_FILE = "net.schema.json"
 
 
 def write_net(path: str, net: Net) -> None:
-    """Write a net file, as `write_text` does; its first line names its JSON Schema where the project has one.
+    """Write a net file, as `write_text` does."""
+    write_text(path, net_text(path, net))
+
+
+def net_text(path: str | Path, net: Net) -> str:
+    """What a net file of this path holds; its first line names its JSON Schema where the project has one.
 
     That is the nearest `net.schema.json` beside the file or above it, up to the folder that the command runs in. An
     editor completes and checks a file by that line; where there is none, the line would name nothing.
@@ -230,7 +235,7 @@ def write_net(path: str, net: Net) -> None:
 
     found = None if path == "-" else _schema_above(Path(path).absolute())
     first = "" if found is None else f"# yaml-language-server: $schema={found}\n"
-    write_text(path, first + format_net(net))
+    return first + format_net(net)
 
 
 def _schema_above(file: Path) -> str | None:

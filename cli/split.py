@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from textwrap import indent
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from firable.cli import text
-from firable.cli.options import answer, formats_option, load_net, net_argument, page_option, with_page, write_folder
+from firable.cli.options import (
+    answer,
+    formats_option,
+    load_net,
+    net_argument,
+    net_text,
+    page_option,
+    with_page,
+    write_folder,
+)
 from firable.cli.report import Report
 from firable.cli.votes import Votes, votes_told
 
@@ -113,7 +123,7 @@ def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | 
         net, suggestion = _owned(loaded.net, asked, rules)
         decomposition = split_net(net)
     found = persistence(decomposition, limits=Limits(Deadline.after(asked.max_seconds)))
-    files = write_folder(subnet_dir, _subnets(decomposition)) if subnet_dir is not None else ()
+    files = write_folder(subnet_dir, _subnets(decomposition, subnet_dir)) if subnet_dir is not None else ()
     if output is not None:
         write_net(output, net)
         files = (output, *files)
@@ -155,11 +165,11 @@ def _owned(net: Net, asked: _Asked, rules: dict[str, list[str]]) -> tuple[Net, S
     return (owned_by_rules(net, rules) if rules else net), None
 
 
-def _subnets(decomposition: Decomposition) -> dict[str, str]:
+def _subnets(decomposition: Decomposition, folder: str) -> dict[str, str]:
     from firable.nets.bundle import file_stem
-    from firable.nets.printing import format_net
 
-    return {f"{file_stem(subnet.name)}.firable.yaml": format_net(subnet) for subnet in decomposition.subnets}
+    named = ((f"{file_stem(subnet.name)}.firable.yaml", subnet) for subnet in decomposition.subnets)
+    return {name: net_text(Path(folder, name), subnet) for name, subnet in named}
 
 
 def _split_json(found: Persistence) -> dict[str, Any]:

@@ -350,11 +350,14 @@ def test_a_net_file_that_is_written_names_the_schema_of_its_project(
         lines.append((project / "cells/cell.firable.yaml").read_text("utf-8").splitlines()[0])
     assert main(["refine", "catalogue:conceptual_one_robot", "-o", "refined.firable.yaml"]) == 0
     lines.append((project / "refined.firable.yaml").read_text("utf-8").splitlines()[0])
+    assert main(["split", "catalogue:one_robot", "--subnets", "parts/one"]) == 0
+    lines.append((project / "parts/one/robot.firable.yaml").read_text("utf-8").splitlines()[0])
     named = "# yaml-language-server: $schema="
     assert lines == [
         "firable: 1",  # the schema above the project is not the project's
         f"{named}../net.schema.json",
         f"{named}net.schema.json",
         f"{named}net.schema.json",
+        f"{named}../../net.schema.json",
     ]
     assert main(["check", "cells/cell.firable.yaml"]) == 0
