@@ -144,7 +144,7 @@ def _machines(net: Net, trace: Trace, argument: str, latency_seconds: float | No
     found = watch(Monitor(net, read_machines(argument), latency_seconds=latency), trace)
     if found is None:
         return Verdict(name, Status.PROVED, statement, method)
-    hint = f"at {found.at_seconds:.2f} s: {found.message}"
+    hint = f"at {found.at_seconds:.2f} s: {found.message}; mend the plant file, or look at that machine"
     return Verdict(name, Status.VIOLATED, statement, method, subjects=found.places, hint=hint)
 
 

@@ -20,5 +20,5 @@ def machines_verdict(report: RunReport | HostReport, method: str) -> tuple[Verdi
     found = report.divergence
     if found is None:
         return (Verdict(name, Status.PROVED, statement, method),)
-    hint = f"at {found.at_seconds:.2f} s: {found.message}"
+    hint = f"at {found.at_seconds:.2f} s: {found.message}; mend the plant file, or look at that machine"
     return (Verdict(name, Status.VIOLATED, statement, method, hint=hint, subjects=found.places),)

@@ -42,6 +42,15 @@ _OF_THE_NET: Final[Mapping[str, str]] = {
     "completions": "F3032",
     "gates-open": "F3033",
 }
+_OF_A_RUN: Final[Mapping[str, str]] = {
+    "workpieces-carried-through": "F5007",
+    "workpieces-intact": "F5007",
+    "ran-until-stopped": "F5007",
+    "machines": "F5008",
+    "machines-as-modelled": "F5008",
+    "rehearsal": "F4006",
+}
+"""Verdicts on what has happened, of which no budget leaves one undecided."""
 _FAMILIES: Final[Mapping[str, str]] = {
     "property": "F3022",
     "query": "F3023",
@@ -50,6 +59,8 @@ _FAMILIES: Final[Mapping[str, str]] = {
     "protocol": "F4006",
     "explored": "F4006",
     "faults": "F4006",
+    "wrong": "F4006",
+    "bisimilar": "F3010",
 }
 
 
@@ -63,6 +74,7 @@ _SAID_OF_ALL: Final[Mapping[str, str]] = {
     "F3019": "where the order of the two matters, make one wait for the other by a place",
     "F3022": "mend the net or the property; till then `{name}: violated` under `expect` passes `check`, not `bundle`",
     "F3023": "mend the net or the query; a formula that has to hold belongs under `properties` of the file",
+    "F5007": "with --trace FILE, `firable view NET --trace FILE` plays it and tells what each transition waits for",
 }
 
 
@@ -100,6 +112,8 @@ def _is_otherwise(verdict: Verdict) -> bool:
 def _own_rule(verdict: Verdict) -> str:
     if verdict.code:
         return verdict.code
+    if code := _OF_A_RUN.get(verdict.name):
+        return code
     if verdict.status is Status.UNKNOWN:
         return _UNDECIDED
     name = verdict.name.removeprefix("loop.")

@@ -62,5 +62,6 @@ def confirmed(
             raise TheoremError(f"{correspondence.conceptual.name}: {statement}, says the theorem, and they are not")
         yield Verdict(
             name, Status.PROVED if alike else Status.VIOLATED, statement, question.method, Weight.INFORMATION,
+            hint="" if alike else "only contact tells them apart: `firable check` shows where",
             cost=cost, discipline=Discipline.INTERLEAVING.value,
         )  # fmt: skip

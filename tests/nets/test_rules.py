@@ -33,6 +33,14 @@ RULES = {
     "protocol.starts": "F4006",
     "explored.follows": "F4006",
     "faults.resumes": "F4006",
+    "wrong.eager": "F4006",
+    "rehearsal": "F4006",
+    "bisimilar.weak": "F3010",
+    "workpieces-carried-through": "F5007",
+    "workpieces-intact": "F5007",
+    "ran-until-stopped": "F5007",
+    "machines": "F5008",
+    "machines-as-modelled": "F5008",
     "eq7.G1": "F4002",
     "ownership": "F4002",
 }
@@ -50,6 +58,7 @@ def test_a_verdict_has_the_rule_of_its_kind(name: str, code: str) -> None:
 
 def test_what_is_not_decided_has_the_rule_of_the_budget() -> None:
     assert rule_of(verdict("live", Status.UNKNOWN)) == "F3004"
+    assert rule_of(verdict("ran-until-stopped", Status.UNKNOWN)) == "F5007"  # somebody stopped it
 
 
 def test_a_verdict_that_says_its_code_keeps_it() -> None:

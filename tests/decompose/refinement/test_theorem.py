@@ -23,6 +23,7 @@ from firable.decompose.refinement.opening import open_tasks
 from firable.decompose.refinement.refining import Refinement, refine
 from firable.nets import Net, Status, Verdict, catalogue_net, parse_net
 from firable.nets.catalogue import catalogue_tasks
+from firable.nets.rules import hints_of
 from firable.nets.tasks.model import Catalogue, Task
 from firable.nets.tasks.text import parse_tasks
 from firable.semantics.player import Player
@@ -270,8 +271,11 @@ def test_a_contact_of_the_conceptual_net_can_be_seen_as_well() -> None:
     refinement = refine(net, catalogue_tasks())
     assert not report_on(explore(net)).verdict("contact-free").holds
     assert not alike(net, refinement.net, dict(refinement.correspondence.transitions), divergence=True)
-    verdicts = confirmed(refinement.correspondence, contact_free=False, settles=True)
+    verdicts = list(confirmed(refinement.correspondence, contact_free=False, settles=True))
     assert {v.status for v in verdicts} == {Status.VIOLATED}
+    assert {hint for v in verdicts for hint in hints_of(v)} == {
+        ("F3010", "only contact tells them apart: `firable check` shows where"),
+    }
 
 
 def test_a_contradiction_would_be_our_own_fault(monkeypatch: pytest.MonkeyPatch) -> None:
