@@ -8,6 +8,8 @@
 //! Nobody can conclude from a part: a method whose answer needs the whole graph raises on an incomplete one.
 
 #[forbid(unsafe_code)]
+mod apart;
+#[forbid(unsafe_code)]
 pub mod batch;
 #[forbid(unsafe_code)]
 pub mod bits;

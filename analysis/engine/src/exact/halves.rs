@@ -12,6 +12,7 @@ use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
+use crate::apart::Apart;
 use crate::budget::{Memory, Stop, Watch};
 
 /// The factor that takes `FACTOR` back.
@@ -89,14 +90,14 @@ impl<S: Slot> Exact<S> {
         };
         let [low, high] = halves(shape, room.all_mut());
         let (taken_low, taken_high) = taken.split_at_mut(low.buckets.len());
-        let (from, ended) = (&*self, AtomicBool::new(false));
+        let (from, ended) = (&*self, Apart(AtomicBool::new(false)));
         let past = thread::scope(|scope| {
-            let go_on = || if ended.load(Ordering::Relaxed) { Err(Stop::Cancelled) } else { Ok(()) };
+            let go_on = || if ended.0.load(Ordering::Relaxed) { Err(Stop::Cancelled) } else { Ok(()) };
             let work = move || high.refill(from, taken_high, go_on);
             // Where the system has no thread to give, all is done here.
             let other = thread::Builder::new().spawn_scoped(scope, work).ok()?;
             let past = low.refill(from, taken_low, || watch.tick(LANES));
-            ended.store(past.is_err(), Ordering::Relaxed);
+            ended.0.store(past.is_err(), Ordering::Relaxed);
             Some((past, other.join().unwrap_or_else(|panic| resume_unwind(panic))))
         });
         memory.release(taken.len());

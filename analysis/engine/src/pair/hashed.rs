@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use super::half::{BLOCK, End, Finds, Half, Shared};
+use crate::apart::Apart;
 use crate::batch::Batch;
 use crate::budget::{Stop, Watch};
 use crate::explore::Space;
@@ -268,12 +269,12 @@ impl<W: Width> Shared<W> for Hashed {
         let Ok(mut wider) = space.table.wider(&space.memory) else { return Ok(false) };
         let (shape, bytes) = (wider.shape(), size_of_val(wider.all_mut()));
         let [mut low, mut high] = halves((&space.table.store, wider.all_mut(), shape));
-        let ended = AtomicBool::new(false);
+        let ended = Apart(AtomicBool::new(false));
         let past = thread::scope(|scope| {
-            let go_on = |_| if ended.load(Ordering::Relaxed) { Err(Stop::Cancelled) } else { Ok(()) };
+            let go_on = |_| if ended.0.load(Ordering::Relaxed) { Err(Stop::Cancelled) } else { Ok(()) };
             let other = scope.spawn(move || high.file(width, go_on));
             let past = low.file(width, |work| watch.tick(work));
-            ended.store(past.is_err(), Ordering::Relaxed);
+            ended.0.store(past.is_err(), Ordering::Relaxed);
             (past, other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
         });
         let past = match past {

@@ -23,8 +23,9 @@
 //! day to day; to sort each level afterwards costs more than the buffers.
 //!
 //! What is left between this and twice as quick, by profiles of a net with levels of ten thousand markings: two threads
-//! take a seventh more instructions than one, each waits a tenth of its time for the other, growth starts threads, and one
-//! of them alone lays markings down. Two explorations that share nothing, at once, are 1.7 to 1.95 times as quick as one
+//! take a seventh more instructions than one, each waits a fifteenth of its time for the other, growth starts threads and
+//! writes to fresh pages, and one of them alone lays markings down. Other sizes of rounds, more rounds ahead of the other
+//! thread, and levels half or a quarter as large made no difference that could be measured. Two explorations that share nothing, at once, are 1.7 to 1.95 times as quick as one
 //! after the other, so that is about all there is to be had.
 
 mod half;
@@ -37,6 +38,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
+use crate::apart::Apart;
 use crate::budget::{Found, Stop, Watch};
 use crate::explore::Space;
 use crate::marking::Width;
@@ -55,7 +57,7 @@ const ROUNDING_BYTES: usize = 1 << 22;
 
 /// The two threads of one exploration, and what they counted so far.
 pub(crate) struct Pair {
-    members: [Member; 2],
+    members: [Apart<Member>; 2],
     /// Bytes claimed for the members from the memory of the space.
     claimed: usize,
     level_least: usize,
@@ -68,7 +70,7 @@ pub(crate) struct Pair {
 impl Pair {
     /// Two threads for a net, for levels of at least so many markings that begin while the flag is set.
     pub(crate) fn new(net: &Net, level_least: usize, free: Arc<AtomicBool>) -> Self {
-        Pair { members: [0, 1].map(|id| Member::new(id, net)), claimed: 0, level_least, free, retired: false }
+        Pair { members: [0, 1].map(|id| Apart(Member::new(id, net))), claimed: 0, level_least, free, retired: false }
     }
 
     /// Whether a level of so many markings is worth it.
@@ -94,7 +96,7 @@ impl Pair {
         loop {
             let worst;
             (open, worst) = self.work(width, space, set, (&open, go_on), max, watch);
-            space.edges += self.members.iter_mut().map(|member| std::mem::take(&mut member.edges)).sum::<u64>();
+            space.edges += self.members.iter_mut().map(|Apart(member)| std::mem::take(&mut member.edges)).sum::<u64>();
             end = self.lay_down(width, space, set, max, watch)?.unwrap_or(end);
             match worst {
                 Some(End::Stopped(stop)) => return Err(stop),
@@ -103,7 +105,7 @@ impl Pair {
                 Some(End::Short) => self.retired = true,
                 None => {}
             }
-            for member in &mut self.members {
+            for Apart(member) in &mut self.members {
                 set.insert_left(width, space, &std::mem::take(&mut member.finds.left), max, watch)?;
             }
             if worst.is_none() || self.retired {
@@ -127,16 +129,16 @@ impl Pair {
         // What is found is held twice for a moment, by its member and in the array.
         let free = (space.memory.limit() - space.memory.used()).saturating_sub(ROUNDING_BYTES);
         let base = space.table.store.len();
-        for member in &mut self.members {
+        for Apart(member) in &mut self.members {
             member.finds.allow(free / 4, max.saturating_sub(base) / 2);
         }
         let (store, [mut low, mut high]) = set.halves(&mut space.table);
         let before = Found { markings: base as u64, edges: space.edges };
-        let work = Work { net: &space.net, old: store.all(), open, base, go_on, free: &self.free, before };
-        let [here, there] = &mut self.members;
+        let work = Apart(Work { net: &space.net, old: store.all(), open, base, go_on, free: &self.free, before });
+        let [Apart(here), Apart(there)] = &mut self.members;
         let [port, its_port] = Port::both();
         let worst = thread::scope(|scope| {
-            let work = &work;
+            let work = &work.0;
             let all = move || there.work(width, work, &mut high, &its_port, None);
             // Where the system has no thread to give, one does it all.
             let its = thread::Builder::new().spawn_scoped(scope, all).ok()?;
@@ -145,7 +147,7 @@ impl Pair {
             Some(end.max(its.join().unwrap_or_else(|panic| resume_unwind(panic))))
         });
         let Some(worst) = worst else { return (open.to_vec(), Some(End::Short)) };
-        let mut left: Vec<_> = self.members.iter().flat_map(|member| member.left(&work)).collect();
+        let mut left: Vec<_> = self.members.iter().flat_map(|Apart(member)| member.left(&work.0)).collect();
         left.sort_unstable();
         (left, worst)
     }
@@ -159,7 +161,7 @@ impl Pair {
         max: usize,
         watch: &mut Watch<'_>,
     ) -> Result<Option<usize>, Stop> {
-        let [a, b] = &mut self.members;
+        let [Apart(a), Apart(b)] = &mut self.members;
         let held = a.finds.memory.used() + b.finds.memory.used();
         space.memory.claim(held.saturating_sub(self.claimed))?;
         self.claimed = self.claimed.max(held);
@@ -177,7 +179,7 @@ impl Pair {
     /// Adds what the members counted to the counts of the space.
     pub(crate) fn finish(self, space: &mut Space) -> Result<(), Stop> {
         let mut dead = Vec::new();
-        for member in self.members {
+        for Apart(member) in self.members {
             for t in 0..space.fired.len() {
                 space.fired[t] += member.fired[t];
                 space.contacts[t] += member.contacts[t];
