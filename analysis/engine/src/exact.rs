@@ -10,9 +10,9 @@
 //! A bucket is eight slots, filled from the first on and compared by vector instructions; at four fifths full, five
 //! keys of six stand in the bucket where they belong. The others stand in a following one, and a slot says how far it
 //! has moved (its low bits; 0 is an empty slot), so that its key can still be told. There are 2^k or 3 * 2^k buckets,
-//! so the table grows by a third or by half, never by two, and is never less than half full. Buckets are in the order
-//! of the mixed keys; so growing reads one table and writes the other from end to end, and needs neither the markings
-//! nor their hashes.
+//! so a large table grows by a third or by half, never by two, and is never less than half full; up to some mebibytes it
+//! doubles, which moves keys half as often. Buckets are in the order of the mixed keys; so growing reads one table and
+//! writes the other from end to end, and needs neither the markings nor their hashes.
 //!
 //! The index of a marking is not needed while exploring; `indexes.rs` puts it beside the slots when somebody asks for
 //! it.
@@ -279,7 +279,7 @@ impl<S: Slot> Exact<S> {
     pub fn grow(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
         let mut shape = self.shape;
         loop {
-            shape = shape.larger()?;
+            shape = shape.roomier()?;
             let mut room = Self::room(shape, memory)?;
             let buckets = room.all_mut().as_chunks_mut().0;
             let filled = memory.filled(0, buckets.len()).and_then(|mut taken| {

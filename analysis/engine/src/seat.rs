@@ -22,6 +22,9 @@ pub(crate) const REACH: usize = (1 << MOVED_BITS) - 1;
 /// Most buckets: their numbers are kept in 32 bits (`exact.rs`, `halves.rs`), and one cut short would take two keys for
 /// one.
 const BUCKETS_MAX: u64 = 1 << 32;
+/// A table of fewer buckets doubles: what it takes is little beside all else, and to move its keys as often as those of a
+/// large one takes a twentieth of an exploration that ends soon after.
+const DOUBLES_BELOW: u64 = 1 << 16;
 /// Odd, so that the product is a bijection (the golden ratio).
 pub(crate) const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -97,6 +100,12 @@ impl Shape {
         Shape { bits, times, log2, buckets: times << log2, factor: FACTOR << (64 - bits), shift: 64 + log2 + 1 - bits }
     }
 
+    /// Twice as large while it is small, else the next larger, if its buckets can be numbered.
+    pub(crate) fn roomier(self) -> Result<Self, Stop> {
+        let larger = self.larger()?;
+        if larger.buckets < DOUBLES_BELOW { larger.larger() } else { Ok(larger) }
+    }
+
     /// The next larger, if its buckets can be numbered.
     pub(crate) fn larger(self) -> Result<Self, Stop> {
         let (times, log2) = if self.times == 2 { (3, self.log2) } else { (2, self.log2 + 1) };
@@ -166,6 +175,21 @@ mod tests {
             assert_eq!(home as u64, shape.buckets - 1);
             assert_eq!(shape.mixed(home as u32 as usize, slot), highest);
         }
+    }
+
+    #[test]
+    fn a_table_doubles_while_it_is_small_and_takes_every_size_from_then_on() {
+        let mut shape = Shape::least(44, 58);
+        let mut sizes = Vec::new();
+        while shape.buckets < 1 << 18 {
+            sizes.push(shape.buckets);
+            shape = shape.roomier().expect("few buckets");
+        }
+        let large = sizes.iter().position(|&size| size == DOUBLES_BELOW).expect("a power of two");
+        assert!(large > 5 && sizes[..=large].windows(2).all(|two| two[1] == 2 * two[0]));
+        assert_eq!(sizes[large..].iter().map(|size| size >> 15).collect::<Vec<_>>(), [2, 3, 4, 6]);
+        assert_eq!(Shape::new(60, 2, 31).roomier().err(), Some(Stop::Memory));
+        assert_eq!(Shape::new(44, 3, 10).roomier().map(|shape| shape.buckets), Ok(3 << 11));
     }
 
     #[test]

@@ -82,7 +82,7 @@ impl<S: Slot> Exact<S> {
     /// Takes more buckets, which two threads fill; false where there is no memory for them. No key is lost by that, nor
     /// where time is over.
     pub(crate) fn grow_by_two(&mut self, memory: &Memory, watch: &mut Watch<'_>) -> Result<bool, Stop> {
-        let Ok(shape) = self.shape.larger() else { return Ok(false) };
+        let Ok(shape) = self.shape.roomier() else { return Ok(false) };
         let Ok(mut room) = Self::room(shape, memory) else { return Ok(false) };
         let Ok(mut taken) = memory.filled(0, shape.buckets as usize + REACH) else {
             memory.release(Self::bytes(shape));
@@ -317,7 +317,7 @@ mod tests {
                     Ok(())
                 };
                 table.put(&mut asked, key, (&memory, &mut watch), count).expect("fits");
-                if i % 10_000 == 5000 {
+                if i % 20_000 == 5000 {
                     assert_eq!(table.grow_by_two(&memory, &mut watch), Ok(true));
                 }
             }
