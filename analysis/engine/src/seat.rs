@@ -112,9 +112,10 @@ impl Shape {
         Shape::new(self.bits, times, log2).numbered()
     }
 
-    /// The same; an end of memory where its buckets are too many to be numbered.
+    /// The same; an end of memory where its buckets are too many to be numbered, or more than a key has bits to tell: no
+    /// set of keys needs so many.
     pub(crate) fn numbered(self) -> Result<Self, Stop> {
-        if self.buckets <= BUCKETS_MAX { Ok(self) } else { Err(Stop::Memory) }
+        if self.buckets <= BUCKETS_MAX && self.log2 + 1 < self.bits { Ok(self) } else { Err(Stop::Memory) }
     }
 
     /// The mixed key, in the high bits of a word.
@@ -189,6 +190,8 @@ mod tests {
         assert!(large > 5 && sizes[..=large].windows(2).all(|two| two[1] == 2 * two[0]));
         assert_eq!(sizes[large..].iter().map(|size| size >> 15).collect::<Vec<_>>(), [2, 3, 4, 6]);
         assert_eq!(Shape::new(60, 2, 31).roomier().err(), Some(Stop::Memory));
+        assert_eq!(Shape::new(16, 3, 13).roomier().map(|shape| shape.buckets), Ok(3 << 14));
+        assert_eq!(Shape::new(16, 3, 14).roomier().err(), Some(Stop::Memory), "a bucket for each two keys");
         assert_eq!(Shape::new(44, 3, 10).roomier().map(|shape| shape.buckets), Ok(3 << 11));
     }
 
