@@ -184,7 +184,8 @@ class Recorder:
 
     def stands(self, at_seconds: float, controller: str, transitions: frozenset[str]) -> None:
         """A controller has said yes for parts that are free of promise: of one host among others, that is told."""
-        self._write(Noted(at_seconds, STANDS, {"controller": controller, "transitions": sorted(transitions)}))
+        if self._is_told(at_seconds):
+            self._write(Noted(at_seconds, STANDS, {"controller": controller, "transitions": sorted(transitions)}))
 
     def applied(self, at_seconds: float, controller: str, number: int, transition: str) -> None:
         """A controller has applied its part of what a round committed: of one host among others, that is told."""

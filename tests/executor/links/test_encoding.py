@@ -4,14 +4,14 @@ import hashlib
 import json
 from contextlib import suppress
 from dataclasses import dataclass, fields
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.examples import examples
 
-from firable.executor.links.encoding import KINDS, MESSAGE_BYTES_MAX, EncodingError, _writer, decode, encode
+from firable.executor.links.encoding import KINDS, MESSAGE_BYTES_MAX, EncodingError, _Form, decode, encode
 from firable.executor.links.link import PROTOCOL_VERSION
 from firable.executor.protocol import messages
 from firable.executor.protocol.messages import Decision, Message, Readiness, ToController, ToCoordinator
@@ -28,6 +28,47 @@ def test_every_message_of_the_protocol_can_be_sent() -> None:
 @given(MESSAGES)
 def test_a_message_is_read_as_it_was_written(message: Message) -> None:
     assert decode(encode(message)) == message
+
+
+NAMES = st.text(alphabet=':,}-01"%a', max_size=6)
+"""Names that look like the text around a number."""
+NUMBERS = st.integers(-3, 3) | st.integers(-(10**20), 10**20)
+
+
+def with_other(message: Message, data: st.DataObject, *, names: bool = False) -> Message:
+    """The message with other numbers, and other names where these are wanted."""
+
+    def drawn(value: Any) -> Any:
+        if isinstance(value, Readiness):
+            return Readiness(*[drawn(getattr(value, field.name)) for field in fields(Readiness)])
+        if isinstance(value, bool) or value is None:
+            return value
+        if isinstance(value, int):
+            return data.draw(NUMBERS)
+        if isinstance(value, frozenset | tuple) and names:
+            return type(value)(data.draw(st.lists(NAMES, max_size=2)))
+        return data.draw(NAMES) if isinstance(value, str) and names else value
+
+    return type(message)(**{field.name: drawn(getattr(message, field.name)) for field in fields(message)})
+
+
+@examples(300)
+@given(MESSAGES, st.data())
+def test_messages_of_one_shape_are_read_each_as_it_was_written(message: Message, data: st.DataObject) -> None:
+    first = with_other(message, data, names=True)
+    for one in (first, with_other(first, data), with_other(first, data)):
+        text = encode(one)
+        assert decode(text) == one
+        assert json.loads(text)[type(one).__name__]["controller"] == one.controller
+
+
+@pytest.mark.parametrize("number", [b"01", b"+1", b"-0", b"1.0", b"1e0", b" 1", b"", b"true", b"--1", b"0x1"])
+def test_number_that_is_written_otherwise_is_refused_in_a_shape_that_is_known(number: bytes) -> None:
+    text = encode(Decision("robot", 77, None, 0, -1))
+    assert decode(text) == decode(text)
+    assert decode(text.replace(b"77", b"-1")) == Decision("robot", -1, None, 0, -1)
+    with pytest.raises(EncodingError):
+        decode(text.replace(b"77", number))
 
 
 @examples(100)
@@ -109,7 +150,7 @@ class Odd:
 
 def test_a_message_with_a_field_that_has_no_one_spelling_is_refused_when_the_program_starts() -> None:
     with pytest.raises(TypeError, match="cannot be part of a message"):
-        _writer(Odd)
+        _Form(Odd)
 
 
 SHAPES = {2: "f8449b1cb1bf4c25", 3: "377b67d513818ce9", 4: "b9084ed7cd0575f6"}
