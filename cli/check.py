@@ -12,8 +12,10 @@ from click.core import ParameterSource
 
 from firable.analysis.methods import Method
 from firable.cli import text
+from firable.cli.choice import OneOf
 from firable.cli.evidence_files import is_evidence
 from firable.cli.loop import loop_report, machines_option, show_loop
+from firable.cli.net_files import demand_a_file
 from firable.cli.options import (
     analysis_options,
     answer_all,
@@ -70,14 +72,14 @@ class _Asked:
 @click.argument("nets", metavar="NET...", nargs=-1, required=True)
 @click.option(
     "--discipline",
-    type=click.Choice(["interleaving", "step"]),
+    type=OneOf(["interleaving", "step"]),
     default="interleaving",
     show_default=True,
     help="One transition at a time, or all enabled ones of a scan together.",
 )
 @click.option(
     "--method",
-    type=click.Choice([str(method) for method in Method]),
+    type=OneOf([str(method) for method in Method]),
     default=str(Method.AUTO),
     show_default=True,
     help="Let one technique answer; `auto` lets them race where exploring a moment does not suffice.",
@@ -166,6 +168,7 @@ def _refuse_beside_machines() -> None:
         raise click.UsageError(f"{message}and check that file")
     if len(context.params["nets"]) > 1 and context.params["loop_file"] is not None:
         raise click.UsageError("--loop-net holds one loop: name one NET")
+    demand_a_file(context.params["loop_file"])
 
 
 def _report(argument: str, asked: _Asked, evidence_dir: str | None, *, many: bool) -> Report:

@@ -12,6 +12,7 @@ from typing import Final
 import click
 
 from firable import __version__
+from firable.cli.choice import OneOf
 from firable.cli.options import write_text
 
 _GITHUB: Final = """\
@@ -72,7 +73,7 @@ def ci() -> None:
 @click.option(
     "--for",
     "site",
-    type=click.Choice(sorted(_FILES)),
+    type=OneOf(sorted(_FILES)),
     default="github",
     show_default=True,
     help="Whose workflow.",

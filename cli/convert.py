@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from firable.cli import text
-from firable.cli.options import load_net, write_net, write_text
+from firable.cli.net_files import write_net
+from firable.cli.options import load_net, write_text
 
 
 @click.command(short_help="Convert a net between *.firable.yaml and PNML.")
@@ -18,7 +19,9 @@ from firable.cli.options import load_net, write_net, write_text
 def convert(source: str, output: str) -> int:
     """Convert NET to the format of the file named by --output.
 
-    What the other format cannot carry is said, never dropped in silence.
+    What the other format cannot carry is said, never dropped in silence. The first line of a net file names its JSON
+    Schema, by which editors complete and check it: the net.schema.json of the project, which is written beside the
+    file where there is none.
     """
     from firable.nets.loading import PNML_SUFFIXES, TEXT_SUFFIXES
     from firable.nets.pnml import write_pnml
@@ -28,7 +31,8 @@ def convert(source: str, output: str) -> int:
         raise click.UsageError(f"cannot tell the format of '{output}': name a file *.firable.yaml or *.pnml")
     loaded = load_net(source)
     if suffix in TEXT_SUFFIXES:
-        write_net(output, loaded.net)
+        for schema in write_net(output, loaded.net)[1:]:
+            click.echo(f"written: {schema}, by which editors complete and check {output}")
         lost = loaded.notes
     else:
         written, more = write_pnml(loaded.net)

@@ -7,6 +7,7 @@ from typing import Final
 
 import click
 
+from firable.cli.choice import OneOf
 from firable.cli.options import load_net, net_argument, write_text
 
 _OF: Final[Mapping[str, tuple[str, ...]]] = {
@@ -29,7 +30,7 @@ _OF: Final[Mapping[str, tuple[str, ...]]] = {
 )
 @click.option(
     "--what",
-    type=click.Choice(["net", "coordinator", "graph", "strip"]),
+    type=OneOf(["net", "coordinator", "graph", "strip"]),
     default="net",
     show_default=True,
     help="The net; who decides what over whom; its reachability graph; a run of it, a small picture for each step.",
@@ -60,7 +61,7 @@ _OF: Final[Mapping[str, tuple[str, ...]]] = {
 )
 @click.option(
     "--discipline",
-    type=click.Choice(["interleaving", "step"]),
+    type=OneOf(["interleaving", "step"]),
     default=None,
     help="Of the graph: fire one transition at a time, or maximal sets of them.  [default: interleaving]",
 )
@@ -72,7 +73,7 @@ _OF: Final[Mapping[str, tuple[str, ...]]] = {
 )
 @click.option(
     "--layout",
-    type=click.Choice(["lanes", "layered", "dot", "elk"]),
+    type=OneOf(["lanes", "layered", "dot", "elk"]),
     default=None,
     help="Place what is drawn in lanes (a net), by distance from the start, or by Graphviz or ELK where these are "
     "installed.  [default: lanes of a net, layered of a graph]",

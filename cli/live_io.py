@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from firable.cli.choice import OneOf
 from firable.cli.options import load_net
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ _COLOURS = {"good": "green", "uncertain": "yellow", "bad": "red"}
 @click.option(
     "--format",
     "format_",
-    type=click.Choice(["text", "json"]),
+    type=OneOf(["text", "json"]),
     default="text",
     show_default=True,
     help="How to print: as a table, or one JSON document a line; `firable schema io` prints its schema.",

@@ -13,7 +13,8 @@ import click
 
 from firable.cli import text
 from firable.cli.evidence_files import is_evidence
-from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_folder, write_net
+from firable.cli.net_files import write_net
+from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_folder
 from firable.cli.report import Report
 
 if TYPE_CHECKING:
@@ -75,8 +76,7 @@ def loop_report(
     faults = ask_faults(report.asked, model, allowed)
     files: tuple[str, ...] = ()
     if loop_file is not None:
-        write_net(loop_file, report.closed.net)
-        files = (loop_file,)
+        files = write_net(loop_file, report.closed.net)
     if evidence_dir is not None:
         loops = {"loop": report.asked, "loop.failing": faults.for_good, "loop.repaired": faults.repaired}
         files += write_folder(evidence_dir, _documents(loaded.net.name, loops, allowed))

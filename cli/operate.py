@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
+from firable.cli.choice import OneOf
+
 if TYPE_CHECKING:
     from firable.executor import Host
     from firable.executor.operating.control import Page
@@ -107,7 +109,7 @@ def serve_options(command: F) -> F:
 
 @click.command(short_help="Act on a run from elsewhere: situation, pause, resume, step, stop, reset.")
 @click.argument("address", metavar="ADDRESS")
-@click.argument("command", type=click.Choice(_COMMANDS))
+@click.argument("command", type=OneOf(_COMMANDS))
 @click.argument("what", metavar="[PLACE=ANSWER]", required=False)
 @click.option("--token-file", metavar="FILE", help="The file with the token that the run was given or has made.")
 @click.option("--ca", metavar="FILE", help="The authority of the run's certificate, for https addresses.")

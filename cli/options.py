@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from firable.cli.choice import OneOf
 from firable.cli.report import Outcome, Report, document, exit_code_of, worst
 
 if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
     from firable.nets.diagnostics import Diagnostic
     from firable.nets.loading import Loaded
-    from firable.nets.net import Net
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -27,7 +27,7 @@ net_argument = click.argument("net", metavar="NET")
 format_option = click.option(
     "--format",
     "format_",
-    type=click.Choice(["text", "json"]),
+    type=OneOf(["text", "json"]),
     default="text",
     show_default=True,
     help="How to print the report; `firable schema report` prints the schema of the JSON.",
@@ -46,7 +46,7 @@ def formats_option(command: F) -> F:
     for option in (
         click.option(
             "--write",
-            type=(click.Choice(["json", "sarif", "junit"]), str),
+            type=(OneOf(["json", "sarif", "junit"]), str),
             multiple=True,
             metavar="FORMAT FILE",
             expose_value=False,
@@ -56,7 +56,7 @@ def formats_option(command: F) -> F:
         click.option(
             "--format",
             "format_",
-            type=click.Choice(["text", "json", "sarif", "junit", "github"]),
+            type=OneOf(["text", "json", "sarif", "junit", "github"]),
             default="text",
             show_default=True,
             help="How to print the report: as text, JSON (`firable schema report`), SARIF 2.1.0, JUnit, or text with "
@@ -215,37 +215,6 @@ def write_text(path: str, text: str) -> None:
         click.echo(text, nl=False)
     else:
         write_whole(path, text)
-
-
-SCHEMA_FILE = "net.schema.json"
-
-
-def write_net(path: str, net: Net) -> None:
-    """Write a net file, as `write_text` does."""
-    write_text(path, net_text(path, net))
-
-
-def net_text(path: str | Path, net: Net) -> str:
-    """What a net file of this path holds; its first line names its JSON Schema where the project has one.
-
-    That is the nearest `net.schema.json` beside the file or above it, up to the folder that the command runs in. An
-    editor completes and checks a file by that line; where there is none, the line would name nothing.
-    """
-    from firable.nets.printing import format_net
-
-    found = None if path == "-" else _schema_above(Path(path).absolute())
-    first = "" if found is None else f"# yaml-language-server: $schema={found}\n"
-    return first + format_net(net)
-
-
-def _schema_above(file: Path) -> str | None:
-    here = Path.cwd()
-    for steps, folder in enumerate(file.parents):
-        if (folder / SCHEMA_FILE).is_file():
-            return "../" * steps + SCHEMA_FILE
-        if not folder.is_relative_to(here) or folder == here:
-            break
-    return None
 
 
 def write_folder(folder: str, files: Mapping[str, str | bytes]) -> tuple[str, ...]:

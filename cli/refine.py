@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli import text
+from firable.cli.net_files import SCHEMA_FILE, demand_a_file, write_net
 from firable.cli.options import (
     analysis_options,
     answer,
@@ -18,7 +19,6 @@ from firable.cli.options import (
     page_option,
     with_page,
     write_folder,
-    write_net,
 )
 from firable.cli.report import Report
 
@@ -89,8 +89,7 @@ def refine(
     violates a condition is refused, with a firing sequence in its own names. `firable bundle DETAILED --conceptual NET`
     puts all this into the bundle, for `firable verify` to show again.
     """
-    if output == "-":
-        raise click.UsageError("the net cannot go to standard output, where the report goes: name a file")
+    demand_a_file(output)
     most = budget(max_markings, max_memory, max_seconds)
     make = with_page(lambda: _report(net, files, output, cell, confirm, most, evidence_dir), page)
     return answer("refine", format_, make, _show)
@@ -134,7 +133,7 @@ def _report(
         verdicts, documents = refinement_evidence(blocks, report, verdicts, _limits(most), detailed=detailed)
         written = write_folder(evidence_dir, documents)
     if output is not None:
-        write_net(output, refinement.net)
+        written = (*write_net(output, refinement.net), *written)
     return Report(
         "refine",
         argument,
@@ -144,7 +143,7 @@ def _report(
         course=(*_told(refinement), f"of the detailed net alone, `firable check` decides: {not_carried()}"),
         notes=(*loaded.notes, *refinement.notes, *more),
         table=table,
-        files=written if output is None else (output, *written),
+        files=written,
     )
 
 
@@ -286,5 +285,7 @@ def _show(report: Report) -> None:
     for file in report.files:
         if file.endswith((".evidence.json", ".evidence.json.gz")):
             click.echo(f"  evidence: firable verify {file}")
+        elif file.endswith(SCHEMA_FILE):
+            click.echo(f"  written: {file}, by which editors complete and check it")
         else:
             click.echo(f"  the detailed net is in {file}")

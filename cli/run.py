@@ -12,6 +12,7 @@ from click.core import ParameterSource
 
 from firable.cli import text
 from firable.cli.bound_run import run_bound_of, show_bound
+from firable.cli.choice import OneOf
 from firable.cli.hosting import HostOptions, host_options, run_host_of, show_host
 from firable.cli.log import log_option, log_to, told_aside
 from firable.cli.operate import ServeOptions, serve_options
@@ -40,7 +41,7 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
 @click.option("--seed", type=int, default=0, show_default=True, help="The seed of the cell's delays.")
 @click.option(
     "--speed",
-    type=click.Choice(list(_SPEEDS)),
+    type=OneOf(list(_SPEEDS)),
     default="max",
     show_default=True,
     help="Times real time; max is virtual time, where a run is a function of bundle, plant and seed.",
@@ -57,7 +58,7 @@ _SPEEDS = {"max": None, "1": 1.0, "10": 10.0}
 )
 @click.option(
     "--watch",
-    type=click.Choice(["tell", "stop", "ignore"]),
+    type=OneOf(["tell", "stop", "ignore"]),
     default="tell",
     show_default=True,
     help="What to do when the machines do what their plant file excludes.",

@@ -8,9 +8,11 @@ from typing import Any
 
 import click
 
+from firable.cli.choice import OneOf
+
 
 @click.command(short_help="Print the JSON Schema of net, task, plant and layout files, or of what is printed.")
-@click.argument("kind", type=click.Choice(["net", "tasks", "plant", "layout", "report", "io"]))
+@click.argument("kind", type=OneOf(["net", "tasks", "plant", "layout", "report", "io"]))
 def schema(kind: str) -> int:
     """Print the JSON Schema of a net, task, plant or layout file, or of what --format json prints.
 
@@ -18,8 +20,13 @@ def schema(kind: str) -> int:
 
     Editors complete and check net files by it.
     """
-    click.echo(json.dumps(schema_of(kind), indent=2, ensure_ascii=False))
+    click.echo(schema_text(kind), nl=False)
     return 0
+
+
+def schema_text(kind: str) -> str:
+    """The JSON Schema of a kind of file or output, as it is printed and written."""
+    return json.dumps(schema_of(kind), indent=2, ensure_ascii=False) + "\n"
 
 
 def schema_of(kind: str) -> Any:

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from textwrap import indent
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from firable.cli import text
+from firable.cli.net_files import demand_a_file, write_net, write_nets
 from firable.cli.options import (
     answer,
     formats_option,
     load_net,
     net_argument,
-    net_text,
     page_option,
     with_page,
-    write_folder,
 )
 from firable.cli.report import Report
 from firable.cli.votes import Votes, votes_told
@@ -96,6 +94,7 @@ def split(
         raise click.UsageError("--suggest proposes owners, and --own and --rules give them: leave one out")
     if output is not None and not by_rule and suggest is None:
         raise click.UsageError("-o writes the net with new owners: give them by --own or --rules, or --suggest them")
+    demand_a_file(output)
     asked = _Asked(own, rules, suggest, slack, max_seconds)
     return answer("split", format_, with_page(lambda: _report(net, asked, output, subnet_dir), page), _show)
 
@@ -114,7 +113,6 @@ class _Asked:
 def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | None) -> Report:
     from firable.analysis.deadline import Deadline
     from firable.analysis.goal import Limits
-    from firable.cli.options import write_net
     from firable.decompose.splitting.cut import split as split_net
     from firable.decompose.splitting.persistence import persistence
 
@@ -123,10 +121,9 @@ def _report(argument: str, asked: _Asked, output: str | None, subnet_dir: str | 
         net, suggestion = _owned(loaded.net, asked, rules)
         decomposition = split_net(net)
     found = persistence(decomposition, limits=Limits(Deadline.after(asked.max_seconds)))
-    files = write_folder(subnet_dir, _subnets(decomposition, subnet_dir)) if subnet_dir is not None else ()
-    if output is not None:
-        write_net(output, net)
-        files = (output, *files)
+    files = () if output is None else write_net(output, net)
+    if subnet_dir is not None:
+        files += write_nets(subnet_dir, _subnets(decomposition))
     split_json = _split_json(found)
     if suggestion is not None:
         split_json["suggestion"] = suggestion.to_json()
@@ -165,11 +162,10 @@ def _owned(net: Net, asked: _Asked, rules: dict[str, list[str]]) -> tuple[Net, S
     return (owned_by_rules(net, rules) if rules else net), None
 
 
-def _subnets(decomposition: Decomposition, folder: str) -> dict[str, str]:
+def _subnets(decomposition: Decomposition) -> dict[str, Net]:
     from firable.nets.bundle import file_stem
 
-    named = ((f"{file_stem(subnet.name)}.firable.yaml", subnet) for subnet in decomposition.subnets)
-    return {name: net_text(Path(folder, name), subnet) for name, subnet in named}
+    return {f"{file_stem(subnet.name)}.firable.yaml": subnet for subnet in decomposition.subnets}
 
 
 def _split_json(found: Persistence) -> dict[str, Any]:

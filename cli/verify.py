@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from firable.cli.choice import OneOf
 from firable.cli.options import answer_all, formats_option, load_net, refuse_a_net, write_folder
 from firable.cli.progress import stages
 from firable.cli.report import Report
@@ -32,7 +33,7 @@ _CLAIM_MAX = 100  # characters told of one claim
 @click.option("--net", "of", metavar="NET", help="Refuse evidence on any other net than this one.")
 @click.option(
     "--solver",
-    type=click.Choice(["cvc5", "z3"]),
+    type=OneOf(["cvc5", "z3"]),
     default="cvc5",
     show_default=True,
     help="Which solver answers the obligations of a bundle, which z3 has proved.",

@@ -85,7 +85,7 @@ CODES: Final[dict[str, str]] = {
     "F3001": "a machine is started that no command ever stops",
     "F3002": "an output signal on a place marked in M0",
     "F3003": "conflicting commands to one machine",
-    "F3004": "the budget is used up",
+    "F3004": "not decided",
     "F3005": "a completion signal awaited by two commands at once",
     "F3006": "a method that does not know the discipline",
     "F3007": "a firing with too many outcomes",

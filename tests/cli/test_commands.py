@@ -337,27 +337,61 @@ def test_every_command_is_loaded_by_its_name(capsys: pytest.CaptureFixture[str])
 def test_a_net_file_that_is_written_names_the_schema_of_its_project(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "net.schema.json").touch()
+    (tmp_path / "net.schema.json").touch()  # above the project, so not the project's
     project = tmp_path / "project"
     (project / "cells").mkdir(parents=True)
     monkeypatch.chdir(project)
-    lines = []
-    for schema in (None, "net.schema.json", "cells/net.schema.json"):
-        if schema is not None:
-            assert main(["schema", "net"]) == 0
-            (project / schema).write_text(capsys.readouterr().out, "utf-8")
-        assert main(["convert", "catalogue:one_robot", "-o", "cells/cell.firable.yaml"]) == 0
-        lines.append((project / "cells/cell.firable.yaml").read_text("utf-8").splitlines()[0])
-    assert main(["refine", "catalogue:conceptual_one_robot", "-o", "refined.firable.yaml"]) == 0
-    lines.append((project / "refined.firable.yaml").read_text("utf-8").splitlines()[0])
-    assert main(["split", "catalogue:one_robot", "--subnets", "parts/one"]) == 0
-    lines.append((project / "parts/one/robot.firable.yaml").read_text("utf-8").splitlines()[0])
-    named = "# yaml-language-server: $schema="
-    assert lines == [
-        "firable: 1",  # the schema above the project is not the project's
-        f"{named}../net.schema.json",
-        f"{named}net.schema.json",
-        f"{named}net.schema.json",
-        f"{named}../../net.schema.json",
-    ]
-    assert main(["check", "cells/cell.firable.yaml"]) == 0
+    assert main(["schema", "net"]) == 0
+    schema = capsys.readouterr().out
+
+    def first_line(file: str, *arguments: str) -> str:
+        assert main(list(arguments)) == 0
+        line, named = (project / file).read_text("utf-8").splitlines()[0].split("=")
+        assert line == "# yaml-language-server: $schema"
+        assert (project / file).parent.joinpath(named).read_text("utf-8") == schema
+        return named
+
+    convert = ("convert", "catalogue:one_robot", "-o", "cells/cell.firable.yaml")
+    refine = ("refine", "catalogue:conceptual_one_robot", "-o", "refined.firable.yaml", "--format", "json")
+    split = ("split", "catalogue:one_robot", "--subnets", "parts/one", "--format", "json")
+    written = "written: cells/net.schema.json, by which editors complete and check cells/cell.firable.yaml\n"
+    assert first_line("cells/cell.firable.yaml", *convert) == "net.schema.json"
+    assert capsys.readouterr().out == written
+    (project / "cells/net.schema.json").unlink()
+    assert first_line("refined.firable.yaml", *refine) == "net.schema.json"
+    assert json.loads(capsys.readouterr().out)["reports"][0]["files"] == ["refined.firable.yaml", "net.schema.json"]
+    assert first_line("cells/cell.firable.yaml", *convert) == "../net.schema.json"
+    assert capsys.readouterr().out == ""
+    assert first_line("parts/one/robot.firable.yaml", *split) == "../../net.schema.json"
+    (project / "net.schema.json").unlink()
+    capsys.readouterr()
+    assert first_line("parts/one/mc.firable.yaml", *split) == "net.schema.json"
+    files = json.loads(capsys.readouterr().out)["reports"][0]["files"]
+    assert files.count("parts/one/net.schema.json") == 1
+    assert len(files) == 5
+    with (project / "parts/one/net.schema.json").open("a") as stream:
+        stream.write("\n")  # the project's own, whatever it holds, is left alone
+    schema += "\n"
+    assert first_line("parts/one/robot.firable.yaml", *split) == "net.schema.json"
+
+
+def test_what_cannot_be_written_leaves_no_schema_behind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "taken.firable.yaml").mkdir()
+    assert main(["convert", "catalogue:one_robot", "-o", str(tmp_path / "taken.firable.yaml")]) == 2
+    assert "taken.firable.yaml: cannot be written: this is a directory" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["taken.firable.yaml"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["refine", "catalogue:conceptual_one_robot", "-o", "-"],
+        ["split", "catalogue:one_robot", "--suggest", "2", "-o", "-"],
+        ["check", "catalogue:one_robot", "--machines", "catalogue:one_robot", "--loop-net", "-"],
+    ],
+)
+def test_a_net_never_goes_amid_the_report(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "the net cannot go to standard output, where the report goes: name a file" in printed.err

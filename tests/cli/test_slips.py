@@ -115,6 +115,9 @@ def test_the_name_that_was_probably_meant_is_told(wrong: Callable[[], object], m
             ["io", str(catalogue_path("one_robot").with_name("one_robot.bind.yaml")), "--force", "robot.tuch=1"],
             "robot.touch",
         ),
+        (["check", "catalogue:one_robot", "--format", "jso"], "json"),
+        (["check", "catalogue:one_robot", "--write", "jnit", "report.xml"], "junit"),
+        (["schema", "nets"], "net"),
     ],
 )
 def test_a_slip_on_the_command_line_is_told_too(
