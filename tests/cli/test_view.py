@@ -44,6 +44,15 @@ def tokens(page: Page) -> set[str]:
     return {str(name).removeprefix("place:") for name in ids}
 
 
+def is_in_sight(page: Page, transition: str) -> bool:
+    room = page.locator(".picture").bounding_box()
+    bar = page.locator(f'[id="transition:{transition}"] rect.hit').first.bounding_box()
+    assert room is not None
+    assert bar is not None
+    below, right = bar["y"] - room["y"], bar["x"] - room["x"]
+    return 0 <= below <= room["height"] - bar["height"] and 0 <= right <= room["width"] - bar["width"]
+
+
 def asked(address: str, path: str, body: object = None, token: str | None = None) -> tuple[int, Any]:
     base, _, own = address.partition("#token=")
     data = None if body is None else json.dumps(body).encode()
@@ -154,6 +163,10 @@ def test_a_counterexample_is_played_with_a_slider(chromium: Browser, late: str) 
         page.keyboard.press("ArrowRight")
         expect(slider).to_have_attribute("aria-valuetext", "1 of 15: G1 fires, start of carrying in.")
         assert "system.carrying_in" in tokens(page)
+        page.locator(".picture").evaluate("one => one.scrollTo(0, one.scrollHeight)")
+        assert not is_in_sight(page, "G2")
+        page.keyboard.press("ArrowRight")
+        assert is_in_sight(page, "G2")
         page.keyboard.press("End")
         expect(page.locator(".playback")).to_contain_text("A deadlock: nothing can fire any more.")
         expect(page.locator(".playback .circle li")).to_have_text(
@@ -172,6 +185,20 @@ def test_a_counterexample_is_played_with_a_slider(chromium: Browser, late: str) 
         expect(page.locator(".own .circle li").first).to_contain_text("waits in G4 for mc.free")
         page.get_by_role("button", name="Undo").click()
         assert "robot.free" in tokens(page)
+
+
+@needs_browser
+def test_what_fires_is_in_sight(chromium: Browser, late: str) -> None:
+    with page_at(chromium, late, viewport={"width": 500, "height": 400}) as page:
+        page.get_by_role("switch", name="Gates free").click()
+        for name in ("G1", "G2", "t1-a", "G3", "t1-b", "G4", "G5", "t2-a", "t2-b", "G6", "t1-c", "G7"):
+            page.locator(f'[data-transition="{name}"]').click()
+        expect(page.locator('[data-transition="t1-d"]')).to_be_visible()
+        page.locator(".picture").evaluate("one => one.scrollTo(0, 0)")
+        assert not is_in_sight(page, "t1-d")
+        page.locator('[data-transition="t1-d"]').click()
+        expect(page.locator("#said")).to_contain_text("t1-d has fired")
+        assert is_in_sight(page, "t1-d")
 
 
 @needs_browser

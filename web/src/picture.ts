@@ -276,7 +276,17 @@ export class Picture {
     for (const name of fired) this.flights.fly(this.bars.get(name) ?? [], this.arcs.get(name) ?? []);
   }
 
-  // How large it is shown
+  // How large it is shown, and what of it
+
+  /** Scroll to what has fired, if nothing of it is in sight. */
+  reveal(fired: Iterable<string>): void {
+    const room = this.element.getBoundingClientRect();
+    const bars = [...fired].flatMap((name) => this.bars.get(name) ?? []).map((bar) => bar.getBoundingClientRect());
+    const inSight = (bar: DOMRect): boolean => bar.top >= room.top && bar.bottom <= room.bottom && bar.right > room.left && bar.left < room.right;
+    if (bars.length === 0 || bars.some(inSight)) return;
+    const { x, y, width, height } = bars[0]!;
+    this.element.scrollBy(x + width / 2 - (room.x + room.width / 2), y + height / 2 - (room.y + room.height / 2));
+  }
 
   /** As large as fits the width, but readable. */
   fit(): void {

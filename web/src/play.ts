@@ -155,6 +155,7 @@ export class Play {
         return;
       }
       const after = await ask<Fired>("api/fire", { ...this.at(this.now), transition: name });
+      this.picture.reveal([name]);
       this.picture.fly([name]);
       const says = this.words.get(name);
       this.add(`${name} fires${says ? `: ${says}` : ""}`, after);
@@ -409,7 +410,7 @@ export class Play {
     this.playback = null;
     this.frame.below.replaceChildren();
     document.body.classList.remove("playing");
-    this.gatesSwitch.disabled = false;
+    for (const button of this.frame.tools.querySelectorAll("button")) button.disabled = false; // show() knows of the others
     if (here !== null) this.add("where the run was left", here);
     else this.show();
     this.mayFire.querySelector<HTMLElement>("button")?.focus();

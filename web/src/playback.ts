@@ -81,6 +81,7 @@ export class Playback {
     const { frames } = this.run;
     const to = Math.min(frames.length - 1, Math.max(0, index));
     const frame = frames[to]!;
+    if (frame.fired) this.picture.reveal(frame.fired);
     if (to === this.at + 1 && frame.fired && !calm()) this.picture.fly(frame.fired);
     this.at = to;
     this.slider.value = String(to);
