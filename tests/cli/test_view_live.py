@@ -122,6 +122,8 @@ def test_a_lost_connection_is_told_and_what_is_shown_is_marked_as_old(chromium: 
         page_at(chromium, address) as page,
     ):
         state(page, "waiting")
+        page.get_by_role("button", name="Emergency stop").click()
+        expect(page.locator(".banner")).to_contain_text("emergency stop: by token")
         process.send_signal(signal.SIGSTOP)  # the host hangs: its sockets stay open, and nothing comes
         expect(page.get_by_role("alert")).to_contain_text("The connection is lost since")
         expect(page.get_by_role("button", name="Emergency stop")).to_be_disabled()
@@ -129,6 +131,7 @@ def test_a_lost_connection_is_told_and_what_is_shown_is_marked_as_old(chromium: 
         process.send_signal(signal.SIGCONT)
         expect(page.locator("body")).not_to_contain_class("old")
         expect(page.get_by_role("button", name="Emergency stop")).to_be_enabled()
+        expect(page.locator(".banner")).to_contain_text("emergency stop: by token")
 
 
 @needs_browser

@@ -173,6 +173,7 @@ export class Live {
       this.lost = false;
       document.body.classList.remove("old");
       this.frame.banner.replaceChildren();
+      this.said = ""; // what the run has to say is said again, in place of what was said of the connection
       announce("The connection is back.");
     }
     this.pace = this.pace * Math.exp((this.shownAt - this.heard) / 1000) + now.fired.length;
