@@ -22,4 +22,5 @@ class OneOf(_Choice):
         except click.BadParameter as error:
             from firable.nets.diagnostics import did_you_mean
 
-            self.fail(f"{error.message} {did_you_mean(str(value), self.choices)}".rstrip(), param, ctx)
+            near = did_you_mean(str(value), self.choices).rstrip()
+            self.fail(f"{error.message.removesuffix('.')}; {near}" if near else error.message, param, ctx)

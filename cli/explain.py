@@ -30,7 +30,8 @@ def explain(code: str) -> int:
     wanted = re.sub(r"[\[\]]|^(error|warning)", "", code.strip()).upper()
     wanted = wanted if wanted.startswith("F") else f"F{wanted}"
     if wanted not in CODES:
-        raise click.UsageError(f"'{code}' is no code of firable. {did_you_mean(wanted, list(CODES))}".rstrip())
+        near = did_you_mean(wanted, list(CODES)).rstrip()
+        raise click.UsageError(f"'{code}' is no code of firable{f'; {near}' if near else '.'}")
     for line in page_of(wanted).removesuffix("\n").splitlines():
         if not line.startswith("```"):
             click.echo(click.style(line.removeprefix("# "), bold=True) if line.startswith("# ") else line)

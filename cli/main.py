@@ -91,7 +91,8 @@ class _Commands(click.Group):
         if args[0] not in COMMANDS and not args[0].startswith("-"):
             from firable.nets.diagnostics import did_you_mean
 
-            ctx.fail(f"No such command '{args[0]}'. {did_you_mean(args[0], list(COMMANDS))}".rstrip())
+            near = did_you_mean(args[0], list(COMMANDS)).rstrip()
+            ctx.fail(f"No such command '{args[0]}'{f'; {near}' if near else '.'}")
         return super().resolve_command(ctx, args)
 
 

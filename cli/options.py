@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,8 +21,9 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 CATALOGUE = "catalogue:"
-NET_FILE = ".firable.yaml"
+NET_FILES = (".firable.yaml", ".firable.yml")
 _MEBIBYTE = 2**20
+_NO_NETS = "name a file, or a folder with files *.firable.yaml in it or below"
 
 net_argument = click.argument("net", metavar="NET")
 format_option = click.option(
@@ -130,9 +132,12 @@ def load_net(argument: str) -> Loaded:
     holds. Raises `InputError` as the readers do.
     """
     from firable.nets.catalogue import catalogue_names, family_net
+    from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.loading import Loaded, load
 
     if not argument.startswith(CATALOGUE):
+        if _is_folder(Path(argument)) and not _nets_below(Path(argument)):
+            raise InputError([Diagnostic("F1001", f"no net file is in {argument}", _NO_NETS)])
         return load(argument)
     name = argument.removeprefix(CATALOGUE)
     if name in catalogue_names():
@@ -150,17 +155,23 @@ def load_net(argument: str) -> Loaded:
 def net_files(arguments: Sequence[str]) -> tuple[str, ...]:
     """The arguments, with every folder replaced by the net files below it, in the order of their names.
 
-    Folders whose names begin with a dot are left out. A folder without a net file stays, for its reader to refuse.
+    A folder without a net file stays, for `load_net` to refuse.
     """
     found: list[str] = []
     for argument in arguments:
-        folder = Path(argument)
-        below = (
-            sorted(folder.rglob(f"*{NET_FILE}")) if not argument.startswith(CATALOGUE) and _is_folder(folder) else []
-        )
-        shown = [path for path in below if not _is_hidden(path.relative_to(folder)) and path.is_file()]
-        found += map(str, shown) if shown else [argument]
+        below = [] if argument.startswith(CATALOGUE) or not _is_folder(Path(argument)) else _nets_below(Path(argument))
+        found += map(str, sorted(below)) if below else [argument]
     return tuple(found)
+
+
+def _nets_below(folder: Path) -> list[Path]:
+    """The net files of a project: none in hidden folders, nor in what is installed there, which has a catalogue."""
+    found = []
+    for here, folders, files in os.walk(folder):
+        folders[:] = [one for one in folders if not one.startswith(".") and not Path(here, one, "pyvenv.cfg").exists()]
+        paths = (Path(here, one) for one in files if one.endswith(NET_FILES))
+        found += [path for path in paths if path.is_file()]
+    return found
 
 
 def _is_folder(path: Path) -> bool:
@@ -168,10 +179,6 @@ def _is_folder(path: Path) -> bool:
         return path.is_dir()
     except OSError:  # a name that no file can have
         return False
-
-
-def _is_hidden(path: Path) -> bool:
-    return any(part.startswith(".") for part in path.parts[:-1])
 
 
 def catalogue_file(argument: str, kind: str) -> Path:

@@ -99,8 +99,8 @@ def net_picture(
         if unknown := [name for name in names if name not in net.place_index]:
             from firable.nets.diagnostics import did_you_mean
 
-            hint = did_you_mean(unknown[0], list(net.place_index))
-            raise click.UsageError(f"the net has no place '{unknown[0]}'. {hint}".strip())
+            near = did_you_mean(unknown[0], list(net.place_index)).rstrip()
+            raise click.UsageError(f"the net has no place '{unknown[0]}'{f'; {near}' if near else ''}")
         shown = net.marking(names)
     return draw(marking=shown)
 
@@ -111,8 +111,8 @@ def refuse_unknown(net: Net, collapse: tuple[str, ...]) -> None:
     if unknown := [name for name in collapse if name not in names]:
         from firable.nets.diagnostics import did_you_mean
 
-        hint = did_you_mean(unknown[0], sorted(names))
-        raise click.UsageError(f"the net has no place and no controller '{unknown[0]}'. {hint}".strip())
+        near = did_you_mean(unknown[0], sorted(names)).rstrip()
+        raise click.UsageError(f"the net has no place and no controller '{unknown[0]}'{f'; {near}' if near else ''}")
 
 
 def _layouter(name: str) -> Layouter:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from firable.cli.loop import read_machines
-from firable.cli.options import CATALOGUE, NET_FILE, catalogue_file, load_net, net_argument
+from firable.cli.options import CATALOGUE, NET_FILES, catalogue_file, load_net, net_argument
 
 if TYPE_CHECKING:
     from firable.cli.view.editing import Editing
@@ -101,8 +101,8 @@ def _plant(loaded: Loaded, net: str, plant: str | None) -> PlantModel | str:
     name = loaded.net.name.replace("-", "_")
     if net.startswith(CATALOGUE):
         name = net.removeprefix(CATALOGUE)
-    elif net.endswith(NET_FILE):
-        beside = Path(net.removesuffix(NET_FILE) + ".plant.yaml")
+    elif net.endswith(NET_FILES):
+        beside = Path(net.rpartition(".firable.")[0] + ".plant.yaml")
         if beside.is_file():
             return read_machines(str(beside))
     is_shipped = net.startswith(CATALOGUE) or loaded.decomposition is not None

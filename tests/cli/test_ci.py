@@ -1,5 +1,6 @@
 """Nets in a project's CI: the workflows of `ci init`, folders of nets, the pre-commit hook, the pytest plugin."""
 
+import json
 import shlex
 import subprocess
 import sys
@@ -75,6 +76,7 @@ def test_the_check_of_the_workflow_passes_and_fails_as_the_nets_do(
     told = capsys.readouterr().out
     assert "::error" not in told
     assert told.index("cells/late/late.firable.yaml") < told.index("cells/safe.firable.yaml")
+    assert next(step for step in steps if "upload-sarif" in step.get("uses", ""))["continue-on-error"] is True
     uploaded = [step["with"] for step in steps if "with" in step and {"sarif_file", "path"} & set(step["with"])]
     wanted = {uploaded[0]["sarif_file"], *uploaded[1]["path"].split()}
     assert {path.name for path in project.iterdir() if path.is_file()} == wanted
@@ -101,7 +103,25 @@ def test_a_requirement_cannot_leave_its_quotes(project: Path) -> None:
 def test_a_folder_without_nets_is_refused(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (project / "empty").mkdir()
     assert main(["check", "empty"]) == 2
-    assert "empty:1:1: error[F1001]: this is a directory" in capsys.readouterr().err
+    assert "error[F1001]: no net file is in empty\n" in capsys.readouterr().err
+    assert main(["draw", "cells"]) == 2
+    assert "cells:1:1: error[F1001]: this is a directory\n  hint: name a file in it" in capsys.readouterr().err
+
+
+def test_all_nets_of_a_project_are_checked_and_none_that_is_installed_there(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (project / "cells/short.firable.yml").write_text(SAFE, "utf-8")
+    (project / "env/lib").mkdir(parents=True)
+    (project / "env/pyvenv.cfg").touch()
+    (project / "env/lib/broken.firable.yaml").write_text("firable: 2\n", "utf-8")
+    assert main(["check", ".", "--format", "json"]) == 0
+    reports = json.loads(capsys.readouterr().out)["reports"]
+    assert [one["input"] for one in reports] == [
+        "cells/late/late.firable.yaml",
+        "cells/safe.firable.yaml",
+        "cells/short.firable.yml",
+    ]
 
 
 def test_the_pre_commit_hook_is_one_and_brings_what_checking_needs() -> None:

@@ -103,4 +103,4 @@ def test_explain_prints_the_page(asked: str, capsys: pytest.CaptureFixture[str])
 
 def test_an_unknown_code_is_refused_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", "F301"]) == 2
-    assert "'F301' is no code of firable. did you mean 'F30" in capsys.readouterr().err
+    assert "'F301' is no code of firable; did you mean 'F30" in capsys.readouterr().err

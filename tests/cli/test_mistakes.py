@@ -105,7 +105,7 @@ def test_what_is_no_net_file_is_refused_at_once(tmp_path: Path, capsys: pytest.C
     ("arguments", "words"),
     [
         ([], "Usage:"),
-        (["chekc"], "No such command 'chekc'. did you mean 'check'?"),
+        (["chekc"], "No such command 'chekc'; did you mean 'check'?"),
         (["check"], "Missing argument"),
         (["check", "--disciplin", "step", "x"], "No such option"),
         (["check", "--discipline", "steps", "x"], "is not one of"),

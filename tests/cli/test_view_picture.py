@@ -114,7 +114,7 @@ def test_a_layout_or_task_that_is_none_is_refused_before_anything_is_served(
     net = tmp_path / "cell.firable.yaml"
     net.write_text(BELT)
     assert main(["view", str(net), "--collapse", "robto", "--no-browser"]) == 2
-    assert "no place and no controller 'robto'. did you mean 'robot'" in capsys.readouterr().err
+    assert "no place and no controller 'robto'; did you mean 'robot'" in capsys.readouterr().err
     (tmp_path / "cell.layout.yaml").write_text("lanes: 3\n")
     assert main(["view", str(net), "--no-browser"]) == 2
     assert "error[F1021]" in capsys.readouterr().err
