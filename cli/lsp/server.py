@@ -3,15 +3,19 @@
 What it tells is what the other commands tell: the diagnostics of the reader as one types, and the verdicts of `firable
 check` that matter, for a moment's budget, when a file is opened or saved; a change that cures a violated one is offered
 as a code action. Names are found in the text as it stands, so going to a definition works in a net that is not well
-formed yet; hovering needs the net, and takes the last one that was. A rename or a cure is offered only where the text
-after it is a net again.
+formed yet; hovering needs the net, and takes the last one that was, and where a bracket is not closed yet, the names
+that are offered are those of the last text that was YAML. A rename or a cure is offered only where the text after it is
+a net again, and changes no line but its own.
 """
 
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import SequenceMatcher
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 from urllib.parse import unquote, urlparse
@@ -57,15 +61,22 @@ _ITEMS: Final = {
     Kind.TRANSITION: lsp.CompletionItemKind.Method,
 }
 
+_TYPED: Final = re.compile(r"[\w.-]*$")
+_NOTHING: Final = re.compile("^")
+"""What stands of a name before the cursor, and after it nothing."""
+
 _Told = tuple[lsp.Diagnostic, tuple[Cure, ...]]
 """What is told of a verdict, and the changes that cure it."""
 
 
 @dataclass
 class _Opened:
-    """A file in the editor: its last text that was a net, and what cures the verdicts on the text that was checked."""
+    """A file in the editor: its last text that was a net, the names of the last one that was YAML, and what cures the
+    verdicts on the text that was checked.
+    """
 
     net: Net | None = None
+    names: Names | None = None
     checked: str = ""
     cures: list[tuple[lsp.Diagnostic, Cure]] = field(default_factory=list)
 
@@ -121,6 +132,7 @@ class NetServer(LanguageServer):
         """Read a file as it stands; what refuses it, or nothing, and then it is the net that is hovered over."""
         opened = self.opened.setdefault(uri, _Opened())
         source = self.source(uri)
+        opened.names = self.names(uri) or opened.names
         try:
             opened.net = parse_positioned(source.text, source.file)[0]
         except InputError as error:
@@ -150,10 +162,15 @@ class NetServer(LanguageServer):
             told.append((lsp.Diagnostic(at, words, severity, rule_of(verdict), source="firable check"), verdict.cures))
         return told
 
-    def whole(self, uri: str, text: str) -> lsp.WorkspaceEdit:
-        """Another text in the place of all that stands in a file."""
-        end = lsp.Position(len(self.workspace.get_text_document(uri).lines) + 1, 0)
-        return lsp.WorkspaceEdit(changes={uri: [lsp.TextEdit(lsp.Range(lsp.Position(0, 0), end), text)]})
+    def edit(self, uri: str, text: str) -> lsp.WorkspaceEdit:
+        """Another text in a file, by the lines that are others: the cursor and what is folded stay as they were."""
+        old, new = _lines(self.source(uri).text), _lines(text)
+        changes = [
+            lsp.TextEdit(lsp.Range(lsp.Position(begin, 0), lsp.Position(end, 0)), "".join(new[start:stop]))
+            for what, begin, end, start, stop in SequenceMatcher(None, old, new, autojunk=False).get_opcodes()
+            if what != "equal"
+        ]
+        return lsp.WorkspaceEdit(changes={uri: changes})
 
     def with_layout(self, edit: lsp.WorkspaceEdit, uri: str, names: Mapping[str, str]) -> lsp.WorkspaceEdit:
         """An edit of a net file, with the new names in the layout file beside it where there is one that is YAML."""
@@ -166,8 +183,13 @@ class NetServer(LanguageServer):
             text = renamed_layout(source, names)
         except InputError:
             return edit
-        more = self.whole(there, text).changes or {} if text != source.text else {}
+        more = self.edit(there, text).changes or {} if text != source.text else {}
         return lsp.WorkspaceEdit(changes={**edit.changes, **more})
+
+
+def _lines(text: str) -> list[str]:
+    """The lines of the protocol, with their ends; `str.splitlines` knows more ends than it does."""
+    return StringIO(text, newline="").readlines()
 
 
 server = NetServer()
@@ -292,7 +314,7 @@ def rename(params: lsp.RenameParams) -> lsp.WorkspaceEdit | None:
         parse_positioned(text, source.file)
     except InputError as error:
         raise JsonRpcInvalidParams(error.diagnostics[0].message) from None
-    return server.with_layout(server.whole(uri, text), uri, names)
+    return server.with_layout(server.edit(uri, text), uri, names)
 
 
 @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions([lsp.CodeActionKind.QuickFix]))
@@ -317,17 +339,28 @@ def cures(params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
         except InputError:
             continue  # it is told in words; where it would stand in the text is no form that is edited by itself
         title = "; and ".join(cure.changes)
-        found[cure.changes] = lsp.CodeAction(title, lsp.CodeActionKind.QuickFix, [told], edit=server.whole(uri, text))
+        found[cure.changes] = lsp.CodeAction(title, lsp.CodeActionKind.QuickFix, [told], edit=server.edit(uri, text))
     return list(found.values())
 
 
-@server.feature(lsp.TEXT_DOCUMENT_COMPLETION)
+@server.feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=["."]))
 def completion(params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
-    """Offer the names of the net; keys are offered by what knows the JSON Schema."""
-    names = server.names(params.text_document.uri)
+    """Offer the names of the net for what is typed of one; keys are offered by what knows the JSON Schema."""
+    uri = params.text_document.uri
+    opened, document = server.opened.get(uri), server.workspace.get_text_document(uri)
+    names = opened.names if opened else None
     defined = {one.name: one for one in names.occurrences if one.defines} if names else {}
+    typed = document.word_at_position(params.position, re_start_word=_TYPED, re_end_word=_NOTHING)
+    units = document.position_codec.client_num_units(typed)
+    start = lsp.Position(params.position.line, params.position.character - units)
+    # By itself an editor would take the dot for the end of a word, and write the controller twice.
     return [
-        lsp.CompletionItem(name, kind=_ITEMS[one.kind], detail=one.kind.value)
+        lsp.CompletionItem(
+            name,
+            kind=_ITEMS[one.kind],
+            detail=one.kind.value,
+            text_edit=lsp.TextEdit(lsp.Range(start, params.position), name),
+        )
         for name, one in defined.items()
         if one.kind in _ITEMS
     ]

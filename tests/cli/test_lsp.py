@@ -2,7 +2,7 @@
 
 import asyncio
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -55,6 +55,24 @@ class Editor:
         return lsp.TextDocumentPositionParams(
             self.document, lsp.Position(line, offset - text.rfind("\n", 0, offset) - 1)
         )
+
+
+def applied(text: str, edits: Sequence[Any]) -> str:
+    """A text after edits of the protocol."""
+    starts = [0, *(place + 1 for place, sign in enumerate(text) if sign == "\n"), len(text)]
+
+    def offset(at: lsp.Position) -> int:
+        return min(starts[min(at.line, len(starts) - 1)] + at.character, len(text))
+
+    for edit in sorted(edits, key=lambda edit: offset(edit.range.start), reverse=True):
+        text = text[: offset(edit.range.start)] + edit.new_text + text[offset(edit.range.end) :]
+    return text
+
+
+def on_line(range_: lsp.Range, line: int) -> lsp.Range:
+    """The same part of another line."""
+    start, end = range_.start.character, range_.end.character
+    return lsp.Range(lsp.Position(line, start), lsp.Position(line, end))
 
 
 @asynccontextmanager
@@ -146,15 +164,16 @@ def test_a_rename_changes_the_text_or_says_why_not(tmp_path: Path) -> None:
         edit = await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "take"))
         assert edit is not None
         assert edit.changes is not None
-        (change,) = edit.changes[one.uri]
-        assert change.new_text == LATE.replace("grasp_cv1", "take")
+        assert applied(LATE, edit.changes[one.uri]) == LATE.replace("grasp_cv1", "take")
+        own = sum(each.range.end.line - each.range.start.line for each in edit.changes[one.uri])
+        assert own == sum("grasp_cv1" in line for line in LATE.splitlines()), "no other line is written anew"
         beside = tmp_path / "cell.layout.yaml"
         beside.write_text("firable_layout: 1\nrows: [[G3]]   # kept\nlanes: [{tracks: [[robot.grasp_cv1]]}]\n")
         edit = await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "take"))
         assert edit is not None
         assert edit.changes is not None
-        (change,) = edit.changes[beside.as_uri()]
-        assert change.new_text == beside.read_text().replace("grasp_cv1", "take")
+        layout = beside.read_text()
+        assert applied(layout, edit.changes[beside.as_uri()]) == layout.replace("grasp_cv1", "take")
         with pytest.raises(JsonRpcException, match=r"there is a 'robot\.free' already"):
             await one.client.text_document_rename_async(lsp.RenameParams(one.document, here, "free"))
         with pytest.raises(JsonRpcException, match="'on' is text for some YAML parsers"):
@@ -179,12 +198,12 @@ def test_a_cure_is_offered_as_an_action_while_the_text_is_the_checked_one(tmp_pa
         assert gate.kind == lsp.CodeActionKind.QuickFix
         assert [each.code for each in gate.diagnostics] == ["F3011"]
         assert "`system.capacity`" in capacity.title
-        (change,) = gate.edit.changes[one.uri]
-        lines, after = LATE.splitlines(), change.new_text.splitlines()
+        cured = applied(LATE, gate.edit.changes[one.uri])
+        lines, after = LATE.splitlines(), cured.splitlines()
         (added,) = (line for line in after if line not in lines)
         assert added.strip() == "unless: system.processing"
         assert not await actions(one, 0)
-        one.change(change.new_text)
+        one.change(cured)
         assert not await actions(one, deadlock.range.start.line)
         one.save()
         assert "F3011" not in {each.code for each in await one.told(bool)}
@@ -197,6 +216,26 @@ def test_what_the_file_expects_of_no_verdict_is_told_at_its_place(tmp_path: Path
         one.open(LATE + "expect: {deadlock-fre: violated}\n")
         (wrong,) = await one.told(bool)
         assert "deadlock-fre" in wrong.message
+
+    within(tmp_path / "cell.firable.yaml", act)
+
+
+def test_names_are_offered_while_a_bracket_is_open_and_take_the_place_of_what_is_typed(tmp_path: Path) -> None:
+    async def act(one: Editor) -> None:
+        one.open(LATE)
+        await one.told(bool)
+        begin, typed = "  t3-a: {from: [mc.free, ", "robot.fr"
+        line = LATE[: LATE.index("\narbiters:")].count("\n")
+        lines = LATE.splitlines()
+        one.change("\n".join([*lines[:line], begin + typed, *lines[line:]]))
+        here = lsp.CompletionParams(one.document, lsp.Position(line, len(begin + typed)))
+        items = await one.client.text_document_completion_async(here)
+        assert isinstance(items, list)
+        (free,) = (item for item in items if item.label == "robot.free")
+        assert isinstance(free.text_edit, lsp.TextEdit)
+        assert applied(begin + typed, [lsp.TextEdit(on_line(free.text_edit.range, 0), free.text_edit.new_text)]) == (
+            begin + "robot.free"
+        )
 
     within(tmp_path / "cell.firable.yaml", act)
 
