@@ -10,9 +10,10 @@ pytest loads this module in every project where firable is installed: until it m
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 
@@ -86,6 +87,29 @@ class NotAsItShouldBeError(AssertionError):
         self.verdict = verdict
 
 
+class _Headline(NamedTuple):
+    """What pytest calls the crash of a test: in CI its summary shows all of the message, so it is one line."""
+
+    message: str
+
+
+@dataclass(frozen=True)
+class _Story:
+    """The story of a verdict, in a form that pytest prints; its summary and JUnit's message have the first line."""
+
+    lines: tuple[str, ...]
+
+    @property
+    def reprcrash(self) -> _Headline:
+        return _Headline(self.lines[0])
+
+    def toterminal(self, writer: Any) -> None:
+        writer.line(str(self))
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines)
+
+
 class NetTest(pytest.Item):
     """One verdict on a net."""
 
@@ -108,8 +132,7 @@ class NetTest(pytest.Item):
 
         match excinfo.value:
             case NotAsItShouldBeError(verdict=verdict):
-                lines = (click.unstyle(verdict_line(verdict)).strip(), *reasons(self.parent.loaded.net, verdict))
-                return "\n".join(lines)
+                return _Story((click.unstyle(verdict_line(verdict)).strip(), *reasons(self.parent.loaded.net, verdict)))
             case InputError() as error:
                 return str(error)
             case ModuleNotFoundError(name=name):

@@ -155,6 +155,20 @@ def test_each_verdict_that_matters_is_a_test(pytester: pytest.Pytester) -> None:
     assert found == {"failed": 1, "deselected": 8}
 
 
+@pytest.mark.parametrize("workers", [(), ("-n", "1")])
+def test_the_story_of_a_verdict_is_told_once_also_in_ci(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, workers: tuple[str, ...]
+) -> None:
+    monkeypatch.setenv("CI", "true")  # where the summary of pytest shows all of a message
+    (pytester.path / "late.firable.yaml").write_text(LATE, "utf-8")
+    told = outcomes(pytester, "-k", "restart", "--junitxml", "report.xml", *workers)[1]
+    if not workers:  # these hand on no more than the text
+        assert told.count("from the initial marking fire:") == 1
+        assert "::property.restart - ✗ violated  property.restart  from every reachable marking" in told
+    report = (pytester.path / "report.xml").read_text("utf-8")
+    assert "1. G1    start of carrying in" in report
+
+
 def test_what_the_file_expects_passes_and_a_change_fails(pytester: pytest.Pytester) -> None:
     path = pytester.path / "late.firable.yaml"
     path.write_text(f"{LATE}{KNOWN}  live: violated\n", "utf-8")
