@@ -35,7 +35,7 @@ from firable.analysis.verdicts.starvation import starvation_free
 from firable.nets.formula import Formula
 from firable.nets.net import Net
 from firable.nets.queries import Query
-from firable.nets.verdict import Status, Verdict, Weight, overall
+from firable.nets.verdict import Status, Verdict, Weight, Witness, overall
 from firable.semantics.player import Player
 from firable.semantics.trace import Discipline
 
@@ -124,8 +124,12 @@ class CheckReport:
         from firable.nets.notebook import told_apart, verdicts_html
         from firable.semantics.frames import frames
 
+        def strip(verdict: Verdict, witness: Witness) -> str:
+            run = frames(self.net, witness.firings)
+            return draw_strip(self.net, run, caption=verdict.statement, width_max=_NOTEBOOK_WIDTH_PIXELS)
+
         pictures = {
-            verdict.name: draw_strip(self.net, frames(self.net, verdict.witness.firings), caption=verdict.statement)
+            verdict.name: strip(verdict, verdict.witness)
             for verdict in told_apart(self.verdicts, _PICTURES_MAX)
             if verdict.witness is not None
         }
@@ -155,6 +159,7 @@ def report_on(
     return CheckReport(space.net, space.discipline, figures(behaviour, conflicts, steps), tuple(verdicts), space)
 
 
+_NOTEBOOK_WIDTH_PIXELS: Final = 900
 _PICTURES_MAX: Final = 3
 _ON_BEHAVIOUR: Final[tuple[Callable[[Behaviour[Any]], Verdict], ...]] = (
     behaviour_of.contact_free,

@@ -47,6 +47,7 @@ def test_a_report_shows_what_is_violated_first_with_its_run_as_a_strip() -> None
     assert strips
     first = ET.fromstring('<svg xmlns="http://www.w3.org/2000/svg"' + strips[0].partition("</svg>")[0] + "</svg>")
     assert {one.get("id") for one in first.iter() if one.get("id")} >= {"step:0", "fired:1:G1"}
+    assert float(first.attrib["width"]) <= 900, "as wide as the cell of a notebook"
     circle = "robot.put_mc waits in G4 for mc.free, which comes from mc.release by G6 and G7"
     assert shown.index("1 marking of the net is a deadlock") < shown.index(circle) < shown.index("[F3011]")
     assert shown.index("✗ violated") < shown.index("<details>") < shown.index("✓ proved")
