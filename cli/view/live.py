@@ -35,6 +35,7 @@ from firable.cli.view.top_view import top_of
 from firable.cli.view.votes import awaited, votes
 from firable.executor import Host
 from firable.executor.operating.latch import may_stay
+from firable.executor.operating.restart import asked_of_the_operator
 from firable.executor.protocol.token_player import TokenPlayer, Word
 from firable.nets.machines.plant_file import PlantModel, misfits
 from firable.nets.net import Net
@@ -159,6 +160,7 @@ class LivePage:
             "votes": list(follower.news("votes", {row["name"]: row for row in rows}).values()),
             "top": self._top(follower),
             "unreached": sorted(host.peers.names - host.peers.connected_to),
+            "asked": {place: str(host.net.place(place).command) for place in asked_of_the_operator(host)},
             "paused": host.paused,
             "ended": ended,
             **follower.happened(),

@@ -80,7 +80,7 @@ def tell_unasked(run: Host, asked: Collection[str]) -> None:
 def say(run: Host, place: str, answer: Answer) -> bool:
     """Take the operator's word on a command of which no machine can tell; False where nobody asks after it (yet)."""
     found = run.taking_up
-    if found is None or not found.is_final or run.stopping or place not in uncertain(run):
+    if found is None or place not in asked_of_the_operator(run):
         return False
     found.answers[place] = answer
     for name, controller in run.controllers.items():
@@ -103,6 +103,12 @@ def release(run: Host) -> None:
 def uncertain(run: Host) -> list[str]:
     """The places with a command of which nobody knows what became of it."""
     return [place for controller in run.controllers.values() for place, _ in controller.commands.questions]
+
+
+def asked_of_the_operator(run: Host) -> list[str]:
+    """The places of whose commands somebody must tell: their machines have been asked, and none could."""
+    found = run.taking_up
+    return [] if found is None or not found.is_final or run.stopping else uncertain(run)
 
 
 def told(run: Host, found: TakingUp) -> str:

@@ -108,6 +108,14 @@ def test_an_emergency_stop_sends_no_command_any_more(chromium: Browser, bundle: 
         state(page, "held")
         expect(page.get_by_role("button", name="Reset")).to_have_count(0)
         expect(page.get_by_role("button", name="Resume")).to_be_enabled()
+        asked = page.locator(".asked")
+        expect(asked.first).to_contain_text("look at the machine. What became of ")
+        expect(page.get_by_text("Nothing.", exact=True)).to_have_count(0)
+        while (left := asked.count()) > 0:  # how many machines were at work depends on when it was stopped
+            asked.first.get_by_role("button", name="Working: ").click()
+            expect(asked).to_have_count(left - 1)
+        expect(page.locator(".banner")).not_to_contain_text("look at the machine")
+        state(page, "held")  # nothing moves before Resume
         page.get_by_role("button", name="Stop", exact=True).click()
         assert process.wait(timeout=PATIENCE_SECONDS) == 3
     events = read_trace(trace).events
@@ -202,7 +210,16 @@ def test_of_many_machines_those_in_view_have_bars_and_of_many_firings_no_token_f
         "signals": [],
         "transitions": {},
     }
-    now |= {"waits": [], "bars": bars, "votes": [], "top": None, "unreached": [], "paused": False, "ended": True}
+    now |= {
+        "waits": [],
+        "bars": bars,
+        "votes": [],
+        "top": None,
+        "unreached": [],
+        "asked": {},
+        "paused": False,
+        "ended": True,
+    }
     now |= {"events": [], "fired": ["t"] * 20}
     svg = '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="99"><path id="input:t:p" d="M0 0h9"/></svg>'
     answers = {"page": start, "picture": {"picture": svg, "members": {}, "foldable": []}, "events": now}

@@ -39,6 +39,8 @@ interface Now {
   votes: Votes[];
   unreached: string[];
   top: Top | null;
+  /** Commands of which no machine can tell, by their places: the operator is asked. */
+  asked: Record<string, string>;
   paused: boolean;
   ended: boolean;
   events: { at: number; kind: string; what: string }[];
@@ -51,6 +53,7 @@ const EVENTS_SHOWN = 200;
 const COLUMNS_MAX = 12;
 /** When more fires in a second, no eye follows the tokens on their way. */
 const FLYING_MAX = 12;
+const ANSWERS = [["done", "Done"], ["working", "Working"], ["not received", "Not received"]] as const;
 const BAD = new Set(["fault", "deadlock", "latched"]);
 const SIGNS: Record<string, [string, string]> = {
   ready: ["●", "ready"], yes: ["✓", "votes yes"], promised: ["◐", "has promised"], no: ["○", "not ready"], ordered: ["…", "has its order"],
@@ -63,6 +66,7 @@ export class Live {
   private readonly frame: Frame;
   private readonly lanes: Lanes;
   private readonly waits = h("ul", { class: "list" });
+  private readonly questions = h("div", { class: "list" });
   private readonly votes = h("table", { class: "votes" });
   private readonly rows = new Map<string, Votes>();
   private readonly shownRows = new Map<string, HTMLElement>();
@@ -112,7 +116,7 @@ export class Live {
     const lanes = h("section", { class: "machines", "aria-label": "Machines" }, this.lanes.element);
     if (start.machines.length > 0) this.frame.below.append(lanes);
     this.frame.side.append(
-      panel("Waits for", this.waits),
+      panel("Waits for", this.questions, this.waits),
       panel("Votes", this.votes),
       panel("Signals", this.signals),
       panel("What happened", this.events),
@@ -151,7 +155,8 @@ export class Live {
     const at = new Date().toLocaleTimeString();
     document.body.classList.add("old");
     banner(this.frame.banner, "bad", `The connection is lost since ${at}. What is shown is old, and nothing here reaches the cell: use the controls at the machines.`);
-    for (const one of this.buttons) one.disabled = true;
+    for (const one of [...this.buttons, ...this.questions.querySelectorAll("button")]) one.disabled = true;
+    this.questions.dataset.key = ""; // to be asked again, then
     this.frame.status.textContent = "no connection";
     this.frame.status.className = "status bad";
   }
@@ -235,15 +240,27 @@ export class Live {
     if (latched) this.pauseButton.disabled = this.stepButton.disabled = true;
   }
 
+  private showQuestions(asked: Record<string, string>): void {
+    const key = JSON.stringify(asked);
+    if (this.questions.dataset.key === key) return;
+    this.questions.dataset.key = key;
+    const answer = (place: string, word: string, words: string): HTMLElement =>
+      h("button", { type: "button", class: "small", "aria-label": `${words}: ${place}`, click: () => void this.command(`say?${new URLSearchParams({ place, answer: word })}`, `${place}: ${words}`) }, words);
+    this.questions.replaceChildren(...Object.entries(asked).map(([place, command]) =>
+      h("div", { class: "wait asked", role: "group", "aria-label": `What became of ${command}?` },
+        h("span", {}, `${place}: look at the machine. What became of ${command}?`), ...ANSWERS.map(([word, words]) => answer(place, word, words)))));
+  }
+
   private showWaits(): void {
     const now = this.now;
     if (now === null) return;
+    this.showQuestions(now.ended ? {} : now.asked);
     const away = now.unreached.map((name) => `${name === "" ? "the coordinator" : name} is not connected`);
     const lines = [...away, ...now.waits];
-    const key = lines.join("\n");
+    const none = Object.keys(now.asked).length > 0 ? "" : now.state === "running" ? "Nothing: the cell is at work." : "Nothing.";
+    const key = [none, ...lines].join("\n");
     if (this.waits.dataset.key === key) return;
     this.waits.dataset.key = key;
-    const none = now.state === "running" ? "Nothing: the cell is at work." : "Nothing.";
     const shown: [string, string][] = lines.length > 0 ? lines.map((line, i) => [i < away.length ? "wait lost" : "wait", line]) : [["none", none]];
     while (this.waits.children.length > shown.length) this.waits.lastElementChild!.remove();
     while (this.waits.children.length < shown.length) this.waits.append(h("li", {}));
