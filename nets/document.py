@@ -74,21 +74,21 @@ class _Extensible(BaseModel):
 class CommandDocument(_Extensible):
     """The output signal of a place: machine, command, and any further keys as parameters of the command."""
 
-    machine: Name
-    command: Name
+    machine: Name = Field(description="The machine that gets the command.")
+    command: Name = Field(description="What the machine is told to do.")
 
 
 class TaskUseDocument(_Extensible):
     """The registered task that a place stands for: its name, and further keys that fill its roles and parameters."""
 
-    name: Name
+    name: Name = Field(description="The task, by its name in the file of tasks.")
 
 
 class ResourceDocument(_Extensible):
     """What a place opens to: an idle place, its machine, and any further keys as parameters for the tasks."""
 
     to: Name = Field(description="The idle place in the detailed net, by its full name.")
-    machine: Name
+    machine: Name = Field(description="The machine that the tasks command.")
     prefix: Text = Field(default="", description="What comes before the names of the machine's signals.")
 
 
@@ -119,7 +119,7 @@ class PlaceDocument(StrictDocument):
     ) = Field(default=None, description="How long the completion may take before the token goes to a fault place.")
     task: TaskUseDocument | None = Field(default=None, description="The registered task that the place stands for.")
     opens: ResourceDocument | None = Field(default=None, description="The resource that the place stands for.")
-    description: Text = ""
+    description: Text = Field(default="", description="What is so, or is being done, while a token is here.")
 
 
 Places = dict[Name, PlaceDocument | None]
@@ -130,36 +130,50 @@ class ControllerDocument(StrictDocument):
 
     coordinator: bool = Field(default=False, description="Whether it coordinates the others.")
     under: Name | None = Field(default=None, description="The coordinator above it, if not that of the whole net.")
-    description: Text = ""
+    description: Text = Field(default="", description="What it controls, for a reader.")
     start: Names = Field(default=[], description="The places that hold a token at first.")
     inputs: Names = Field(default=[], description="The sensors, signals that no command clears.")
-    places: Places | None = None
+    places: Places | None = Field(default=None, description="Its places, called `controller.place` elsewhere.")
 
 
 class TransitionDocument(StrictDocument):
     """A transition; `if` and `unless` name places (internal gates) or signals (external gates)."""
 
     number: Integer | None = Field(default=None, ge=0, description="The number in the coordinator table.")
-    inputs: Names = Field(default=_NO_NAMES, alias="from")
-    outputs: Names = Field(default=_NO_NAMES, alias="to")
-    permissive: Names = Field(default=_NO_NAMES, alias="if")
-    inhibitive: Names = Field(default=_NO_NAMES, alias="unless")
-    description: Text = ""
+    inputs: Names = Field(default=_NO_NAMES, alias="from", description="The places of which it takes the tokens.")
+    outputs: Names = Field(
+        default=_NO_NAMES, alias="to", description="The places that it puts tokens on; it waits until they are empty."
+    )
+    permissive: Names = Field(
+        default=_NO_NAMES, alias="if", description="It waits until these places hold a token and these signals are 1."
+    )
+    inhibitive: Names = Field(
+        default=_NO_NAMES, alias="unless", description="It waits until these places are empty and these signals are 0."
+    )
+    description: Text = Field(default="", description="What happens when it fires.")
 
 
 class ArbiterDocument(StrictDocument):
     """How the conflict between the transitions `among` is decided."""
 
-    among: Names
-    by: Literal["priority", "order", "rotation"] = "priority"
+    among: Names = Field(description="The transitions that compete, in the order that `by` speaks of.")
+    by: Literal["priority", "order", "rotation"] = Field(
+        default="priority",
+        description="priority: always in this order. rotation: who has won goes to the end. "
+        "order: in this sequence, which may name one of them more than once.",
+    )
 
 
 class LeadsToDocument(StrictDocument):
     """Whenever `from` holds, `to` holds then or later."""
 
-    source: FormulaText = Field(alias="from")
-    target: FormulaText = Field(alias="to")
-    fairness: Literal["none", "weak", "strong"] = "weak"
+    source: FormulaText = Field(alias="from", description="What happens first.")
+    target: FormulaText = Field(alias="to", description="What follows, at once or later.")
+    fairness: Literal["none", "weak", "strong"] = Field(
+        default="weak",
+        description="Of which transitions it is assumed that they fire: of none, of those that stay firable (weak), "
+        "or of those that are firable again and again (strong).",
+    )
 
 
 PATTERNS: Final = ("never", "always", "reachable", "leads_to", "always_possible")
@@ -176,9 +190,9 @@ class PropertyDocument(StrictDocument):
         json_schema_extra={"oneOf": [{"required": [pattern]} for pattern in (*PATTERNS, *LOGICS)]},
     )
 
-    never: FormulaText | None = None
-    always: FormulaText | None = None
-    reachable: FormulaText | None = None
+    never: FormulaText | None = Field(default=None, description="Holds in no reachable marking.")
+    always: FormulaText | None = Field(default=None, description="Holds in every reachable marking.")
+    reachable: FormulaText | None = Field(default=None, description="Holds in some reachable marking.")
     leads_to: (
         Annotated[
             LeadsToDocument,
@@ -189,8 +203,10 @@ class PropertyDocument(StrictDocument):
             ),
         ]
         | None
-    ) = None
-    always_possible: FormulaText | None = None
+    ) = Field(default=None, description="Whenever `from` holds, `to` holds then or later; in short: [from, to].")
+    always_possible: FormulaText | None = Field(
+        default=None, description="Can be reached from every reachable marking."
+    )
     ctl: FormulaText | None = Field(default=None, description="A formula of CTL, which must hold at first.")
     ltl: FormulaText | None = Field(default=None, description="A formula of LTL, which every run must satisfy.")
 
@@ -209,14 +225,23 @@ class NetDocument(StrictDocument):
         description="The version of the format."
     )
     cell: Text = Field(description="The name of the net.")
-    description: Text = ""
-    controllers: dict[Name, ControllerDocument | None] | None = None
+    description: Text = Field(default="", description="What the cell does, for a reader.")
+    controllers: dict[Name, ControllerDocument | None] | None = Field(
+        default=None, description="The controllers by their names; what is nested in one is owned by it."
+    )
     start: Names = Field(default=[], description="The places without an owner that hold a token at first.")
     inputs: Names = Field(default=[], description="The sensors without an owner.")
     places: Places | None = Field(default=None, description="The places without an owner.")
-    transitions: dict[Name, TransitionDocument | None] | None = None
-    arbiters: dict[Name, ArbiterDocument] | None = None
-    properties: dict[Name, PropertyDocument] | None = None
+    transitions: dict[Name, TransitionDocument | None] | None = Field(
+        default=None,
+        description="The transitions by their names; of those that several controllers share, each has a part.",
+    )
+    arbiters: dict[Name, ArbiterDocument] | None = Field(
+        default=None, description="Who goes first where transitions compete; else it is the order of the file."
+    )
+    properties: dict[Name, PropertyDocument] | None = Field(
+        default=None, description="What `firable check` shall show of this net; a bundle needs all of them proved."
+    )
     expect: dict[Name, Literal["proved", "violated"]] | None = Field(
         default=None,
         description="Verdicts of `firable check` that are known to end so: it fails when one of them changes.",

@@ -49,6 +49,14 @@ def test_the_first_line_of_a_file_of_the_catalogue_names_its_schema(file: Path) 
     assert schema == SCHEMAS[kind]()
 
 
+def test_an_editor_is_told_what_every_key_means() -> None:
+    schema = json_schema()
+    records = {"": schema, **schema["$defs"]}
+    silent = [f"{kind}.{key}" for kind, one in records.items() for key, value in one.get("properties", {}).items()
+              if not value.get("description")]  # fmt: skip
+    assert not silent
+
+
 def test_the_schema_is_a_schema() -> None:
     jsonschema.Draft202012Validator.check_schema(json_schema())
 
