@@ -23,6 +23,7 @@ class NetKeys(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """The sections, parsed as Markdown of the page that asks for them."""
+        self.env.note_reread()  # the page stays as it is when the schema changes
         lines = list(_sections(schema_of(self.arguments[0])))
         return self.parse_text_to_nodes("\n".join(lines), allow_section_headings=True)
 
