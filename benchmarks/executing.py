@@ -48,15 +48,17 @@ KNOCK: Final = "a.knock"
 """A sensor that opens nothing: a runtime to which nothing ever comes takes a net that fires on and on for a fault."""
 
 
-def rings(*lengths: int) -> Decomposition:
-    """One controller with rings of these lengths, each with one token."""
+def rings(*lengths: int, in_turn: bool = False) -> Decomposition:
+    """One controller with rings of these lengths, each with one token.
+
+    The next transition behind the last one fires: a ring goes round and then the next one does or, `in_turn`, where the
+    transitions of a ring stand backwards, each ring moves on by one and then the next one does.
+    """
     names = [[f"a.r{r}.{i}" for i in range(length)] for r, length in enumerate(lengths)]
     places = tuple(Place(name, "a", marked=i == 0) for ring in names for i, name in enumerate(ring))
-    moves = tuple(
-        Transition(f"t{r}.{i}", (ring[i],), (ring[(i + 1) % len(ring)],))
-        for r, ring in enumerate(names)
-        for i in range(len(ring))
-    )
+    step = -1 if in_turn else 1
+    order = [(r, i) for r, ring in enumerate(names) for i in range(len(ring))[::step]]
+    moves = tuple(Transition(f"t{r}.{i}", (names[r][i],), (names[r][(i + 1) % len(names[r])],)) for r, i in order)
     signals = (Signal(KNOCK, "a", SignalKind.SENSOR),)
     return split(Net("rings", places, moves, signals=signals, controllers=(Controller("a"),)))
 
@@ -186,8 +188,8 @@ def _rate(repeat: int) -> Table:
 
 def _scaling(repeat: int) -> Table:
     sizes = (100, 1_000, 10_000)
-    # Of different lengths, so that no word comes again: what was asked of a word before would be known (`enabled.py`).
-    nets = {size: rings(*(size // 10 + more for more in range(-5, 6) if more)) for size in sizes}
+    # Of different lengths and in turn, so that no word comes again: what was asked of one is remembered (`enabled.py`).
+    nets = {size: rings(*(size // 10 + more for more in range(-5, 6) if more), in_turn=True) for size in sizes}
     controllers = {size: LocalController(net, "a") for size, net in nets.items()}
     alone: dict[int, list[float]] = {size: [] for size in sizes}
     hosts: dict[int, list[float]] = {size: [] for size in sizes}
@@ -209,7 +211,8 @@ def _scaling(repeat: int) -> Table:
     return Table(
         "What transitions cost that nothing touched",
         "10 rings, ever longer: 10 transitions are enabled in each net, and no marking comes again, or what is enabled "
-        "there would be remembered. What is left of the growth is the word itself, which has a bit for each place.",
+        "there would be remembered. What is left of the growth is the word itself, which has a bit for each place, and "
+        "that what a firing needs is in no cache any more when its turn comes again.",
         (
             "transitions",
             "controller, times 100 transitions",

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from firable.executor.drivers.driver import withdraw
 from firable.executor.operating.items import CommandTaken
-from firable.nets.net import Place
+from firable.nets.net import Net, Place
 
 if TYPE_CHECKING:
     from firable.executor.operating.host import Host
@@ -31,8 +31,7 @@ class Dispatch:
         """The alarm of each command that is awaited, by its completion or, without one, its place."""
         self.untaken: set[str] = set()
         """The places whose command has no completion, and is with the driver."""
-        self.commanding: dict[tuple[str, str], list[Place]] = {}
-        """The places with a command that a firing leaves, by controller and transition; looked up once."""
+        self.left_behind = _left_behind(run.net)
 
     def send(self, place: str, entry: int) -> None:
         """Hand the command of a place to the driver."""
@@ -57,13 +56,7 @@ class Dispatch:
 
     def left(self, controller: str, transition: str) -> None:
         """Give up what the tokens of a controller have left behind."""
-        places = self.commanding.get((controller, transition))
-        if places is None:
-            inputs = map(self.run.net.place, self.run.net.transition(transition).inputs)
-            ours = [place for place in inputs if place.owner == controller and place.command is not None]
-            # A token whose command has no completion stays until its machine has it: nothing is given up with it.
-            places = [place for place in ours if place.completion is not None]
-            self.commanding[controller, transition] = places
+        places = self.left_behind.get((controller, transition))
         if places:
             for name in withdraw(self.run.driver, places, self.run.acts.outbox):
                 self.run.recorder.note(self.run.now_seconds(), "withdrawn", place=name)
@@ -95,3 +88,18 @@ class Dispatch:
             f"'{sender.command}' of '{place}', sent at {sent_at:.1f} s, is overdue: "
             f"{awaited} within {self.overdue_seconds:g} s"
         )
+
+
+def _left_behind(net: Net) -> dict[tuple[str, str], list[Place]]:
+    """The places whose command a firing leaves behind, by their controller and the transition, where there are any.
+
+    A token whose command has no completion stays until its machine has it: nothing is given up with it.
+    """
+    commanding = {
+        place.name: place for place in net.places if place.command is not None and place.completion is not None
+    }
+    found: dict[tuple[str, str], list[Place]] = {}
+    for transition in net.transitions:
+        for place in filter(None, map(commanding.get, transition.inputs)):
+            found.setdefault((str(place.owner), transition.name), []).append(place)
+    return found

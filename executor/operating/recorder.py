@@ -124,7 +124,7 @@ class Recorder:
         self.word = net.initial_marking
         openable = [c for c in self.player.transitions.values() if c.openable]
         places = self.player.places
-        self._firable = EnabledSet([(c.needs & places, c.forbids & places) for c in openable])
+        self._firable = EnabledSet([(c.needs & places, c.forbids & places) for c in openable], len(net.places))
         self.stream = stream
         self.firings: dict[str, int] = {transition.name: 0 for transition in net.transitions}
         self.commands = 0

@@ -63,9 +63,9 @@ from firable.executor.protocol.messages import (
     VoteRequest,
 )
 from firable.executor.protocol.restored import restore
-from firable.executor.protocol.stored_word import changed_pieces
+from firable.executor.protocol.stored_word import Piece, changed_pieces, kept_of
 from firable.executor.protocol.timers import Timers
-from firable.executor.protocol.token_player import Arbiter, Compiled, TokenPlayer, Word
+from firable.executor.protocol.token_player import Arbiter, Compiled, SignalAt, TokenPlayer, Word
 from firable.nets.decomposition import Decomposition
 from firable.nets.net import Marking, SignalKind
 
@@ -83,7 +83,8 @@ class LocalController:
         compiled = self.player.transitions
         self.parts: dict[str, Compiled] = {row: compiled[part] for part, row in part_of.items()}
         self.transitions = tuple(compiled.values())
-        self.enabled = EnabledSet([(c.needs, c.forbids) for c in self.transitions])
+        width = len(self.subnet.places) + len(self.subnet.signals)
+        self.enabled = EnabledSet([(c.needs, c.forbids) for c in self.transitions], width)
         self.rows = {t: part_of[c.name] for t, c in enumerate(self.transitions) if c.name in part_of}
         """The coordinated transition of each part, by the index of the part."""
         self.local_mask = sum(1 << t for t in range(len(self.transitions)) if t not in self.rows)
@@ -210,12 +211,13 @@ class LocalController:
         """
         if entry is not None and entry != self.commands.entry(signal):
             return []
-        if not value and self.player.signal_bit(signal) & self.lasting:
+        at = self.player.signals[signal]
+        if not value and at.bit & self.lasting:
             return []
-        if self.promises and self.player.signal_bit(signal) & self._locked_reads():
+        if self.promises and at.bit & self._locked_reads():
             self.latched[signal] = value
             return []
-        return self._take(signal, value)
+        return self._take(signal, at, value)
 
     def sent(self, place: str, entry: int) -> list[Effect]:
         """Take the driver's word that it has the command of a place."""
@@ -246,13 +248,18 @@ class LocalController:
     @property
     def may_fire(self) -> bool:
         """Whether a local transition is enabled by the word; what else keeps it, `fire` knows."""
-        return self.enabled.at(self.word) & self.local_mask != 0
+        enabled = self.enabled.at(self.word)
+        return (enabled & self.local_mask if self.rows else enabled) != 0
 
     def fire(self) -> list[Effect]:
         """Fire one local transition, if one is enabled and disturbs no promise; no effect means that none is."""
         if self.held or self.leaving:
             return []
-        enabled = self.enabled.at(self.word) & self.local_mask & ~self.forgone
+        enabled = self.enabled.at(self.word)
+        if self.rows:  # each operation counts where there are thousands of transitions
+            enabled &= self.local_mask
+        if self.forgone:
+            enabled &= ~self.forgone
         if not enabled:
             return []
         is_bound = self.promises or self.untold or self.unsent  # by more than the word
@@ -260,7 +267,8 @@ class LocalController:
         if found is None:
             return []
         chosen = self.transitions[found]
-        effects: list[Effect] = [Firing(chosen.name), *self._fire(chosen)]
+        effects = self._fire(chosen)
+        effects.insert(0, Firing(chosen.name))
         if self.arbiter.turns != self.kept_turns:
             self.kept_turns = self.arbiter.turns
             effects.append(Keep("turns", self.kept_turns))
@@ -317,7 +325,7 @@ class LocalController:
             self.promises[request.round] = Promise.of(self.parts, yes)
             if yes:
                 yield Keep(f"promise/{request.round}", yes)
-                yield from self._keep_word()
+                yield from self._keep_word(self.word, ())
         above = self._above(request.round)
         yield Vote(self.name, request.round, self.promises[request.round].promised, self._told(above), above.name)
 
@@ -374,8 +382,9 @@ class LocalController:
     def _fire(self, transition: Compiled) -> list[Effect]:
         before = self.word
         self.word = transition.fire(before)
-        effects: list[Effect] = self._keep_word()
-        for entered in self.player.entered[transition.name]:
+        self.enabled.said = before, self.word, transition.step
+        effects = self._keep_word(before, transition.pieces)
+        for entered in transition.entered:
             for signal, bit in entered.cleared:
                 self.latched.pop(signal, None)  # a value from before the command
                 if before & bit:
@@ -395,30 +404,33 @@ class LocalController:
                 del self.latched[signal]
                 timed = self.timers.signals.get(signal)
                 if timed is None or self.timers.waits(timed.name, self.word):
-                    yield from self._take(signal, value)
+                    yield from self._take(signal, self.player.signals[signal], value)
                 else:  # the completion has come in time after all
                     self.timers.enter(timed.name)
 
-    def _take(self, signal: str, value: bool) -> list[Effect]:
+    def _take(self, signal: str, at: SignalAt, value: bool) -> list[Effect]:
         effects: list[Effect] = []
-        bit = self.player.signal_bits[signal]
+        bit, before = at.bit, self.word
         # What a sensor shows first after a restart is told even if it is nothing new: the image may be newer than what
         # was kept of it, and who follows the trace saw the newer one.
-        if bool(self.word & bit) != value or bit & self.untold:
-            self.word = self.word | bit if value else self.word & ~bit
-            self.untold &= ~bit
+        if bool(before & bit) != value or bit & self.untold:
+            self.word = before | bit if value else (before | bit) ^ bit
+            self.enabled.said = before, self.word, at.steps[value]
+            if self.untold:
+                self.untold &= ~bit
             effects.append(Taken(signal, value))
             if bit & self.player.completing:
-                effects += self._keep_word()
+                effects += self._keep_word(before, at.pieces)
         if value and bit & self.player.completing:
             effects += self.commands.completed(signal)
         return effects
 
-    def _keep_word(self) -> list[Effect]:
-        if self.word == self.kept_word:
-            return []
-        before, self.kept_word = self.kept_word, self.word
-        return [*changed_pieces(before, self.word)]
+    def _keep_word(self, before: Word, pieces: tuple[Piece, ...]) -> list[Effect]:
+        """Have the word kept; of the word `before`, these pieces have changed."""
+        kept, self.kept_word = self.kept_word, self.word
+        if kept is before:
+            return kept_of(before, self.word, pieces)
+        return changed_pieces(kept, self.word)
 
     def _is_enabled(self, transition: Compiled) -> bool:
         """Enabled by what is known.
@@ -456,7 +468,9 @@ class LocalController:
         return union(promise.reads | promise.writes for promise in self.promises.values())
 
     def _readiness(self, above: Above) -> Readiness:
-        ready = 0 if self.held or self.leaving else self.enabled.at(self.word) & above.mask & ~self.forgone
+        ready = 0 if self.held or self.leaving else self.enabled.at(self.word) & above.mask
+        if self.forgone:
+            ready &= ~self.forgone
         if self.untold or self.unsent:
             ready = sum(1 << t for t in bits(ready) if self._is_enabled(self.transitions[t]))
         if self.promises and ready & self.free_mask:

@@ -15,9 +15,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import Final, Self
 
-from firable.executor.protocol.enabled import bits, bits_behind
+from firable.executor.protocol.enabled import Literal, bits, bits_behind, first_behind, literal
+from firable.executor.protocol.stored_word import Piece, pieces_of
 from firable.nets.decomposition import ArbitrationGroup
 from firable.nets.net import Marking, Net, Place, SignalKind
 from firable.semantics.arbitration import Arbitration, Group, Turns
@@ -25,6 +26,30 @@ from firable.semantics.conflict import conflicts
 
 Word = int
 """A marking and a valuation of the signals, as bits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entered:
+    """A place with a command, the signals that a token clears when it enters, with their bits, and its own bit."""
+
+    place: Place
+    cleared: tuple[tuple[str, Word], ...]
+    bit: Word
+
+
+@dataclass(frozen=True, slots=True)
+class SignalAt:
+    """The bit of a signal, the steps that clear it and set it, and the piece in which stable storage holds it."""
+
+    bit: Word
+    steps: tuple[tuple[Literal, ...], tuple[Literal, ...]]
+    pieces: tuple[Piece, ...]
+
+    @classmethod
+    def of(cls, position: int) -> Self:
+        """That of the bit at a position."""
+        falls, rises = (literal(position, value=value) for value in (False, True))
+        return cls(1 << position, ((falls,), (rises,)), pieces_of([position]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +64,16 @@ class Compiled:
     clears: Word
     openable: bool
     """Whether some valuation of the signals opens its external gates."""
-    drops: Word
-    """What it takes and clears."""
+    lowest: int
+    """The position of the lowest place that changes."""
+    moved: Word
+    """The places that change, from that one on."""
+    step: tuple[Literal, ...]
+    """Bit by bit, what `fire` does."""
+    pieces: tuple[Piece, ...]
+    """The pieces in which stable storage holds what it writes."""
+    entered: tuple[Entered, ...]
+    """The places with a command that it puts a token on, in the order of the net."""
 
     @property
     def writes(self) -> Word:
@@ -61,21 +94,13 @@ class Compiled:
         return word & self.needs & places == self.needs & places and not word & self.forbids & places
 
     def fire(self, word: Word) -> Word:
-        """Eq. (3)-(4), and the completions and timers of the places entered cleared."""
-        return (word | self.drops) ^ self.drops | self.puts  # no complement, which is slow where words are wide
+        """Eq. (3)-(4) where it is firable, and the completions and timers of the places entered cleared."""
+        fired = word ^ self.moved << self.lowest  # few operations, and few bits to be fetched: a word may be wide
+        return fired ^ fired & self.clears if self.clears else fired
 
     def disturbs(self, writes: Word, reads: Word) -> bool:
         """Whether firing could change what another reads, or reads what another will write (O1)."""
         return bool(self.writes & reads or self.reads & writes)
-
-
-@dataclass(frozen=True, slots=True)
-class Entered:
-    """A place with a command, the signals that a token clears when it enters, with their bits, and its own bit."""
-
-    place: Place
-    cleared: tuple[tuple[str, Word], ...]
-    bit: Word
 
 
 @dataclass(frozen=True)
@@ -91,11 +116,19 @@ class TokenPlayer:
     def of(cls, net: Net) -> Self:
         """Compile a net."""
         signal_bit = {signal.name: 1 << len(net.places) + j for j, signal in enumerate(net.signals)}
+        order = net.place_index.__getitem__
+        commanding = {
+            place.name: Entered(place, tuple((s, signal_bit[s]) for s in place.cleared), 1 << order(place.name))
+            for place in net.places
+            if place.command
+        }
         compiled = {}
         for t, transition in enumerate(net.transitions):
             masks = net.masks[t]
             opening = sum({signal_bit[gate.signal] for gate in transition.external if gate.wanted})
             closing = sum({signal_bit[gate.signal] for gate in transition.external if not gate.wanted})
+            moves = masks.inputs | masks.outputs
+            lowest = next(bits(moves), 0)
             cleared = {signal for place in transition.outputs for signal in net.place(place).cleared}
             clears = sum(signal_bit[name] for name in cleared)
             compiled[transition.name] = Compiled(
@@ -106,7 +139,14 @@ class TokenPlayer:
                 puts=masks.outputs,
                 clears=clears,
                 openable=transition.openable,
-                drops=masks.inputs | clears,
+                lowest=lowest,
+                moved=moves >> lowest,
+                step=(
+                    *(literal(bit, value=False) for bit in bits(masks.inputs | clears)),
+                    *(literal(bit, value=True) for bit in bits(masks.outputs)),
+                ),
+                pieces=pieces_of(bits(moves | clears)),
+                entered=tuple(commanding[p] for p in sorted(transition.outputs, key=order) if p in commanding),
             )
         return cls(net, compiled, (1 << len(net.places)) - 1)
 
@@ -124,23 +164,15 @@ class TokenPlayer:
         return {signal.name: 1 << len(self.net.places) + j for j, signal in enumerate(self.net.signals)}
 
     @cached_property
+    def signals(self) -> dict[str, SignalAt]:
+        """Where each signal is in a word."""
+        first = len(self.net.places)
+        return {signal.name: SignalAt.of(first + j) for j, signal in enumerate(self.net.signals)}
+
+    @cached_property
     def completing(self) -> Word:
         """The bits of the completion signals."""
         return sum(self.signal_bits[s.name] for s in self.net.signals if s.kind is SignalKind.COMPLETION)
-
-    @cached_property
-    def entered(self) -> dict[str, tuple[Entered, ...]]:
-        """The places with a command that a firing of each transition enters, in the order of the net."""
-        commanding = {
-            place.name: Entered(place, tuple((s, self.signal_bits[s]) for s in place.cleared), 1 << i)
-            for i, place in enumerate(self.net.places)
-            if place.command
-        }
-        order = self.net.place_index.__getitem__
-        return {
-            transition.name: tuple(commanding[p] for p in sorted(transition.outputs, key=order) if p in commanding)
-            for transition in self.net.transitions
-        }
 
 
 class Arbiter:
@@ -180,9 +212,15 @@ class Arbiter:
         It is the first behind the last winner that its arbiter grants; only its own rivals are looked at.
         """
         if is_free is None:
-            if enabled and not enabled & (enabled - 1):  # one alone has no rivals
-                self.last = enabled.bit_length() - 1
-                return self.last
+            if enabled < _WIDE and not enabled & (enabled - 1):  # one alone has no rivals
+                if enabled:
+                    self.last = enabled.bit_length() - 1
+                    return self.last
+                return None
+            t = first_behind(enabled, self.last)
+            if self.arbitration.conflicts.component_of[t] < 0 or self._is_granted(t, enabled, _anybody):
+                self.last = t  # mostly it is that one
+                return t
             is_free = _anybody
         for t in bits_behind(enabled, self.last):
             if is_free(t) and self._is_granted(t, enabled, is_free):
@@ -206,6 +244,10 @@ class Arbiter:
             turn = self.arbitration.groups[g].turn_after(t, self.turns[g])
             self.turns = (*self.turns[:g], turn, *self.turns[g + 1 :])
         return True
+
+
+_WIDE: Final = 1 << 1024
+"""A mask from here on takes longer to be looked at whole than the first of it to be found."""
 
 
 def _anybody(_: int) -> bool:

@@ -1,6 +1,7 @@
 """What is kept up to date by what changed is what looking at everything would say."""
 
 import random
+from copy import copy
 from typing import Any
 
 import pytest
@@ -26,14 +27,42 @@ from firable.semantics.arbitration import Arbitration
 @given(owned_nets(), st.lists(st.integers(0, 2**30), max_size=12))
 def test_enabled_set_is_what_each_transition_says(net: Net, words: list[int]) -> None:
     compiled = list(TokenPlayer.of(net).transitions.values())
-    watched = EnabledSet([(c.needs, c.forbids) for c in compiled])
+    watched = EnabledSet([(c.needs, c.forbids) for c in compiled], len(net.places) + len(net.signals))
     for drawn in words:
         word = drawn & ((1 << len(net.places) + len(net.signals)) - 1)
         assert list(bits(watched.at(word))) == [t for t, c in enumerate(compiled) if c.enabled(word)]
 
 
+@examples(100)
+@given(owned_nets(), st.data(), st.sampled_from([0, 3, enabled.KNOWN_MAX]), st.booleans())
+def test_enabled_set_is_the_same_whether_a_step_is_said_or_not(
+    net: Net, data: st.DataObject, known_max: int, is_wide: bool
+) -> None:
+    compiled = list(TokenPlayer.of(net).transitions.values())
+    width = len(net.places) + len(net.signals)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(enabled, "KNOWN_MAX", known_max)
+        patch.setattr(enabled, "WIDE_BITS", 0 if is_wide else enabled.WIDE_BITS)
+        watched = EnabledSet([(c.needs, c.forbids) for c in compiled], width)
+        word, sets = data.draw(st.integers(0, (1 << width) - 1)), [watched]
+        for _ in range(12):
+            step = data.draw(st.lists(st.integers(0, 2 * width - 1), max_size=4))
+            after = word
+            for one in step:
+                after = after & ~(1 << one // 2) | (one % 2) << one // 2
+            one_set = data.draw(st.sampled_from(sets))
+            how = data.draw(st.sampled_from(["said", "asked", "copied", "forgotten"]))
+            if how == "copied":  # copies go ways of their own
+                sets.append(copy(one_set))
+            if how in ("said", "copied"):
+                one_set.said = word, after, step
+            if how != "forgotten":
+                assert list(bits(one_set.at(after))) == [t for t, c in enumerate(compiled) if c.enabled(after)]
+            word = after
+
+
 def test_transition_that_reads_nothing_is_always_enabled() -> None:
-    watched = EnabledSet([(0, 0), (1, 0)])
+    watched = EnabledSet([(0, 0), (1, 0)], 2)
     assert [watched.at(word) for word in (0, 1, 0)] == [1, 3, 1]
 
 
@@ -98,12 +127,12 @@ def test_firing_looks_only_at_the_transitions_that_it_touches(monkeypatch: pytes
         ]
         controller = LocalController(split(Net("n", tuple(places), tuple(moves), controllers=(Controller("a"),))), "a")
         controller.fire()
-        looks: list[tuple[int, int, int]] = []
+        looks: list[int] = []
 
-        class Counting(dict[int, list[tuple[int, int, int]]]):
-            def get(self, bit: int, default: Any = None) -> Any:
-                found = super().get(bit, default)
-                looks.extend(found)
+        class Counting(tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]):
+            def __getitem__(self, one: Any) -> Any:
+                found = super().__getitem__(one)
+                looks.extend((*found[0], *found[1]))
                 return found
 
         monkeypatch.setattr(controller.enabled, "_readers", Counting(controller.enabled._readers))

@@ -158,7 +158,7 @@ class TakesTimersBlindly(LocalController):
         for signal, value in list(self.latched.items()):
             if not self.player.signal_bit(signal) & self._locked_reads():
                 del self.latched[signal]
-                yield from self._take(signal, value)
+                yield from self._take(signal, self.player.signals[signal], value)
 
 
 class DropsTimersAtPromises(LocalController):
