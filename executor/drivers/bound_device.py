@@ -47,6 +47,8 @@ class BoundDevice:
         self.sensed = [signal for signal in signals if signal in driver.completions.shown]
         """Signals from which completions are formed; the others are told as they are."""
         commands = {place: one for place, one in binding.document.commands.items() if one.device == name}
+        self.writes = {place: writes(one.write) for place, one in commands.items()}
+        """What the command of each place writes."""
         self.channels: dict[str, Channel | Handshake] = {}
         for channel_name, body in self.document.channels.items():
             places = [place for place, one in commands.items() if one.channel == channel_name]
@@ -84,8 +86,8 @@ class BoundDevice:
 
     def send(self, command: CommandDocument, place: Place, entry: int) -> None:
         """Send a command by its channel."""
-        self.channels[command.channel].send(place.name, entry, str(place.command), writes(command.write))
-        self.kept.awake.set()
+        self.channels[command.channel].send(place.name, entry, str(place.command), self.writes[place.name])
+        self.kept.urge()
 
     async def settled(self, channel: Channel | Handshake, place: str, entry: int) -> None:
         """Wait until the device shows what the safe outputs of the start have ended, or its time is over."""

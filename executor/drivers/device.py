@@ -13,11 +13,11 @@ mistakes are, into every one of them.
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Coroutine, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, Final, Protocol
+from typing import Annotated, Any, Final, Protocol, runtime_checkable
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
 
@@ -111,6 +111,15 @@ class Connection(Protocol):
 
     async def close(self) -> None:
         """End the connection, also one that has failed; it does not fail itself."""
+        ...
+
+
+@runtime_checkable
+class Prompt(Connection, Protocol):
+    """A connection that writes at once where it can, in the very turn of the event loop in which a command comes."""
+
+    def begin(self, writes: Writes) -> Coroutine[Any, Any, None]:
+        """Begin what `write` does, and return what waits for the end of it, and fails where it does."""
         ...
 
 

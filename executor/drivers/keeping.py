@@ -2,9 +2,11 @@
 
 One task reads, one writes. All that is written goes through the one that writes, so that the order is the one that was
 meant: safe outputs before anything else on the first connection, then heartbeats and commands, then safe outputs as
-the last thing. A connection that has failed in any way is closed and never asked again; the next one is made after a
-pause that doubles up to a bound, and is read before it is written, because what the device shows then decides what is
-still to be sent.
+the last thing. A command may leave before that task has its turn (`urge`), where it waits for something to write and
+the connection can begin a write (`device.Prompt`): the order is the same, and the command a turn of the event loop
+earlier. A connection that has failed in any way is closed and never asked again; the next one is made after a pause
+that doubles up to a bound, and is read before it is written, because what the device shows then decides what is still
+to be sent.
 
 A stop breaks off what is being written, if it is not confirmed at once, and makes new connections until the device has
 confirmed the safe outputs, or has had its time.
@@ -27,7 +29,17 @@ from contextlib import suppress
 from typing import Any, Final, Protocol
 
 from firable.executor.drivers.binding import DeviceDocument, writes
-from firable.executor.drivers.device import Connection, DeviceKind, LinkError, Options, Point, Value, Wanted, Writes
+from firable.executor.drivers.device import (
+    Connection,
+    DeviceKind,
+    LinkError,
+    Options,
+    Point,
+    Prompt,
+    Value,
+    Wanted,
+    Writes,
+)
 
 BEATS: Final = 65_536
 """Heartbeats are numbers from 0, one more each time, and again from 0."""
@@ -73,6 +85,10 @@ async def uninterrupted(work: Coroutine[Any, Any, None]) -> None:
     task.result()
     if cancelled is not None:
         raise cancelled
+
+
+async def _failed(error: Exception) -> None:
+    raise error
 
 
 class Served(Protocol):
@@ -151,6 +167,10 @@ class Kept:
         self.served = served
         self.safe = writes(document.safe)
         self.awake = asyncio.Event()
+        self.idle: Prompt | None = None
+        """The connection, while who writes has nothing to write."""
+        self.begun: Coroutine[Any, Any, None] | None = None
+        """What was begun on it meanwhile, and who writes is to wait for."""
         self.connections = 0
         """How many connections there have been."""
         self.is_connected = False
@@ -230,6 +250,17 @@ class Kept:
             self.writing.reschedule(asyncio.get_running_loop().time() + _CONFIRMED_SECONDS)
         self.awake.set()
 
+    def urge(self) -> None:
+        """There is something to be written: it is begun now, where nothing else is under way, or else in its turn."""
+        if self.idle is not None and not self.stopping:
+            connection, self.idle = self.idle, None
+            try:
+                if (some := self.served.next_writes()) is not None:
+                    self.begun = connection.begin(some)
+            except Exception as error:
+                self.begun = _failed(error)  # a mistake is dealt with where it would else be made
+        self.awake.set()
+
     async def _asked_to_stop(self) -> None:
         while not self.stopping:
             self.awake.clear()
@@ -247,6 +278,7 @@ class Kept:
             raise
         finally:
             self.is_connected = False
+            self._forget()
             await connection.close()
 
     async def _serve(self, connection: Connection) -> None:
@@ -275,7 +307,7 @@ class Kept:
         while True:
             self._take(await connection.read())
             if self.served.is_writing:  # what was read may be what the next command waits for
-                self.awake.set()
+                self.urge()
 
     async def _write(self, connection: Connection) -> None:
         if (not self.started or self.served.is_latched) and not self.stopping:
@@ -285,44 +317,60 @@ class Kept:
         self.connections += 1
         self.served.ready()
         loop = asyncio.get_running_loop()
+        prompt = connection if isinstance(connection, Prompt) else None
         heartbeat = self.document.heartbeat
         due = loop.time()
         beaten = False
-        while not self.stopping:
+        while not self.stopping or self.begun is not None:
             self.awake.clear()
+            if self.begun is not None:
+                beaten, (begun, self.begun) = False, (self.begun, None)
+                await self._put(begun)
+                self.served.written()
+                continue
             is_due = heartbeat is not None and loop.time() >= due
             # They take turns where a device is so slow that there is always a heartbeat to be sent.
             if not (is_due and not beaten) and (some := self.served.next_writes()) is not None:
                 beaten = False
-                await self._put(connection, some)
+                await self._put(connection.write(some))
                 self.served.written()
             elif is_due and heartbeat is not None:
                 beaten, due = True, loop.time() + heartbeat.every_s
-                await self._put(connection, ((heartbeat.write, self.beat),))
+                await self._put(connection.write(((heartbeat.write, self.beat),)))
                 self.beat = (self.beat + 1) % BEATS
             else:
                 timer = None if heartbeat is None else loop.call_later(due - loop.time(), self.awake.set)
-                await self.awake.wait()
+                self.idle = prompt
+                try:
+                    await self.awake.wait()
+                finally:
+                    self.idle = None
                 if timer is not None:
                     timer.cancel()
         if self.safe:
             await connection.write(self.safe)
         self.is_safe = True
 
-    async def _put(self, connection: Connection, some: Writes) -> None:
+    async def _put(self, writing: Coroutine[Any, Any, None]) -> None:
         """Write, and break it off at a stop, so that no machine starts after it; the connection is of no use then.
 
         Without a task of its own, which would be two more turns of the loop on the way of each command.
         """
         try:
-            async with asyncio.timeout(None) as self.writing:
-                await connection.write(some)
+            async with asyncio.timeout(_CONFIRMED_SECONDS if self.stopping else None) as self.writing:
+                await writing
         except TimeoutError:
             if self.stopping:
                 raise LinkError("stopped while something was written") from None
             raise
         finally:
             self.writing = None
+
+    def _forget(self) -> None:
+        """The connection is gone, with what was begun on it."""
+        if self.begun is not None:
+            self.begun.close()
+            self.begun = None
 
     async def _watch(self) -> None:
         """End the connection when the device has not changed its sign of life in time."""

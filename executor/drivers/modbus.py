@@ -1,45 +1,49 @@
 """Modbus over TCP and over a serial line (RTU), by pymodbus.
 
-Points are `coil N`, `discrete N`, `input N` and `holding N`, with addresses from 0 as they stand on the wire, and
-`holding N.B` or `input N.B` for a bit of a register, from 0. Modbus has no events, so the points are polled: those next
-to each other in one request, never with a gap, because a device may refuse what is not there. What is written together
-and lies together goes out in one request, so that a command and its number reach the device in one piece.
-The line takes one request at a time, and a command goes before the next poll.
+Modbus has no events, so the points are polled (`modbus_points.py`). What is written together and lies together goes out
+in one request, so that a command and its number reach the device in one piece. The line takes one request at a time,
+and a command goes before the next poll.
 
-A request that is not answered in time ends the connection (`retries=0`). Frames over TCP carry a transaction number and
-pymodbus looks at it, frames of RTU carry none: there a late answer *is* the answer to the next question. The time is
-watched here (`Watch`), by one timer for all requests of a connection: pymodbus would set one for each, and wait for its
-answer in two more turns of the event loop, which is a good part of what a reaction takes.
+A request that is not answered in time ends the connection. Frames over TCP carry a transaction number and pymodbus
+looks at it, frames of RTU carry none: there a late answer *is* the answer to the next question.
 
-pymodbus does not tell who waits for an answer that the connection is gone: it would be waited for until its time is
-over. So this is told here. And what comes when nobody asks any more, as where a stop has broken off a question, is
-nobody's answer: it is dropped before pymodbus warns of it.
+What is asked, how it is written and read, and the transport are those of pymodbus; only the waiting is done here
+(`ModbusConnection.ask`). Its `execute` sets a timer for each request, and passes an answer on through three coroutines
+and two locks: a good part of what a reaction takes. Here one timer watches all requests of a connection (`Watch`), and
+what is sent is sent by a plain call, so that a command that follows from an answer leaves in the turn of the event loop
+in which the answer came (`begin`). Who waits for an answer is told when the connection is gone, which pymodbus tells
+nobody. And what comes when nobody asks any more, as where a stop has broken off a question, is nobody's answer: it is
+dropped before pymodbus warns of it.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import Field
 
 from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes, quiet
+from firable.executor.drivers.modbus_points import (
+    BITS,
+    WRITTEN,
+    Address,
+    Block,
+    address,
+    blocks,
+    shown_value,
+    together,
+)
 
 if TYPE_CHECKING:
     from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
+    from pymodbus.client.mixin import ModbusClientMixin
     from pymodbus.pdu import ModbusPDU
-
-TABLES: Final = ("coil", "discrete", "input", "holding")
-BITS: Final = ("coil", "discrete")
-WRITTEN: Final = ("coil", "holding")
-ADDRESS_MAX: Final = 65_535
-AT_ONCE_MAX: Final = {"coil": 1968, "discrete": 2000, "input": 125, "holding": 123}
-"""How many a request may carry, by the standard."""
 
 
 class TcpOptions(Options):
@@ -62,57 +66,6 @@ class RtuOptions(Options):
     every_s: float = Field(default=0.02, ge=0, le=60, allow_inf_nan=False)
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Address:
-    """What a point means; `bit` is None for the whole."""
-
-    table: str
-    number: int
-    bit: int | None = None
-
-
-def address(point: Point) -> Address:
-    """The address that a point is; raises `ValueError` with a sentence that says what is wrong.
-
-    >>> address("coil 5"), address("input 30.2")
-    (Address(table='coil', number=5, bit=None), Address(table='input', number=30, bit=2))
-    """
-    table, _, rest = point.partition(" ")
-    number, dot, bit = rest.partition(".")
-    if table not in TABLES or not number.isdecimal() or int(number) > ADDRESS_MAX:
-        raise ValueError("it is not `coil N`, `discrete N`, `input N` or `holding N`, with N from 0 to 65535")
-    if not dot:
-        return Address(table, int(number))
-    if table in BITS or not bit.isdecimal() or int(bit) > 15:
-        raise ValueError("only a register has bits, `holding N.B` or `input N.B`, with B from 0 to 15")
-    return Address(table, int(number), int(bit))
-
-
-@dataclass(frozen=True, slots=True)
-class _Block:
-    """Addresses that are read or written in one request."""
-
-    table: str
-    first: int
-    count: int
-
-
-def blocks(addresses: Sequence[Address]) -> Iterator[_Block]:
-    """The requests that read all addresses and nothing else.
-
-    >>> [(b.first, b.count) for b in blocks([address(f"input {n}") for n in (4, 3, 7, 3)])]
-    [(3, 2), (7, 1)]
-    """
-    for table in TABLES:
-        numbers = sorted({one.number for one in addresses if one.table == table})
-        while numbers:
-            count = 1
-            while count < min(len(numbers), AT_ONCE_MAX[table]) and numbers[count] == numbers[0] + count:
-                count += 1
-            yield _Block(table, numbers[0], count)
-            del numbers[:count]
-
-
 class Watch:
     """The time limit of a connection, on whatever it asks: one question at a time."""
 
@@ -120,18 +73,13 @@ class Watch:
         self.timeout_s = timeout_s
         self.loop = asyncio.get_running_loop()
         self.since_seconds = 0.0
-        self.asking: asyncio.Task[Any] | None = None
-        """Who asks, since then."""
-        self.is_over = False
+        self.answer: asyncio.Future[Any] | None = None
+        """What is waited for since then."""
         self.timer = self.loop.call_later(timeout_s, self._look)
 
-    def __enter__(self) -> None:
-        self.since_seconds, self.asking = self.loop.time(), asyncio.current_task()
-
-    def __exit__(self, *failed: object) -> None:
-        asking, self.asking = self.asking, None
-        if self.is_over and asking is not None and asking.uncancel() == 0:
-            raise TimeoutError("no answer in time") from None
+    def begin(self, answer: asyncio.Future[Any]) -> None:
+        """A question is asked."""
+        self.since_seconds, self.answer = self.loop.time(), answer
 
     def close(self) -> None:
         """Watch no more."""
@@ -139,13 +87,20 @@ class Watch:
 
     def _look(self) -> None:
         left_s = self.timeout_s
-        if self.asking is not None:
+        if self.answer is not None and not self.answer.done():
             left_s -= self.loop.time() - self.since_seconds
             if left_s <= 0:
-                self.is_over = True
-                self.asking.cancel()
-                return
+                self.answer.set_exception(TimeoutError("no answer in time"))
+                left_s = self.timeout_s
         self.timer = self.loop.call_later(left_s, self._look)
+
+
+@dataclass(frozen=True, slots=True)
+class _Question:
+    """A request, and of what, in words."""
+
+    request: ModbusPDU
+    what: str
 
 
 class ModbusConnection:
@@ -158,71 +113,96 @@ class ModbusConnection:
 
         self.client = client
         self.closed = partial(ModbusException, "the connection was closed")
+        self.unconnected = partial(ModbusException, "Not connected")
         client.ctx.trace_connect = self._told
         client.ctx.trace_packet = self._passed
+        self.requests = _requests()
         self.unit = unit
         self.every_s = every_s
+        self.loop = asyncio.get_running_loop()
         self.watch = Watch(timeout_s)
-        self.line = asyncio.Lock()
-        """Of who asks: the time of a question begins when the line is its own."""
+        self.is_asking = False
+        """Whether an answer is awaited: the line takes one question at a time."""
+        self.queue: deque[asyncio.Future[None]] = deque()
+        """Who waits for the line; the first is told when it is free."""
+        self.is_free = asyncio.Event()
+        """Set while nothing is being written."""
+        self.is_free.set()
         self.points: dict[Address, list[Point]] = {}
-        self.blocks: tuple[_Block, ...] = ()
+        self.polls: list[tuple[_Question, Block]] = []
         self.layout: list[tuple[Point, int, Address]] = []
         """Where each point stands among the values of all blocks."""
         self.due_seconds = 0.0
         self.failures: tuple[type[Exception], ...] = (ModbusException, TimeoutError)
-        self.asked: dict[str, Callable[..., Awaitable[ModbusPDU]]] = {
-            "coil": client.read_coils,
-            "discrete": client.read_discrete_inputs,
-            "input": client.read_input_registers,
-            "holding": client.read_holding_registers,
-        }
-        """What asks for a block of each table."""
-        self.is_free = asyncio.Event()
-        """Set while nothing is being written."""
-        self.is_free.set()
 
     def want(self, points: Sequence[Point]) -> None:
         """Say what is to be read."""
         for point in points:
             self.points.setdefault(address(point), []).append(point)
-        self.blocks = tuple(blocks(list(self.points)))
-        first = dict(zip(self.blocks, accumulate((b.count for b in self.blocks), initial=0), strict=False))
-        at = {(b.table, b.first + i): first[b] + i for b in self.blocks for i in range(b.count)}
+        asking = {
+            "coil": self.requests.read_coils,
+            "discrete": self.requests.read_discrete_inputs,
+            "input": self.requests.read_input_registers,
+            "holding": self.requests.read_holding_registers,
+        }
+        at: dict[tuple[str, int], int] = {}
+        for block in blocks(list(self.points)):
+            request = asking[block.table](block.first, count=block.count, device_id=self.unit)
+            self.polls.append((_Question(request, f"{block.table} {block.first}"), block))
+            for number in range(block.first, block.first + block.count):
+                at[block.table, number] = len(at)
         self.layout = [(point, at[one.table, one.number], one) for one, each in self.points.items() for point in each]
 
     async def read(self) -> Sequence[tuple[Point, Value]]:
         """All points, when it is time to poll them again."""
-        loop = asyncio.get_running_loop()
-        # A turn of the loop at least, in which the writer begins with the command that follows from what was polled.
-        await asyncio.sleep(max(0.0, self.due_seconds - loop.time()))
+        if (early_s := self.due_seconds - self.loop.time()) > 0 or not self.polls:
+            await asyncio.sleep(max(0.0, early_s))
         if not self.is_free.is_set():
             await self.is_free.wait()
-        self.due_seconds = loop.time() + self.every_s
+        self.due_seconds = self.loop.time() + self.every_s
         shown: list[int] = []
-        for block in self.blocks:
-            shown += await self._block(block)
-        return [(point, _value(shown[at], one)) for point, at, one in self.layout]
+        for question, block in self.polls:
+            await self._turn()
+            answer = await self._answer(self.ask(question), question)
+            values: Sequence[int] = answer.bits if block.table in BITS else answer.registers
+            if len(values) < block.count:
+                short = f"an answer with {len(values)} values to a question for {block.count}"
+                raise LinkError(f"{short} from {question.what}")
+            shown += values[: block.count]
+        return [(point, shown_value(shown[at], one)) for point, at, one in self.layout]
 
     async def write(self, writes: Writes) -> None:
         """Write values in their order, neighbours together."""
-        self.is_free.clear()
-        try:
-            await self._write_all([(address(point), value) for point, value in writes])
-        finally:
-            self.is_free.set()
+        await self.begin(writes)
 
-    async def _write_all(self, pending: list[tuple[Address, Value]]) -> None:
-        while pending:
-            (first, _), count = pending[0], 1
-            while (
-                count < min(len(pending), AT_ONCE_MAX[first.table])
-                and first.bit is None
-                and pending[count][0] == Address(first.table, first.number + count)
-            ):
-                count += 1
-            await self._write(first, [value for _, value in pending[:count]])
-            del pending[:count]
+    def begin(self, writes: Writes) -> Coroutine[Any, Any, None]:
+        """Write values in their order, the first of them now where nothing else is asked; what waits for the rest."""
+        self.is_free.clear()  # nothing is polled before they are written
+        begun: tuple[_Question, asyncio.Future[ModbusPDU]] | None = None
+        questions = self._questions(writes)
+        if self._is_idle:
+            try:
+                if (first := next(questions, None)) is not None:
+                    begun = first, self.ask(first)
+            except LinkError:
+                questions = self._questions(writes)  # who waits is told
+        return self._written(begun, questions)
+
+    def ask(self, question: _Question) -> asyncio.Future[ModbusPDU]:
+        """Ask the device now, as nothing else is asked; what will be answered, or why nothing will be."""
+        line = self.client.ctx
+        answer: asyncio.Future[ModbusPDU] = self.loop.create_future()
+        self.is_asking = True
+        self.watch.begin(answer)
+        line.response_future, line.recv_buffer = answer, b""
+        try:
+            if line.transport is None:
+                raise self.unconnected()
+            question.request.transaction_id = line.getNextTID()
+            line.pdu_send(question.request)
+        except Exception as error:
+            answer.set_exception(error)
+        return answer
 
     async def close(self) -> None:
         """Close the client, which is not used again."""
@@ -232,22 +212,66 @@ class ModbusConnection:
     def _told(self, is_connected: bool) -> None:
         """The connection is made, or it is gone: then nobody will answer what was asked."""
         answer = self.client.ctx.response_future
-        if not is_connected and self.watch.asking is not None and not answer.done():
+        if not is_connected and self.is_asking and not answer.done():
             answer.set_exception(self.closed())
 
     def _passed(self, is_sent: bool, data: bytes) -> bytes:
         """What goes out, and what comes in as long as somebody asks."""
         return data if is_sent or not self.client.ctx.response_future.done() else b""
 
-    async def _block(self, block: _Block) -> Sequence[int]:
-        what = f"{block.table} {block.first}"
-        answer = await self._answered(partial(self.asked[block.table], block.first, count=block.count), what)
-        shown: Sequence[int] = answer.bits if block.table in BITS else answer.registers
-        if len(shown) < block.count:
-            raise LinkError(f"an answer with {len(shown)} values to a question for {block.count} from {what}")
-        return shown[: block.count]
+    async def _written(
+        self, begun: tuple[_Question, asyncio.Future[ModbusPDU]] | None, questions: Iterator[_Question]
+    ) -> None:
+        try:
+            if begun is not None:
+                question, answer = begun
+                await self._answer(answer, question)
+            for question in questions:
+                await self._turn()
+                await self._answer(self.ask(question), question)
+        finally:
+            self.is_free.set()
 
-    async def _write(self, first: Address, values: Sequence[Value]) -> None:
+    @property
+    def _is_idle(self) -> bool:
+        return not self.is_asking and not self.queue
+
+    async def _turn(self) -> None:
+        """Wait until the line is free, behind those who have waited before: neither polls nor writes starve."""
+        if self._is_idle:
+            return
+        turn = self.loop.create_future()
+        self.queue.append(turn)
+        try:
+            await turn
+        except asyncio.CancelledError:
+            self.queue.remove(turn)
+            self._hand_on()
+            raise
+        self.queue.remove(turn)
+
+    def _hand_on(self) -> None:
+        if self.queue and not self.is_asking and not self.queue[0].done():
+            self.queue[0].set_result(None)
+
+    async def _answer(self, answer: asyncio.Future[ModbusPDU], question: _Question) -> ModbusPDU:
+        try:
+            shown = await answer
+        except self.failures as error:
+            raise LinkError(f"{question.what}: {str(error).removeprefix('Modbus Error: ')}") from None
+        finally:
+            self.is_asking = False
+            self._hand_on()
+        if shown.isError():
+            raise LinkError(f"the device refuses {question.what}: exception {shown.exception_code}")
+        return shown
+
+    def _questions(self, writes: Writes) -> Iterator[_Question]:
+        """The requests that write values in their order, neighbours together; raises `LinkError`."""
+        for first, begin, end in together(tuple(point for point, _ in writes)):
+            yield self._question(first, [value for _, value in writes[begin:end]])
+
+    def _question(self, first: Address, values: Sequence[Value]) -> _Question:
         what = f"{first.table} {first.number}"
         try:
             numbers = [int(value) for value in values]
@@ -255,32 +279,29 @@ class ModbusConnection:
             raise LinkError(f"{what} takes numbers, not {values[0]!r}") from None
         if first.table == "coil":
             bits = [bool(number) for number in numbers]
-            request = partial(self.client.write_coils, first.number, bits)
-        elif first.bit is not None:
+            return _Question(self.requests.write_coils(first.number, bits, device_id=self.unit), what)
+        if first.bit is not None:
             mask = 1 << first.bit
-            mask_write = self.client.mask_write_register
-            request = partial(mask_write, address=first.number, and_mask=0xFFFF ^ mask, or_mask=mask * bool(numbers[0]))
-        else:
-            numbers = [number & 0xFFFF for number in numbers]
-            request = partial(self.client.write_registers, first.number, numbers)
-        await self._answered(request, what)
-
-    async def _answered(self, request: Callable[..., Awaitable[ModbusPDU]], what: str) -> ModbusPDU:
-        try:
-            async with self.line:
-                with self.watch:
-                    answer = await request(device_id=self.unit)
-        except self.failures as error:
-            raise LinkError(f"{what}: {str(error).removeprefix('Modbus Error: ')}") from None
-        if answer.isError():
-            raise LinkError(f"the device refuses {what}: exception {answer.exception_code}")
-        return answer
+            keeping, setting = 0xFFFF ^ mask, mask * bool(numbers[0])
+            mask_write = self.requests.mask_write_register
+            request = mask_write(address=first.number, and_mask=keeping, or_mask=setting, device_id=self.unit)
+            return _Question(request, what)
+        numbers = [number & 0xFFFF for number in numbers]
+        return _Question(self.requests.write_registers(first.number, numbers, device_id=self.unit), what)
 
 
-def _value(shown: int, one: Address) -> Value:
-    if one.table in BITS:
-        return bool(shown)
-    return shown if one.bit is None else bool(shown >> one.bit & 1)
+def _requests() -> ModbusClientMixin[ModbusPDU]:
+    """The requests of pymodbus, by the methods of its clients, as they are before they are sent."""
+    from pymodbus.client.mixin import ModbusClientMixin
+    from pymodbus.pdu import ModbusPDU
+
+    class Requests(ModbusClientMixin[ModbusPDU]):
+        def execute(self, no_response_expected: bool, request: ModbusPDU) -> ModbusPDU:
+            del no_response_expected
+            return request
+
+    made: Callable[[], ModbusClientMixin[ModbusPDU]] = Requests  # it is not typed
+    return made()
 
 
 class _Modbus:

@@ -16,7 +16,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from firable.executor.drivers.device import Point, Value, quiet
 from firable.executor.drivers.far_side.end import Faults
 from firable.executor.drivers.far_side.line import PseudoLine
-from firable.executor.drivers.modbus import BITS, Address, address
+from firable.executor.drivers.modbus_points import BITS, Address, address
 
 REGISTERS = 256
 """How many addresses each table has."""

@@ -1,0 +1,99 @@
+"""Points of Modbus devices: what an address means, and which of them one request reads or writes.
+
+Points are `coil N`, `discrete N`, `input N` and `holding N`, with addresses from 0 as they stand on the wire, and
+`holding N.B` or `input N.B` for a bit of a register, from 0. Those next to each other go into one request, never with a
+gap, because a device may refuse what is not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from typing import Final
+
+from firable.executor.drivers.device import Point, Value
+
+TABLES: Final = ("coil", "discrete", "input", "holding")
+BITS: Final = ("coil", "discrete")
+WRITTEN: Final = ("coil", "holding")
+ADDRESS_MAX: Final = 65_535
+AT_ONCE_MAX: Final = {"coil": 1968, "discrete": 2000, "input": 125, "holding": 123}
+"""How many a request may carry, by the standard."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Address:
+    """What a point means; `bit` is None for the whole."""
+
+    table: str
+    number: int
+    bit: int | None = None
+
+
+@cache
+def address(point: Point) -> Address:
+    """The address that a point is; raises `ValueError` with a sentence that says what is wrong.
+
+    >>> address("coil 5"), address("input 30.2")
+    (Address(table='coil', number=5, bit=None), Address(table='input', number=30, bit=2))
+    """
+    table, _, rest = point.partition(" ")
+    number, dot, bit = rest.partition(".")
+    if table not in TABLES or not number.isdecimal() or int(number) > ADDRESS_MAX:
+        raise ValueError("it is not `coil N`, `discrete N`, `input N` or `holding N`, with N from 0 to 65535")
+    if not dot:
+        return Address(table, int(number))
+    if table in BITS or not bit.isdecimal() or int(bit) > 15:
+        raise ValueError("only a register has bits, `holding N.B` or `input N.B`, with B from 0 to 15")
+    return Address(table, int(number), int(bit))
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Addresses that are read or written in one request."""
+
+    table: str
+    first: int
+    count: int
+
+
+def blocks(addresses: Sequence[Address]) -> Iterator[Block]:
+    """The requests that read all addresses and nothing else.
+
+    >>> [(b.first, b.count) for b in blocks([address(f"input {n}") for n in (4, 3, 7, 3)])]
+    [(3, 2), (7, 1)]
+    """
+    for table in TABLES:
+        numbers = sorted({one.number for one in addresses if one.table == table})
+        while numbers:
+            count = 1
+            while count < min(len(numbers), AT_ONCE_MAX[table]) and numbers[count] == numbers[0] + count:
+                count += 1
+            yield Block(table, numbers[0], count)
+            del numbers[:count]
+
+
+@cache
+def together(points: tuple[Point, ...]) -> tuple[tuple[Address, int, int], ...]:
+    """Which points are written in one request: the address of the first, and where they begin and end.
+
+    >>> [(begin, end) for _, begin, end in together(("holding 4", "holding 5", "coil 6", "holding 6"))]
+    [(0, 2), (2, 3), (3, 4)]
+    """
+    found = [address(point) for point in points]
+    cuts = [0]
+    for at in range(1, len(found)):
+        first, count = found[cuts[-1]], at - cuts[-1]
+        follows = first.bit is None and found[at] == Address(first.table, first.number + count)
+        if not follows or count == AT_ONCE_MAX[first.table]:
+            cuts.append(at)
+    return tuple((found[begin], begin, end) for begin, end in pairwise([*cuts, len(found)]) if begin < end)
+
+
+def shown_value(shown: int, one: Address) -> Value:
+    """What a point shows, of the bit or register that it is or is in."""
+    if one.table in BITS:
+        return bool(shown)
+    return shown if one.bit is None else bool(shown >> one.bit & 1)
