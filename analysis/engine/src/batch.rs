@@ -52,8 +52,9 @@ impl Batch {
         self.hashes[..keys.len()].copy_from_slice(keys);
     }
 
+    /// The same without anything that stands for them.
     #[inline(always)]
-    fn slice<W: Width>(&mut self, width: W) {
+    pub fn slice<W: Width>(&mut self, width: W) {
         self.count = self.markings.len() / width.words();
         self.valid = if self.count == 64 { !0 } else { (1 << self.count) - 1 };
         slice(width, &self.markings, &mut self.slices);

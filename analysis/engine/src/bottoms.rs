@@ -14,12 +14,19 @@
 //! 3. What is left has all its edges in its own tree. Search on from it: either an edge leads into another tree, and
 //!    the two are joined, or all that it reaches goes down to it again, which is a bottom component.
 //!
+//! Before that, an order of markings in which each transition always goes down or always up is tried (`descent.rs`): where
+//! it is enough, and mostly it is, no edge is looked up at all.
+//!
 //! M0 reaches everything, so where another bottom component exists, M0 is in none and needs no search. The work of
 //! searches that are given up is bounded: where it grows beyond the graph itself, the edges are stored and the
 //! components found by Pearce's algorithm (`scc.rs`), if memory allows it. That is also the way under steps.
 //!
 //! The rejected way, a search against the edges from M0, tests each marking for every edge that enters it: it took
-//! two to five times the exploration, this one takes a fraction of it.
+//! two to five times the exploration, this one takes about as long as it, and without the edges a twentieth.
+
+mod descent;
+mod meeting;
+mod ranking;
 
 use crate::bits::Bits;
 use crate::budget::{Memory, Stop, Watch};
@@ -47,6 +54,14 @@ pub struct Bottoms {
 impl Bottoms {
     /// The bottom components of a whole graph.
     pub fn new(space: &Space, watch: &mut Watch<'_>) -> Result<Self, Stop> {
+        if !space.step {
+            let memory = space.memory.clone();
+            match with_width!(space.net.words, width => descent::bottoms(width, space, &memory, watch)) {
+                Ok(Some(bottoms)) => return Ok(bottoms),
+                Ok(None) | Err(Stop::Memory) => {}
+                Err(stop) => return Err(stop),
+            }
+        }
         Bottoms::within(space, 2 * space.len(), watch)
     }
 

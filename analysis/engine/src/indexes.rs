@@ -260,6 +260,15 @@ impl Space {
         }
     }
 
+    /// Whether a marking was found; where markings have keys, another one may stand for one that was not.
+    pub fn may_hold<W: Width>(&self, width: W, marking: &[u64]) -> bool {
+        match &self.set {
+            Set::Hashed => self.table.find(width, marking, linear_hash(width, marking)).is_some(),
+            Set::Narrow(keyed) => keyed.exact.has(keyed.span.key(marking)),
+            Set::Wide(keyed) => keyed.exact.has(keyed.span.key(marking)),
+        }
+    }
+
     /// The index of any marking, if it was found.
     pub fn find(&self, marking: &[u64]) -> Option<u32> {
         with_width!(self.net.words, width => {

@@ -148,6 +148,13 @@ impl Rules {
         self.edge[t]
     }
 
+    /// Which of some of the sliced markings have an edge by the transition.
+    #[inline(always)]
+    pub fn fire(&self, t: usize, slices: &[u64], pending: u64) -> u64 {
+        let (base, blocked) = self.test(t, slices, pending);
+        base & !blocked & self.edge[t]
+    }
+
     /// The same test at one marking, of an openable transition; false for any other.
     pub fn test_one(&self, t: usize, holds: impl Fn(u32) -> bool) -> bool {
         let span = self.spans[t];
@@ -245,6 +252,15 @@ impl Net {
     #[inline(always)]
     pub fn flip(&self, t: usize, words: usize) -> &[u64] {
         &self.flips[t * words..(t + 1) * words]
+    }
+
+    /// Changes some of the sliced markings as a firing of `t` does.
+    #[inline(always)]
+    pub fn flip_slices(&self, t: usize, slices: &mut [u64], some: u64) {
+        let Transition { inputs, outputs, .. } = &self.transitions[t];
+        for &p in inputs.iter().chain(outputs) {
+            slices[p as usize] ^= some;
+        }
     }
 
     /// Bytes held by the compiled net.

@@ -16,6 +16,29 @@ pub(crate) fn machines(n: u32, pad: u32) -> Net {
     Net::new((pad + 2 * n) as usize, transitions, &initial).expect("well formed")
 }
 
+/// The slotted ring of so many nodes: nearly all markings come down to one that is far from M0.
+pub(crate) fn slotted_ring(n: u32) -> Net {
+    let transitions = (0..n)
+        .flat_map(|i| {
+            let [used, owned, ready, put, idle, sent, full, get] = [0, 1, 2, 3, 4, 5, 6, 7].map(|k| 8 * i + k);
+            let before = 8 * ((i + n - 1) % n);
+            [
+                (vec![used], vec![put]),
+                (vec![used], vec![owned]),
+                (vec![owned], vec![put]),
+                (vec![owned], vec![get]),
+                (vec![sent, get], vec![ready, idle]),
+                (vec![put, sent], vec![ready, full]),
+                (vec![full, before + 2], vec![sent, before]),
+                (vec![idle, before + 2], vec![sent, before + 1]),
+            ]
+        })
+        .map(|(inputs, outputs)| Transition::new(&inputs, &outputs, &[], &[], &[]))
+        .collect();
+    let initial: Vec<u32> = (0..n).flat_map(|i| [8 * i + 2, 8 * i + 4]).collect();
+    Net::new(8 * n as usize, transitions, &initial).expect("well formed")
+}
+
 pub(crate) fn explore(net: Net, step: bool) -> Space {
     let limits = Limits { step, markings: 1 << 20, memory_bytes: 1 << 28, time: None };
     Space::explore(net, limits, &mut unwatched).expect("fits")
