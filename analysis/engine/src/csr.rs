@@ -115,7 +115,7 @@ fn fill_by_key<W: Width>(
     watch: &mut Watch<'_>,
 ) -> Result<(), Stop> {
     let (count, net) = (space.len(), &space.net);
-    let mut batch = Batch::new(width.words());
+    let mut batch = Batch::new(net);
     let mut fires = vec![[0_u64; 64]; net.transitions.len().div_ceil(64)];
     let (mut keys, mut waiting, mut asking) = ([0; ROOM], 0, Asking::new());
     let mut parts = targets.chunks_mut(ROOM);

@@ -56,7 +56,7 @@ impl<'a> Edges<'a> {
             space,
             steps: space.step.then(|| Steps::new(&space.net, &space.components)),
             firable: vec![Vec::new(); 64],
-            batch: Batch::new(space.net.words),
+            batch: Batch::new(&space.net),
         }
     }
 

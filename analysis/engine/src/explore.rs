@@ -191,7 +191,7 @@ impl Space {
         max: usize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
-        let mut batch = Batch::new(width.words());
+        let mut batch = Batch::new(net);
         batch.markings.extend_from_slice(&net.initial);
         arrivals.first(width, &mut batch, (&mut self.table, max, &self.memory, watch))?;
         let (mut next, mut end) = (0, 1);

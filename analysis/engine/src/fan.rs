@@ -47,7 +47,7 @@ impl<'a> Fan<'a> {
         Ok(Fan {
             space,
             rules,
-            batch: Batch::new(space.net.words),
+            batch: Batch::new(&space.net),
             candidates: Candidates::new(space.net.words),
             keys: Vec::new(),
             edges: Vec::new(),

@@ -13,10 +13,11 @@ use std::hint::black_box;
 
 use crate::batch::Batch;
 use crate::budget::{Memory, Stop, Watch};
-use crate::exact::{Exact, ROOM};
+use crate::exact::ROOM;
 use crate::explore::Space;
 use crate::known::{Keyed, Set};
 use crate::marking::{Width, linear_hash};
+use crate::net::Net;
 use crate::region::Region;
 use crate::seat::{LANES, REACH, Shape, Slot};
 use crate::store::Store;
@@ -68,20 +69,19 @@ impl<S: Slot> Indexes<S> {
     fn new<W: Width>(
         width: W,
         keyed: &Keyed<S>,
-        exact: &Exact<S>,
-        store: &Store,
+        (net, store): (&Net, &Store),
         memory: &Memory,
         watch: &mut Watch<'_>,
     ) -> Result<Self, Stop> {
-        let from = exact.all();
+        let from = keyed.exact.all();
         let bytes = 2 * size_of_val(from);
         memory.claim(bytes)?;
         let Some(lines) = Region::zeroed(2 * from.len()) else {
             memory.release(bytes);
             return Err(Stop::Memory);
         };
-        let mut indexes = Indexes { lines, shape: exact.shape() };
-        let fill = indexes.fill(width, keyed, from, store, watch);
+        let mut indexes = Indexes { lines, shape: keyed.exact.shape() };
+        let fill = indexes.fill(width, keyed, from, (net, store), watch);
         fill.inspect_err(|_| memory.release(bytes)).map(|()| indexes)
     }
 
@@ -90,14 +90,14 @@ impl<S: Slot> Indexes<S> {
         width: W,
         keyed: &Keyed<S>,
         from: &[S],
-        store: &Store,
+        (net, store): (&Net, &Store),
         watch: &mut Watch<'_>,
     ) -> Result<(), Stop> {
         let lines = self.lines.all_mut().as_chunks_mut::<LINE>().0;
         for (line, bucket) in lines.iter_mut().zip(from.as_chunks::<LANES>().0) {
             line[..LANES].copy_from_slice(bucket);
         }
-        let mut batch = Batch::new(width.words());
+        let mut batch = Batch::new(net);
         let (mut keys, mut asking) = ([0; ROOM], Asking::new());
         for first in (0..store.len()).step_by(ROOM) {
             let end = store.len().min(first + ROOM);
@@ -183,9 +183,15 @@ impl<S: Slot> Indexes<S> {
 }
 
 impl<S: Slot> Keyed<S> {
-    fn index<W: Width>(&self, width: W, store: &Store, memory: &Memory, watch: &mut Watch<'_>) -> Result<(), Stop> {
+    fn index<W: Width>(
+        &self,
+        width: W,
+        of: (&Net, &Store),
+        memory: &Memory,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Stop> {
         if self.indexes.get().is_none() {
-            let indexes = Indexes::new(width, self, &self.exact, store, memory, watch)?;
+            let indexes = Indexes::new(width, self, of, memory, watch)?;
             if let Err(second) = self.indexes.set(indexes) {
                 // Somebody has done the same meanwhile.
                 memory.release(size_of_val(second.lines.all()));
@@ -245,8 +251,8 @@ impl Space {
     pub fn index(&self, watch: &mut Watch<'_>) -> Result<(), Stop> {
         with_width!(self.net.words, width => match &self.set {
             Set::Hashed => Ok(()),
-            Set::Narrow(keyed) => keyed.index(width, &self.table.store, &self.memory, watch),
-            Set::Wide(keyed) => keyed.index(width, &self.table.store, &self.memory, watch),
+            Set::Narrow(keyed) => keyed.index(width, (&self.net, &self.table.store), &self.memory, watch),
+            Set::Wide(keyed) => keyed.index(width, (&self.net, &self.table.store), &self.memory, watch),
         })
     }
 

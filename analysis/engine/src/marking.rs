@@ -147,33 +147,42 @@ fn swap_blocks<const D: usize>(rows: &mut [u64; 64], mask: u64) {
     }
 }
 
-/// Bit slices of up to 64 markings laid end to end: bit `j` of slice `p` says whether marking `j` holds place `p`.
+/// Bit slices of up to 64 markings laid end to end, for the places of some words: bit `j` of slice `p` says whether
+/// marking `j` holds place `p`.
 ///
 /// Few markings are scattered token by token, many are transposed word by word; both leave the same slices.
 #[inline]
-pub fn slice<W: Width>(width: W, markings: &[u64], slices: &mut [u64]) {
-    let words = width.words();
-    let count = markings.len() / words;
-    debug_assert!(count <= 64 && slices.len() == 64 * words);
-    if count <= 6 {
-        slices.fill(0);
-        for (j, marking) in markings.chunks_exact(words).enumerate() {
-            for (k, &word) in marking.iter().enumerate() {
-                let mut rest = word;
-                while rest != 0 {
-                    slices[64 * k + rest.trailing_zeros() as usize] |= 1 << j;
-                    rest &= rest - 1;
-                }
-            }
-        }
+pub fn slice<W: Width>(width: W, active: &[usize], markings: &[u64], slices: &mut [u64]) {
+    let blocks = slices.as_chunks_mut::<64>().0;
+    debug_assert!(markings.len() <= 64 * width.words() && blocks.len() == width.words());
+    if width.words() == 1 {
+        slice_word(width, 0, markings, &mut blocks[0]);
         return;
     }
-    for (k, block) in slices.as_chunks_mut::<64>().0.iter_mut().enumerate() {
+    for &k in active {
+        slice_word(width, k, markings, &mut blocks[k]);
+    }
+}
+
+#[inline(always)]
+fn slice_word<W: Width>(width: W, k: usize, markings: &[u64], block: &mut [u64; 64]) {
+    let words = width.words();
+    let count = markings.len() / words;
+    if count > 6 {
         for (row, marking) in block.iter_mut().zip(markings.chunks_exact(words)) {
             *row = marking[k];
         }
         block[count..].fill(0);
         transpose(block);
+        return;
+    }
+    block.fill(0);
+    for (j, marking) in markings.chunks_exact(words).enumerate() {
+        let mut rest = marking[k];
+        while rest != 0 {
+            block[rest.trailing_zeros() as usize] |= 1 << j;
+            rest &= rest - 1;
+        }
     }
 }
 
@@ -204,10 +213,10 @@ mod tests {
         let mut seed = 2;
         let markings: Vec<u64> = (0..64 * 3).map(|_| noise(&mut seed)).collect();
         let mut all = vec![0; 64 * 3];
-        slice(Fixed::<3>, &markings, &mut all);
+        slice(Fixed::<3>, &[0, 1, 2], &markings, &mut all);
         for j in 0..64 {
             let mut one = vec![7; 64 * 3];
-            slice(Dynamic(3), &markings[3 * j..3 * j + 3], &mut one);
+            slice(Dynamic(3), &[0, 1, 2], &markings[3 * j..3 * j + 3], &mut one);
             for p in 0..192 {
                 assert_eq!(one[p], all[p] >> j & 1);
             }

@@ -182,6 +182,8 @@ pub struct Net {
     pub transitions: Vec<Transition>,
     /// M0.
     pub initial: Vec<u64>,
+    /// The words of a marking that some firing changes, ascending; all others are those of M0.
+    pub active: Vec<usize>,
     /// The rule at the marking before.
     pub forward: Rules,
     /// The rule at the marking after.
@@ -205,6 +207,7 @@ impl Net {
             places,
             words,
             initial: vec![0; words],
+            active: Vec::new(),
             forward: Rules::new(),
             backward: Rules::new(),
             flips: vec![0; words * transitions.len()],
@@ -245,6 +248,9 @@ impl Net {
                 _ => linear_hash(Dynamic(words), flip),
             });
         }
+        let changes =
+            |k: usize| (0..net.transitions.len()).any(|t| net.forward.edge(t) != 0 && net.flip(t, words)[k] != 0);
+        net.active = (0..words).filter(|&k| changes(k)).collect();
         Ok(net)
     }
 

@@ -114,7 +114,7 @@ mod tests {
             let net = machines(10, pad);
             let (words, span) = (words_for(net.places), Span::new(&net).expect("ten bits"));
             assert_eq!((span.pivots.len(), span.bits), (10, LEAST_BITS));
-            let mut batch = Batch::new(words);
+            let mut batch = Batch::new(&net);
             batch.markings.extend_from_slice(&net.initial);
             for t in [0, 2, 4, 1, 8] {
                 let from = batch.markings.len() - words;

@@ -15,7 +15,7 @@ impl Space {
             asked[u] = true;
         }
         let mut firable = vec![0; self.net.transitions.len()];
-        let mut batch = Batch::new(self.net.words);
+        let mut batch = Batch::new(&self.net);
         let mut missing = pairs.len();
         let mut first = 0;
         while first < self.len() && missing > 0 {

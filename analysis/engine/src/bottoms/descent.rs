@@ -120,7 +120,7 @@ fn sweep<W: Width>(
     watch: &mut Watch<'_>,
 ) -> Result<Option<Vec<u32>>, Stop> {
     let most = space.len() / STUCK_PART + 1;
-    let mut batch = Batch::new(width.words());
+    let mut batch = Batch::new(&space.net);
     let mut stuck = Vec::new();
     for first in (0..space.len()).step_by(64) {
         let end = space.len().min(first + 64);
@@ -157,7 +157,7 @@ fn join<W: Width>(
     watch: &mut Watch<'_>,
 ) -> Result<bool, Stop> {
     let (net, words) = (firings.net, width.words());
-    let mut batch = Batch::new(words);
+    let mut batch = Batch::new(net);
     let mut tried = vec![0; firings.ups.len()];
     let (mut slices, mut ends) = (Vec::new(), vec![0; 64 * words]);
     for first in (1..stuck.indexes.len()).step_by(64) {
@@ -297,7 +297,7 @@ mod tests {
         let mut poll = unwatched;
         let mut watch = Watch::new(None, &mut poll);
         let downs = ranking::downs(&space.net, &space.fired, 1000).expect("little work");
-        let mut last = Batch::new(1);
+        let mut last = Batch::new(&space.net);
         last.markings.extend_from_slice(space.marking(63));
         last.slice(Fixed::<1>);
         for (passes, ended) in [(0, false), (1, false), (2, true)] {

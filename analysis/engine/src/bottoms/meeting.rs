@@ -65,7 +65,7 @@ pub(super) fn all_return<W: Width>(
 /// Searches backwards from M0 until more than so many markings are found.
 fn returning<W: Width>(width: W, space: &Space, most: usize, watch: &mut Watch<'_>) -> Result<Returning, Stop> {
     let (net, words) = (&*space.net, width.words());
-    let mut batch = Batch::new(words);
+    let mut batch = Batch::new(net);
     let (mut slices, mut before) = (Vec::new(), vec![0; 64 * words]);
     let mut queue = net.initial.clone();
     let mut markings = HashSet::from([queue.clone()]);

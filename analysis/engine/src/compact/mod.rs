@@ -200,7 +200,7 @@ impl<S: Slot> Sweep<S> {
         (self.keys[0], self.origins[0]) = (plan.from, plan.from);
         self.exact.ask(&mut self.asked, 1, |_| plan.from, |_, _| ());
         self.settle(plan, 0, swept, watch)?;
-        let mut batch = Batch::new(width.words());
+        let mut batch = Batch::new(&of.net);
         let (mut kept, mut marking) = (0, vec![0; width.words()]);
         let (mut keys, mut origins) = (Vec::with_capacity(64), Vec::with_capacity(64));
         loop {

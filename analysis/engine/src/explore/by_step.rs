@@ -29,7 +29,7 @@ impl Space {
         let initial = &net.initial;
         self.table.insert(width, initial, linear_hash(width, initial), max, &self.memory)?;
         self.memory.push(&mut self.parents, NONE)?;
-        let mut batch = Batch::new(words);
+        let mut batch = Batch::new(net);
         let mut firable: Vec<Vec<u32>> = vec![Vec::new(); 64];
         let (mut next, mut end) = (0, 1);
         while self.level_end(next, &mut end)? {

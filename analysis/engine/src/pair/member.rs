@@ -165,7 +165,7 @@ impl Member {
             theirs: Records::default(),
             spare: Vec::new(),
             room: 0,
-            batch: Batch::new(net.words),
+            batch: Batch::new(net),
             firing: Vec::new(),
             contact: Vec::new(),
         }

@@ -155,13 +155,14 @@ impl Table {
 mod tests {
     use super::*;
     use crate::marking::Fixed;
+    use crate::samples::machines;
 
     #[test]
     fn markings_of_one_hash_stay_apart() {
         let memory = Memory::new(1 << 20);
         let mut table = Table::new(2, &memory).expect("fits");
         let mut candidates = Candidates::new(2);
-        let mut batch = Batch::new(2);
+        let mut batch = Batch::new(&machines(3, 70));
         batch.markings.extend((0..40).flat_map(|i| [i, 0]));
         batch.cut(Fixed::<2>);
         batch.hashes.fill(5);
