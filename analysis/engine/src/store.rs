@@ -101,6 +101,16 @@ impl Store {
         Ok(())
     }
 
+    /// Appends so many markings, which the caller writes: all of them, or none.
+    pub(crate) fn extend(&mut self, count: usize, most: usize, memory: &Memory) -> Result<&mut [u64], Stop> {
+        while self.claimed - self.len < count {
+            self.make_room(most, memory)?;
+        }
+        let from = self.len;
+        self.len += count;
+        Ok(&mut self.region.all_mut()[from * self.words..(from + count) * self.words])
+    }
+
     /// Forgets all markings, and keeps the memory.
     pub fn clear(&mut self) {
         self.len = 0;

@@ -24,13 +24,14 @@
 //!
 //! What is left between this and twice as quick, by profiles of a net with levels of ten thousand markings: two threads
 //! take a seventh more instructions than one, each waits a fifteenth of its time for the other, growth starts threads and
-//! writes to fresh pages, and one of them alone lays markings down. Other sizes of rounds, more rounds ahead of the other
+//! writes to fresh pages. Other sizes of rounds, more rounds ahead of the other
 //! thread, and levels half or a quarter as large made no difference that could be measured. Two explorations that share nothing, at once, are 1.7 to 1.95 times as quick as one
 //! after the other, so that is about all there is to be had.
 
 mod half;
 mod hashed;
 mod keyed;
+mod laying;
 mod member;
 
 use std::panic::resume_unwind;
@@ -45,7 +46,8 @@ use crate::marking::Width;
 use crate::net::Net;
 use crate::table::NONE;
 pub(crate) use half::Shared;
-use half::{BLOCK, End, Finds};
+use half::{BLOCK, End};
+use laying::append;
 use member::{Member, Port, Work};
 
 /// Markings below which a level is not worth the starting of threads.
@@ -195,32 +197,6 @@ impl Pair {
         space.deadlocks.sort_unstable();
         Ok(())
     }
-}
-
-/// Appends to the array the finds of each level: in turn a block of each thread, then what one and the other have more.
-fn append(space: &mut Space, finds: [&Finds; 2], max: usize) -> Result<Option<usize>, Stop> {
-    let words = space.net.words;
-    let mut all = finds.map(|of| of.fresh.all());
-    let mut end = None;
-    for (&a, &b) in finds[0].levels.iter().zip(&finds[1].levels) {
-        if let Some(begun) = end {
-            space.memory.push(&mut space.levels, begun as u32)?;
-        }
-        end = Some(space.table.store.len());
-        let even = a.min(b) / BLOCK;
-        let mut lay = |of: usize, count: usize| {
-            let (markings, rest) = all[of].split_at(count * words);
-            all[of] = rest;
-            space.table.store.append(markings, max, &space.memory)
-        };
-        for _ in 0..even {
-            lay(0, BLOCK)?;
-            lay(1, BLOCK)?;
-        }
-        lay(0, a - BLOCK * even)?;
-        lay(1, b - BLOCK * even)?;
-    }
-    Ok(end.filter(|_| finds[0].levels.len() > 1))
 }
 
 #[cfg(test)]
