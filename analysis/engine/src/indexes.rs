@@ -146,7 +146,18 @@ impl<S: Slot> Indexes<S> {
             asking.open[open % ROOM] = c as u8;
             open += usize::from(found == 0);
         }
+        // Most of them stand in the next line (see `exact.rs`).
+        let mut left = 0;
         for k in 0..open {
+            let c = usize::from(asking.open[k % ROOM]);
+            let next = asking.lines[c] as usize + 1;
+            let found = S::matches(slots(&lines[next]), S::new(asking.wanted[c] + 1));
+            asking.found[c] = value(&lines[next], found.trailing_zeros() as usize % LANES);
+            asking.open[left % ROOM] = c as u8;
+            left += usize::from(found == 0);
+            asking.lines[c] += u32::from(found != 0);
+        }
+        for k in 0..left {
             let c = usize::from(asking.open[k % ROOM]);
             let (line, lane) = self.search(asking.lines[c] as usize, S::new(asking.wanted[c]));
             asking.lines[c] = line as u32;

@@ -190,7 +190,8 @@ impl<S: Slot> HalfExact<'_, S> {
         (*mine_len, *len) = (a, b);
     }
 
-    /// Looks at the one bucket where each of fewer than `ROOM` records belongs; how many were not found there (`open`).
+    /// Looks at the bucket where each of fewer than `ROOM` records belongs, and the next one; how many were not found there
+    /// (`open`).
     #[inline(always)]
     pub(crate) fn look(&self, records: &[u64], open: &mut [u8; ROOM]) -> usize {
         // First a word of each, so that the cache misses overlap (see `exact.rs`).
@@ -205,7 +206,16 @@ impl<S: Slot> HalfExact<'_, S> {
             open[usize::from(count)] = c as u8;
             count += u8::from(S::matches(&self.buckets[home - self.first], wanted) == 0);
         }
-        usize::from(count)
+        // As in `exact.rs`; of the last bucket, the next one is not this half's.
+        let mut left = 0;
+        for k in 0..usize::from(count) {
+            let c = usize::from(open[k]);
+            let (home, wanted) = read::<S>(&records[c * stride::<S>()..(c + 1) * stride::<S>()]);
+            let next = self.buckets.get(home - self.first + 1);
+            open[left] = c as u8;
+            left += usize::from(next.is_none_or(|next| S::matches(next, S::new(wanted.get() + 1)) == 0));
+        }
+        left
     }
 
     /// Puts those of all keys that belong here into this half, which is empty as are the counts of what its buckets hold;
