@@ -25,6 +25,7 @@ pub(crate) mod halves;
 mod in_place;
 
 use std::hint::black_box;
+use std::ops::Range;
 
 use crate::budget::{Memory, Stop, Watch};
 use crate::region::{Region, write_first};
@@ -310,17 +311,53 @@ impl<S: Slot> Exact<S> {
     /// Puts all keys into other buckets; false where some of them are full. That ends with as many buckets as keep any
     /// eight keys apart, if not with memory.
     fn refill(&self, shape: Shape, mut filling: Filling<'_, S>, watch: &mut Watch<'_>) -> Result<bool, Stop> {
+        let mut moving = Moving::new();
+        let mut fits = true;
         for (at, bucket) in self.buckets().iter().enumerate() {
             watch.tick(LANES)?;
-            for slot in bucket.iter().map(|slot| slot.get()).take_while(|&slot| slot != 0) {
-                let home = at + 1 - (slot & REACH as u64) as usize;
-                let (home, wanted) = shape.seat::<S>(self.shape.mixed(home, slot));
-                if !filling.take(home, wanted) {
-                    return Ok(false);
-                }
+            moving.take(self.shape, at, bucket, 0..usize::MAX);
+            moving.leave(at + 1 == self.buckets().len(), |mixed| {
+                let (home, wanted) = shape.seat(mixed);
+                fits &= filling.take(home, wanted);
+            });
+            if !fits {
+                return Ok(false);
             }
         }
         Ok(true)
+    }
+}
+
+/// Mixed keys on their way from one table into another. They are gathered without a branch: where a bucket's keys end, no
+/// processor guesses.
+struct Moving {
+    mixed: [u64; ROOM],
+    count: usize,
+}
+
+impl Moving {
+    fn new() -> Self {
+        Moving { mixed: [0; ROOM], count: 0 }
+    }
+
+    /// Takes the keys of a bucket, by its number, that belong to some buckets.
+    #[inline(always)]
+    fn take<S: Slot>(&mut self, shape: Shape, at: usize, bucket: &[S; LANES], of: Range<usize>) {
+        for slot in bucket.map(|slot| slot.get()) {
+            // Of an empty slot this is nothing, and is written over.
+            let home = at + 1 - (slot & REACH as u64) as usize;
+            self.mixed[self.count % ROOM] = shape.mixed(home, slot);
+            self.count += usize::from(slot != 0) & usize::from(of.start <= home) & usize::from(home < of.end);
+        }
+    }
+
+    /// Gives away what was taken, if it is much or the last.
+    #[inline(always)]
+    fn leave(&mut self, last: bool, mut to: impl FnMut(u64)) {
+        if self.count > ROOM - LANES || last {
+            self.mixed[..self.count].iter().for_each(|&mixed| to(mixed));
+            self.count = 0;
+        }
     }
 }
 

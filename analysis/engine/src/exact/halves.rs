@@ -4,7 +4,7 @@
 //! lower half, a handful of keys, is the affair of its thread, which keeps it in a list; nobody else looks for it. When
 //! nobody works on the table they are put into it.
 
-use super::{Asked, Exact, Filling, Place, ROOM};
+use super::{Asked, Exact, Filling, Moving, Place, ROOM};
 use crate::seat::{FACTOR, LANES, REACH, Shape, Slot};
 use std::hint::black_box;
 use std::mem;
@@ -233,19 +233,16 @@ impl<S: Slot> HalfExact<'_, S> {
         let mut past = Vec::new();
         // What belongs before the middle may stand past it.
         let until = (end.saturating_add(REACH)).min(from.buckets().len());
+        let mut moving = Moving::new();
         for (at, bucket) in from.buckets()[..until].iter().enumerate().skip(start) {
             poll()?;
-            for slot in bucket.iter().map(|slot| slot.get()).take_while(|&slot| slot != 0) {
-                let home = at + 1 - (slot & REACH as u64) as usize;
-                if home < start || home >= end {
-                    continue;
-                }
-                let mixed = old.mixed(home, slot);
+            moving.take(old, at, bucket, start..end);
+            moving.leave(at + 1 == until, |mixed| {
                 let (home, wanted) = self.shape.seat::<S>(mixed);
                 if !filling.take(home - self.first, wanted) {
                     past.push(self.shape.key(mixed));
                 }
-            }
+            });
         }
         Ok(past)
     }
