@@ -4,7 +4,8 @@
 //! out not to stand where it belongs. Up to 256 are gathered from the bit slices; one word of each one's bucket is
 //! read, in a loop so short that the cache misses of all overlap; then the buckets are compared, and those that are
 //! left are noted without a branch and compared with the next bucket: new ones, and few known ones, are left then. Only
-//! these are looked up by a loop, and only of new ones the marking is made. Under hashes (`table.rs`) candidates are whole markings.
+//! these are looked up by a loop, and only of new ones the marking is made. Under hashes (`table.rs`) candidates are whole
+//! markings.
 //!
 //! Rejected: to look up each candidate in the pass that makes it (a tenth fewer instructions,
 //! but so many stand between two reads of the table that few cache misses overlap: two fifths of the time was waiting).

@@ -2,8 +2,8 @@
 //! have more.
 //!
 //! The array is new memory, which the system fills with zeros when it is first written to, and that takes longer than the
-//! copying. Of much it is done by both, each a half of the array: one alone took up to a tenth of the time of all, in which the
-//! other one had nothing to do.
+//! copying. Of much it is done by both, each a half of the array: one alone took up to a tenth of the time of all, in which
+//! the other one had nothing to do.
 
 use std::thread;
 
