@@ -118,6 +118,11 @@ class PingPong:
         """None: there is no device that could be out of reach."""
         return ()
 
+    @property
+    def unreached(self) -> tuple[str, ...]:
+        """Nothing, likewise."""
+        return ()
+
     def readings(self) -> Mapping[str, Reading]:
         """Nothing that would be asked for."""
         return {}

@@ -92,6 +92,11 @@ class BoundDriver:
         """The devices that have safe outputs and have not confirmed them since the stop."""
         return tuple(name for name, device in self.devices.items() if not device.kept.is_safe)
 
+    @property
+    def unreached(self) -> tuple[str, ...]:
+        """The devices to which there is no connection now, in a phrase each that says why."""
+        return tuple(device.unreached for device in self.devices.values() if device.unreached)
+
     def readings(self) -> Mapping[str, Reading]:
         """The process image."""
         return {name: reading for device in self.devices.values() for name, reading in device.image.readings.items()}

@@ -118,6 +118,13 @@ class BoundDevice:
         """Whether every connection begins with the safe outputs."""
         return self.driver.is_latched
 
+    @property
+    def unreached(self) -> str:
+        """That there is no connection to it now, and why, as far as that is known; empty where there is one."""
+        if self.is_ready.is_set():
+            return ""
+        return ": ".join(filter(None, (f"{self.name} is not connected", self.noted)))
+
     def against(self) -> Iterator[str]:
         """What keeps its driver latched, in a phrase each."""
         if not self.is_ready.is_set():

@@ -119,6 +119,11 @@ class Driver(Protocol):
         """The devices that have not confirmed the safe outputs of the stop; asked once `run` has ended."""
         ...
 
+    @property
+    def unreached(self) -> Collection[str]:
+        """The devices to which there is no connection now, in a phrase each that says why."""
+        ...
+
     def readings(self) -> Mapping[str, Reading]:
         """The process image: each signal that is read, sensors and what completions are formed from."""
         ...

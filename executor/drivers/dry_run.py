@@ -38,6 +38,11 @@ class DryRunDriver:
         """None: there is no device that could be out of reach."""
         return ()
 
+    @property
+    def unreached(self) -> tuple[str, ...]:
+        """Nothing, likewise."""
+        return ()
+
     def readings(self) -> Mapping[str, Reading]:
         """What the sensors show."""
         return {name: Reading(value, quality=Quality.GOOD, why="") for name, value in self.shown.items()}

@@ -88,6 +88,11 @@ class SimulatedDriver:
         """None: there is no device that could be out of reach."""
         return ()
 
+    @property
+    def unreached(self) -> tuple[str, ...]:
+        """Nothing, likewise."""
+        return ()
+
     def readings(self) -> Mapping[str, Reading]:
         """What each sensor of the plant showed in the report told last."""
         return self.image

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.operating import latch, restart
-from firable.executor.operating.situation import Situation, State, blocked, blocked_parts
+from firable.executor.operating.situation import Situation, State, blocked, blocked_here
 from firable.executor.operating.uncut import Patience, uncut
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.net import Net, SignalKind
@@ -22,14 +22,19 @@ if TYPE_CHECKING:
     from firable.executor.operating.host import Host
 
 AT_THE_END: Final = "stopped at the end of the cycle"
+_TOLD_ALREADY: Final = (State.FAULT, State.STOPPED, State.LATCHED)
+"""An end says what has become of devices, and a latched host what is against a reset."""
 
 
 def situation(run: Host) -> Situation:
-    """What a host is doing, and what waits for what; exact at quiescence, as far as its machines know."""
+    """What a host is doing, and what waits for what; exact at quiescence, as far as its machines know.
+
+    First comes what keeps everything waiting, whatever the net says: a disk that hangs; and while the run goes on,
+    other hosts and devices that cannot be reached, without which a gate that is awaited may be open by now.
+    """
     found = _situation(run)
-    if hangs := run.groups.disk.sentence():
-        return replace(found, message="; ".join(filter(None, (hangs, found.message))))
-    return found
+    away = [] if found.state in _TOLD_ALREADY else [*run.peers.absent(), *run.driver.unreached]
+    return replace(found, message="; ".join(filter(None, (run.groups.disk.sentence(), *away, found.message))))
 
 
 def _situation(run: Host) -> Situation:
@@ -37,7 +42,7 @@ def _situation(run: Host) -> Situation:
     if run.is_whole:
         waiting = tuple(blocked(run.recorder.player, run.recorder.word, run.dispatch.untaken))
     else:
-        waiting = tuple(one for each in run.controllers.values() for one in blocked_parts(each, run.dispatch.untaken))
+        waiting = blocked_here(run.controllers.values(), run.dispatch.untaken)
     barred = beginnings(run.net) if run.ends_at_home else ()
     waiting = tuple(replace(one, is_barred=one.transition in barred) for one in waiting)
     if run.fault:

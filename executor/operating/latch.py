@@ -109,5 +109,6 @@ def told(run: Host) -> str:
 
 def situation(run: Host) -> Situation:
     """What a latched host is doing."""
-    others = "; ".join(sentence for sentence in run.peers.waits() if "is held" not in sentence)
-    return Situation(State.LATCHED, run.marking, (), "; ".join(filter(None, (told(run), others))), is_emergency=True)
+    others = [sentence for sentence in run.peers.waits() if "is held" not in sentence]
+    sentences = filter(None, (told(run), *run.peers.absent(), *others))
+    return Situation(State.LATCHED, run.marking, (), "; ".join(sentences), is_emergency=True)

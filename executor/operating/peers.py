@@ -99,6 +99,15 @@ class Peers:
         yield from waits(self.acts.coordinators, self.acts.controllers, self.names - self.connected_to)
         yield from map(_missing, self.never_met)
 
+    def absent(self) -> Iterator[str]:
+        """Those that some machine here talks to and that are lost, in a sentence each.
+
+        Without them nothing of what they take part in goes on, also where nothing that was said waits for an answer.
+        """
+        for name in self.needed:
+            if name in self.met and name not in self.connected_to:
+                yield f"{called(name)} is not connected"
+
     @property
     def have_let_go(self) -> bool:
         """Whether each coordinator that can be reached has said to each controller here that no order is open.

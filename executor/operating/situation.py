@@ -14,7 +14,7 @@ Asked at quiescence, when no message is under way, the joint marking and the pro
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -119,3 +119,18 @@ def blocked_parts(controller: LocalController, untaken: Collection[str] = ()) ->
     for one in blocked(controller.player, controller.word, untaken):
         row = row_of.get(one.transition, one.transition)
         yield replace(one, transition=row, decided_by=decided_by.get(row))
+
+
+def blocked_here(controllers: Iterable[LocalController], untaken: Collection[str] = ()) -> tuple[Blocked, ...]:
+    """The same of several controllers of one host: the parts of a transition that are here wait as one."""
+    found: dict[str, Blocked] = {}
+    for one in (each for controller in controllers for each in blocked_parts(controller, untaken)):
+        had = found.get(one.transition, replace(one, empty=(), full=(), gates=(), untaken=()))
+        found[one.transition] = replace(
+            had,
+            empty=had.empty + one.empty,
+            full=had.full + one.full,
+            gates=had.gates + one.gates,
+            untaken=had.untaken + one.untaken,
+        )
+    return tuple(found.values())

@@ -455,6 +455,38 @@ def test_a_machine_that_never_comes_is_told_by_name_and_no_more_when_it_has_come
     run_in_virtual_time(main())
 
 
+def test_a_situation_names_the_hosts_that_are_lost_also_where_no_answer_is_awaited(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(12.3)
+        robot, centre = cell.hosts[ROBOT], cell.hosts[CENTRE]
+        assert "not connected" not in robot.situation().message + centre.situation().message
+        cell.exchange.cut(cell.links[ROBOT])
+        await asyncio.sleep(60)
+        assert not list(robot.peers.waits()), "it is at its work, and has promised nothing"
+        assert robot.situation().message == "the coordinator is not connected"
+        assert centre.situation().message.startswith("'robot' is not connected")
+        cell.exchange.mend(cell.links[ROBOT])
+        await asyncio.sleep(10)
+        assert "not connected" not in robot.situation().message + centre.situation().message
+        await cell.stop()
+        cell.replayed()
+
+    run_in_virtual_time(main())
+
+
+def test_parts_of_one_host_in_a_transition_wait_as_one(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path, (("", "system", "mc", "conveyor"), ROBOT))
+        for _ in range(60):
+            await asyncio.sleep(0.5)
+            waiting = [one.transition for one in cell.hosts["", "system", "mc", "conveyor"].situation().blocked]
+            assert len(waiting) == len(set(waiting))
+        await cell.stop()
+
+    run_in_virtual_time(main())
+
+
 def test_what_nobody_answers_is_repeated_ever_more_seldom_and_soon_when_there_is_something_new(tmp_path: Path) -> None:
     async def main() -> None:
         cell = Cell(tmp_path)

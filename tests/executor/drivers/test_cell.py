@@ -7,10 +7,12 @@ from functools import partial
 
 import pytest
 from support.cells import plant_of
+from support.link_rigs import free_port
 from support.served_cells import DECOMPOSITION, NET, Served, halved, served, unhurried
 
 from firable.executor.cell.disturbances import Drops, NeverCompletes
 from firable.executor.drivers.bench import until
+from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.bound import bound_driver
 from firable.executor.drivers.far_side.ends import binding_text
 from firable.executor.drivers.far_side.mqtt_device import mosquitto
@@ -100,6 +102,23 @@ def test_button_of_the_cell_ends_the_run_with_every_machine_stopped() -> None:
             await until(lambda: not one.cell.at, "all machines stand")
 
     asyncio.run(main())
+
+
+def test_a_situation_names_the_devices_that_cannot_be_reached_and_says_why() -> None:
+    ports = {"modbus": str(free_port()), "serial": "/dev/nobody-is-here"}
+    driver = bound_driver(parse_binding(binding_text(NET, ports, plant_of("one_robot").sensors), "cell"), NET)
+    seen: list[Situation] = []
+
+    async def operator(host: Host) -> None:
+        await until(lambda: host.situation().message.count("not connected: ") == 2, "both refusals")
+        seen.append(host.situation())
+        host.stop()
+
+    recorder = Recorder(NET, net_digest(NET), io.StringIO())
+    asyncio.run(Host(DECOMPOSITION, driver, recorder, operator=operator, patience=patience_with(driver)).main())
+    assert seen[0].state is State.WAITING
+    assert "modbus is not connected: 127.0.0.1" in seen[0].message
+    assert "serial is not connected: " in seen[0].message
 
 
 def test_machine_that_hangs_is_a_fault_and_the_others_are_stopped() -> None:
