@@ -175,7 +175,7 @@ async def _asked(
 
 def _told(answer: dict[str, Any]) -> str:
     lines = [f"{answer['state']}: {answer['message']}" if answer["message"] else str(answer["state"])]
-    if "fired" in answer:
+    if "fired" in answer and not answer.get("refused"):
         lines.insert(0, f"fired {answer['fired']}" if answer["fired"] else "nothing is enabled")
     lines[:0] = [f"refused: {why}" for why in answer.get("refused", ())]
     lines.append(f"  tokens on {', '.join(answer['marking'])}")

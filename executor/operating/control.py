@@ -38,7 +38,7 @@ from typing import Final, Protocol
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from firable.executor.operating.situation import Situation
+from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import Answer
 from firable.nets.diagnostics import Diagnostic, InputError
 
@@ -59,8 +59,8 @@ class Operated(Protocol):
         """Let nothing fire any more."""
         ...
 
-    def resume(self) -> object:
-        """Let transitions fire again."""
+    def resume(self) -> bool:
+        """Let transitions fire again; whether they may."""
         ...
 
     async def step(self) -> str | None:
@@ -201,10 +201,17 @@ def application(
 
         return handler
 
+    async def resume(request: web.Request) -> web.Response:
+        run.commanded("resume", who(request))
+        refused = [] if run.resume() else [f"the run is {run.situation().state}, and cannot be resumed now"]
+        return web.json_response({"refused": refused, **_situation(run)})
+
     async def step(request: web.Request) -> web.Response:
         run.commanded("step", who(request))
         fired = await run.step()
-        return web.json_response({"fired": fired, **_situation(run)})
+        now = run.situation().state
+        refused = [] if fired or now is State.PAUSED else [f"the run is {now}, and only one that is paused is stepped"]
+        return web.json_response({"fired": fired, "refused": refused, **_situation(run)})
 
     async def emergency_stop(request: web.Request) -> web.Response:
         by = who(request)
@@ -227,7 +234,7 @@ def application(
     app.router.add_get("/situation", situation)
     app.router.add_get("/metrics", metrics)
     app.router.add_post("/pause", commanding("pause", run.pause))
-    app.router.add_post("/resume", commanding("resume", run.resume))
+    app.router.add_post("/resume", resume)
     app.router.add_post("/step", step)
     app.router.add_post("/stop", commanding("stop", run.stop))
     app.router.add_post("/stop-at-end", commanding("stop-at-end", lambda: run.stop(at_end_of_cycle=True)))

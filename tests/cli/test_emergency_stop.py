@@ -186,12 +186,12 @@ def test_host_whose_coordinator_is_dead_is_latched_by_its_contact_and_goes_on_wh
         assert "firable_latched 1.0" in operate("metrics")
         lamp.show("button", value=True)
         until(lambda: "it can be reset; then" in operate("situation"), "that it may be reset")
-        assert operate("resume").startswith("latched")
+        assert operate("resume").startswith("refused: the run is latched")
         assert operate("reset").startswith("held")
         processes.append(started(*other, "--resume"))
         lamp.show("sensor", value=False)  # then they may take it back, and do it again
         assert len(lamp.machine.orders) == 1, "nothing moves by a reset"
-        until(lambda: not operate("resume").startswith("held"), "the resumption")
+        until(lambda: not operate("resume").startswith("refused"), "the resumption")
         until(lambda: "a.free" in operate("situation").splitlines()[1], "a transition of both")
         lamp.show("sensor", value=True)
         until(lambda: len(lamp.machine.orders) == 2, "the next command")

@@ -88,7 +88,9 @@ def test_an_operator_pauses_steps_resumes_and_stops_a_run_at_once(
     operate(address, "resume", folder, capsys)
     operate(address, "emergency-stop", folder, capsys)
     until_told(address, "latched: emergency stop: by token", folder, capsys)
-    assert operate(address, "resume", folder, capsys).startswith("latched")
+    for command in ("resume", "step"):
+        told = operate(address, command, folder, capsys, code=1)
+        assert told.startswith("refused: the run is latched, and ")
     operate(address, "stop", folder, capsys)
     out, _ = process.communicate(timeout=PATIENCE_SECONDS)
     assert process.returncode == 3, "whether all workpieces go through is not known"
@@ -114,7 +116,7 @@ def test_an_operator_resets_an_emergency_stop_says_what_a_machine_did_and_resume
     told = until_told(address, "nobody knows what became of it", folder, capsys)
     places = re.findall(r"say (\S+)=done", told)
     assert places
-    assert operate(address, "resume", folder, capsys).startswith("held")
+    assert operate(address, "resume", folder, capsys, code=1).startswith("refused: the run is held")
     assert "nobody asks after mc.fix" in operate(address, "say mc.fix=done", folder, capsys, code=1)
     for place in places:
         operate(address, f"say {place}=not-received", folder, capsys)

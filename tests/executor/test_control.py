@@ -32,8 +32,9 @@ BEARER = {"Authorization": f"Bearer {TOKEN}"}
 class Told:
     """A run that writes down what it is told."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, obeys: bool = True) -> None:
         self.log: list[str] = []
+        self.obeys = obeys
 
     def situation(self) -> Situation:
         return Situation(State.WAITING, ("robot.free",))
@@ -41,12 +42,13 @@ class Told:
     def pause(self) -> None:
         self.log.append("pause")
 
-    def resume(self) -> None:
+    def resume(self) -> bool:
         self.log.append("resume")
+        return self.obeys
 
     async def step(self) -> str | None:
         self.log.append("step")
-        return "G1"
+        return "G1" if self.obeys else None
 
     def stop(self, *, at_end_of_cycle: bool = False) -> None:
         self.log.append("stop at end" if at_end_of_cycle else "stop")
@@ -104,6 +106,21 @@ def test_every_command_reaches_the_run_with_the_name_of_who_gave_it() -> None:
         "emergency stop by token",
         "token: emergency-stop",
     ]
+
+
+def test_a_resume_or_a_step_that_does_nothing_is_refused_in_the_words_of_the_situation() -> None:
+    async def main() -> None:
+        run = Told(obeys=False)
+        async with serving(run, Endpoint("127.0.0.1", 0, TOKEN), lambda: b"") as url, ClientSession() as session:
+            async with session.post(f"{url}/resume", headers=BEARER) as answer:
+                assert (await answer.json())["refused"] == ["the run is waiting, and cannot be resumed now"]
+            async with session.post(f"{url}/step", headers=BEARER) as answer:
+                told = await answer.json()
+                assert told["fired"] is None
+                assert told["refused"] == ["the run is waiting, and only one that is paused is stepped"]
+        assert run.log == ["token: resume", "resume", "token: step", "step"]
+
+    asyncio.run(main())
 
 
 def test_a_reset_and_what_is_said_of_a_command_are_answered_by_what_is_against_them() -> None:
