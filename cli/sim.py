@@ -164,7 +164,7 @@ async def _serve(
     try:
         try:
             await cell.start()
-        except (OSError, RuntimeError) as error:  # a port that is taken, or a broker that is not installed
+        except RuntimeError as error:  # a port that is taken, or a broker that is not installed
             hint = "end what else serves there, or name other ports in a binding of your own, with --bind alone"
             raise InputError([Diagnostic("F5104", f"the cell cannot be served: {error}", hint)]) from None
         click.echo(f"serving '{net.name}'; Ctrl-C ends it")

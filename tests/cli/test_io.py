@@ -185,7 +185,7 @@ def test_device_that_cannot_be_served_here_is_refused(tmp_path: Path, capsys: py
         taken.listen()
         bind.write_text(binding_text(NET, {"modbus": str(taken.getsockname()[1])}, SENSORS))
         assert main(["sim", "catalogue:one_robot", "--bind", str(bind)]) == 2
-    assert "error[F5104]: the cell cannot be served: " in capsys.readouterr().err
+    assert "error[F5104]: the cell cannot be served: modbus: " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -90,9 +90,13 @@ class CellServer:
         return (asyncio.get_running_loop().time() - self.begun_seconds) * self.speed
 
     async def start(self) -> None:
-        """Begin to serve."""
+        """Begin to serve; raises `RuntimeError`, with the names of its devices, where an end cannot be had."""
         for end, devices in self._ends():
-            await end.start(partial(self._written_to, devices))
+            try:
+                await end.start(partial(self._written_to, devices))
+            except (OSError, RuntimeError) as error:
+                names = ", ".join(name for name, device in self.devices.items() if device in devices)
+                raise RuntimeError(f"{names}: {error}") from error
         for device in self.devices.values():
             for channel in device.channels.values():
                 self._clear(device, channel)
