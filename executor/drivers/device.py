@@ -38,6 +38,10 @@ class LinkError(Exception):
     """A connection cannot be made, has failed, has timed out, or brought what nobody can read."""
 
 
+class WithheldError(LinkError):
+    """What was to be written was withheld (`Prompt.withhold`); the connection is as good as before."""
+
+
 class Beside(str):
     """The path of a file that a binding names, found from the folder of the binding."""
 
@@ -120,6 +124,13 @@ class Prompt(Connection, Protocol):
 
     def begin(self, writes: Writes) -> Coroutine[Any, Any, None]:
         """Begin what `write` does, and return what waits for the end of it, and fails where it does."""
+        ...
+
+    def withhold(self) -> None:
+        """Send nothing more of what is being written: who waits for it comes to know by `WithheldError`.
+
+        What was sent is sent, and its end is waited for as ever; what is written from now on is sent.
+        """
         ...
 
 

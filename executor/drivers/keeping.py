@@ -9,7 +9,9 @@ that doubles up to a bound, and is read before it is written, because what the d
 to be sent.
 
 A stop breaks off what is being written, if it is not confirmed at once, and makes new connections until the device has
-confirmed the safe outputs, or has had its time.
+confirmed the safe outputs, or has had its time. What has not been sent by then is not sent any more, where the
+connection can tell (`device.Prompt`): a command may wait behind the very question whose answer is the reason of the
+stop.
 
 An error that is no failure of a link is a mistake, in a library or in what is served here. It ends the run, and this
 device is stopped as any other: over a new connection of which nothing is taken, since what it shows may be what nobody
@@ -38,6 +40,7 @@ from firable.executor.drivers.device import (
     Prompt,
     Value,
     Wanted,
+    WithheldError,
     Writes,
 )
 
@@ -167,8 +170,10 @@ class Kept:
         self.served = served
         self.safe = writes(document.safe)
         self.awake = asyncio.Event()
+        self.prompt: Prompt | None = None
+        """The connection, where it can begin a write and withhold it."""
         self.idle: Prompt | None = None
-        """The connection, while who writes has nothing to write."""
+        """The same, while who writes has nothing to write."""
         self.begun: Coroutine[Any, Any, None] | None = None
         """What was begun on it meanwhile, and who writes is to wait for."""
         self.connections = 0
@@ -248,6 +253,8 @@ class Kept:
         self.stopping = True
         if self.writing is not None and not self.writing.expired():
             self.writing.reschedule(asyncio.get_running_loop().time() + _CONFIRMED_SECONDS)
+        if self.prompt is not None and (self.writing is not None or self.begun is not None):
+            self.prompt.withhold()
         self.awake.set()
 
     def urge(self) -> None:
@@ -317,7 +324,7 @@ class Kept:
         self.connections += 1
         self.served.ready()
         loop = asyncio.get_running_loop()
-        prompt = connection if isinstance(connection, Prompt) else None
+        self.prompt = connection if isinstance(connection, Prompt) else None
         heartbeat = self.document.heartbeat
         due = loop.time()
         beaten = False
@@ -325,22 +332,22 @@ class Kept:
             self.awake.clear()
             if self.begun is not None:
                 beaten, (begun, self.begun) = False, (self.begun, None)
-                await self._put(begun)
-                self.served.written()
+                if await self._put(begun):
+                    self.served.written()
                 continue
             is_due = heartbeat is not None and loop.time() >= due
             # They take turns where a device is so slow that there is always a heartbeat to be sent.
             if not (is_due and not beaten) and (some := self.served.next_writes()) is not None:
                 beaten = False
-                await self._put(connection.write(some))
-                self.served.written()
+                if await self._put(connection.write(some)):
+                    self.served.written()
             elif is_due and heartbeat is not None:
                 beaten, due = True, loop.time() + heartbeat.every_s
                 await self._put(connection.write(((heartbeat.write, self.beat),)))
                 self.beat = (self.beat + 1) % BEATS
             else:
                 timer = None if heartbeat is None else loop.call_later(due - loop.time(), self.awake.set)
-                self.idle = prompt
+                self.idle = self.prompt
                 try:
                     await self.awake.wait()
                 finally:
@@ -351,14 +358,19 @@ class Kept:
             await connection.write(self.safe)
         self.is_safe = True
 
-    async def _put(self, writing: Coroutine[Any, Any, None]) -> None:
+    async def _put(self, writing: Coroutine[Any, Any, None]) -> bool:
         """Write, and break it off at a stop, so that no machine starts after it; the connection is of no use then.
+
+        Returns whether it is written: what was not sent before the stop is withheld, and costs no connection.
 
         Without a task of its own, which would be two more turns of the loop on the way of each command.
         """
         try:
             async with asyncio.timeout(_CONFIRMED_SECONDS if self.stopping else None) as self.writing:
                 await writing
+            return True
+        except WithheldError:
+            return False
         except TimeoutError:
             if self.stopping:
                 raise LinkError("stopped while something was written") from None
@@ -368,6 +380,7 @@ class Kept:
 
     def _forget(self) -> None:
         """The connection is gone, with what was begun on it."""
+        self.prompt = None
         if self.begun is not None:
             self.begun.close()
             self.begun = None

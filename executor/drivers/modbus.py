@@ -28,7 +28,18 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from pydantic import Field
 
-from firable.executor.drivers.device import Connection, LinkError, Options, Point, Use, Value, Wanted, Writes, quiet
+from firable.executor.drivers.device import (
+    Connection,
+    LinkError,
+    Options,
+    Point,
+    Use,
+    Value,
+    Wanted,
+    WithheldError,
+    Writes,
+    quiet,
+)
 from firable.executor.drivers.modbus_points import (
     BITS,
     WRITTEN,
@@ -128,6 +139,8 @@ class ModbusConnection:
         self.is_free = asyncio.Event()
         """Set while nothing is being written."""
         self.is_free.set()
+        self.withheld = 0
+        """How often what was being written was withheld."""
         self.points: dict[Address, list[Point]] = {}
         self.polls: list[tuple[_Question, Block]] = []
         self.layout: list[tuple[Point, int, Address]] = []
@@ -186,7 +199,11 @@ class ModbusConnection:
                     begun = first, self.ask(first)
             except LinkError:
                 questions = self._questions(writes)  # who waits is told
-        return self._written(begun, questions)
+        return self._written(begun, questions, self.withheld)
+
+    def withhold(self) -> None:
+        """Send nothing more of what is being written, also what waits for its turn behind a poll."""
+        self.withheld += 1
 
     def ask(self, question: _Question) -> asyncio.Future[ModbusPDU]:
         """Ask the device now, as nothing else is asked; what will be answered, or why nothing will be."""
@@ -220,7 +237,7 @@ class ModbusConnection:
         return data if is_sent or not self.client.ctx.response_future.done() else b""
 
     async def _written(
-        self, begun: tuple[_Question, asyncio.Future[ModbusPDU]] | None, questions: Iterator[_Question]
+        self, begun: tuple[_Question, asyncio.Future[ModbusPDU]] | None, questions: Iterator[_Question], withheld: int
     ) -> None:
         try:
             if begun is not None:
@@ -228,6 +245,9 @@ class ModbusConnection:
                 await self._answer(answer, question)
             for question in questions:
                 await self._turn()
+                if withheld != self.withheld:
+                    self._hand_on()
+                    raise WithheldError(f"{question.what} is not written any more")
                 await self._answer(self.ask(question), question)
         finally:
             self.is_free.set()

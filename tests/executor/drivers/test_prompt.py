@@ -12,7 +12,18 @@ import pytest
 from firable.executor.drivers import modbus
 from firable.executor.drivers.bench import PATIENCE_S, until
 from firable.executor.drivers.binding import parse_binding
-from firable.executor.drivers.device import Connection, LinkError, Options, Point, Prompt, Use, Value, Wanted, Writes
+from firable.executor.drivers.device import (
+    Connection,
+    LinkError,
+    Options,
+    Point,
+    Prompt,
+    Use,
+    Value,
+    Wanted,
+    WithheldError,
+    Writes,
+)
 from firable.executor.drivers.far_side.modbus_server import ModbusTcpEnd
 from firable.executor.drivers.keeping import Kept, Nobody
 
@@ -50,6 +61,9 @@ class Line:
     async def write(self, writes: Writes) -> None:
         """Send it, and wait."""
         await self.begin(writes)
+
+    def withhold(self) -> None:
+        """Nothing: it is sent."""
 
     async def close(self) -> None:
         """Nothing."""
@@ -215,6 +229,59 @@ def test_mistake_at_the_beginning_of_a_write_stops_the_device() -> None:
 # Over Modbus
 
 
+class Commander(Commands):
+    """Who stops the device as soon as its input shows 1."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.kept: list[Kept] = []
+
+    def read(self, batch: Sequence[tuple[Point, Value]]) -> None:
+        """A button."""
+        if ("input 0", 1) in batch:
+            self.kept[0].stop()
+
+
+@pytest.mark.parametrize("turns", [0, 5])
+@pytest.mark.parametrize("pressed", [False, True])
+def test_command_that_waits_for_an_answer_is_not_sent_after_a_stop(turns: int, pressed: bool) -> None:
+    written: list[tuple[Point, Value]] = []
+    commands = Commander()
+
+    async def main() -> None:
+        end = ModbusTcpEnd()
+        await end.start(lambda point, value: written.append((point, value)))
+        options = modbus.TcpOptions(host="127.0.0.1", port=end.port, every_s=0)
+        document = parse_binding(BINDING).document.devices["D"]
+        kept = Kept(document, modbus.TCP, options, frozenset({"input 0"}), commands)
+        commands.kept.append(kept)
+        task = asyncio.create_task(kept.run())
+        await until(lambda: kept.idle is not None, "the connection")
+        connection = kept.idle
+        assert isinstance(connection, modbus.ModbusConnection)
+        end.faults.delay_s = 0.01
+        for _ in range(2):  # the second one is answered so late
+            asked = connection.watch.answer
+            while connection.watch.answer is asked:
+                await asyncio.sleep(0)
+        commands.waiting.append((("coil 7", True),))
+        kept.urge()
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        if pressed:
+            end.show("input 0", 1)
+        else:
+            kept.stop()
+        await asyncio.wait((task,), timeout=PATIENCE_S)
+        assert kept.is_safe
+        assert kept.connections == 1, "the connection is as good as before"
+        await end.stop()
+
+    asyncio.run(main())
+    assert written == [("coil 1", False), ("coil 1", False)]
+    assert commands.confirmed == 0
+
+
 def over_modbus(
     work: Callable[[modbus.ModbusConnection, ModbusTcpEnd, list[Point]], Awaitable[None]],
     read: Sequence[Point] = ("input 0", "input 5"),
@@ -260,6 +327,22 @@ def test_what_is_begun_while_something_is_polled_goes_before_the_rest_of_the_pol
         assert not polled.done()
         assert written == ["holding 1"]
         assert list(await polled) == [("input 0", 0), ("input 5", 1)]
+
+    over_modbus(work)
+
+
+def test_what_is_withheld_is_sent_no_further_and_the_line_goes_on() -> None:
+    async def work(connection: modbus.ModbusConnection, end: ModbusTcpEnd, written: list[Point]) -> None:
+        end.show("input 5", 1)
+        begun = connection.begin([("holding 1", 7), ("coil 3", True)])
+        polled = asyncio.create_task(connection.read())
+        connection.withhold()
+        with pytest.raises(WithheldError, match="coil 3 is not written any more"):
+            await begun
+        assert written == ["holding 1"]
+        assert list(await asyncio.wait_for(polled, PATIENCE_S)) == [("input 0", 0), ("input 5", 1)]
+        await connection.write([("coil 4", True)])
+        assert written == ["holding 1", "coil 4"]
 
     over_modbus(work)
 
