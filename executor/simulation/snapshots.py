@@ -2,15 +2,17 @@
 
 A machine is a Python object that changes. To explore what it can do it is copied before each act, and two machines are
 the same iff all that can change in them is the same. Neither asks what a field means: every field is copied and
-compared, whatever is added to the machines later, and a kind of thing that is not known here is refused.
+compared, whatever is added to the machines later, and a kind of thing that is not known here is refused. How a kind of
+thing is copied and compared is looked up once for each type, as explorations do little else.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from copy import copy
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
 from enum import Enum
+from functools import cache
 from typing import Any, Final, TypeVar
 
 from firable.executor.protocol.commands import Commands
@@ -36,48 +38,81 @@ def clone(value: T) -> T:
     return made
 
 
-def _cloned(value: Any) -> Any:
-    if isinstance(value, (*_SIMPLE, *_FIXED)):
-        return value
-    if isinstance(value, _DERIVED):
-        return copy(value)  # it changes its numbers, and shares its tables
-    if isinstance(value, tuple):
-        return value if not any(_changes(each) for each in value) else tuple(map(_cloned, value))
-    if isinstance(value, dict):
-        return {key: _cloned(each) for key, each in value.items()}
-    if isinstance(value, set):
-        return set(value)
-    if isinstance(value, list):
-        return [_cloned(each) for each in value]
-    if is_dataclass(value) and not isinstance(value, type):
-        if isinstance(value, Hashable):  # it is frozen
-            return value
-        return replace(value, **{f.name: _cloned(getattr(value, f.name)) for f in fields(value)})
-    if isinstance(value, _CHANGING):
-        made = object.__new__(type(value))
-        vars(made).update({name: _cloned(each) for name, each in vars(value).items()})
-        return made
-    raise TypeError(f"a machine holds a {type(value).__name__}, which is not known here")
-
-
-def _changes(value: Any) -> bool:
-    return isinstance(value, (dict, set, list, _DERIVED, *_CHANGING))
-
-
 def frozen(value: Any) -> Hashable:
     """A value that is equal for two machines iff all that can change in them is."""
-    if isinstance(value, (*_FIXED, _DERIVED)):
+    found: Hashable = _freezer(value.__class__)(value)
+    return found
+
+
+def _cloned(value: Any) -> Any:
+    copier = _copier(value.__class__)
+    return value if copier is None else copier(value)
+
+
+@cache
+def _copier(of: type) -> Callable[[Any], Any] | None:
+    """How values of a type are copied; None where they never change."""
+    if issubclass(of, (*_SIMPLE, *_FIXED)) or _is_frozen(of):
         return None
-    if isinstance(value, _SIMPLE):
-        return value
-    if isinstance(value, tuple | list):
-        return tuple(map(frozen, value))
-    if isinstance(value, dict):
-        return tuple((key, frozen(each)) for key, each in value.items())
-    if isinstance(value, set):
-        return frozenset(value)
-    if is_dataclass(value) and not isinstance(value, type):
-        return tuple(frozen(getattr(value, f.name)) for f in fields(value))
-    if isinstance(value, _CHANGING):
-        return tuple(frozen(each) for each in vars(value).values())
-    raise TypeError(f"a machine holds a {type(value).__name__}, which is not known here")
+    if issubclass(of, _DERIVED):
+        return copy  # it changes its numbers, and shares its tables
+    for known, copier in ((tuple, _copy_of_tuple), (dict, _copy_of_dict), (set, set), (list, _copy_of_list)):
+        if issubclass(of, known):
+            return copier
+    if is_dataclass(of):
+        names = _names(of)
+        return lambda value: of(**{name: _cloned(getattr(value, name)) for name in names})
+    if issubclass(of, _CHANGING):
+        return _copy_of_machine
+    raise TypeError(f"a machine holds a {of.__name__}, which is not known here")
+
+
+def _copy_of_tuple(value: tuple[Any, ...]) -> tuple[Any, ...]:
+    return value if all(_copier(each.__class__) is None for each in value) else tuple(map(_cloned, value))
+
+
+def _copy_of_dict(value: dict[Any, Any]) -> dict[Any, Any]:
+    made = value.copy()
+    for key, each in value.items():
+        if (copier := _copier(each.__class__)) is not None:
+            made[key] = copier(each)
+    return made
+
+
+def _copy_of_list(value: list[Any]) -> list[Any]:
+    return list(map(_cloned, value))
+
+
+def _copy_of_machine(value: Any) -> Any:
+    made = object.__new__(type(value))
+    vars(made).update(_copy_of_dict(vars(value)))
+    return made
+
+
+@cache
+def _freezer(of: type) -> Callable[[Any], Hashable]:
+    """What values of a type are compared by."""
+    if issubclass(of, (*_FIXED, _DERIVED)):
+        return lambda _: None
+    if issubclass(of, _SIMPLE) or _is_frozen(of):
+        return lambda value: value
+    if issubclass(of, tuple | list):
+        return lambda value: tuple(map(frozen, value))
+    if issubclass(of, dict):
+        return lambda value: tuple((key, frozen(each)) for key, each in value.items())
+    if issubclass(of, set):
+        return frozenset
+    if is_dataclass(of):
+        names = _names(of)
+        return lambda value: tuple(frozen(getattr(value, name)) for name in names)
+    if issubclass(of, _CHANGING):
+        return lambda value: tuple(map(frozen, vars(value).values()))
+    raise TypeError(f"a machine holds a {of.__name__}, which is not known here")
+
+
+def _is_frozen(of: type) -> bool:
+    return is_dataclass(of) and of.__hash__ is not None
+
+
+def _names(of: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(of))
