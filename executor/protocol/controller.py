@@ -290,7 +290,7 @@ class LocalController:
         return [effect for above in self.above.values() for effect in self._say_again(above)]
 
     def _say_again(self, above: Above) -> list[Effect]:
-        promised = [n for n, promise in self.promises.items() if promise.promised and self._above(n) is above]
+        promised = [n for n, promise in self.promises.items() if promise.promised and self.above_of(n) is above]
         if promised:
             return [Vote(self.name, n, self.promises[n].promised, self._told(above), above.name) for n in promised]
         return [self._report(above)] if above.told > above.seen or self._is_unanswered(above) else []
@@ -326,7 +326,7 @@ class LocalController:
             if yes:
                 yield Keep(f"promise/{request.round}", yes)
                 yield from self._keep_word(self.word, ())
-        above = self._above(request.round)
+        above = self.above_of(request.round)
         yield Vote(self.name, request.round, self.promises[request.round].promised, self._told(above), above.name)
 
     def _decided(self, decision: Decision) -> Iterator[Effect]:
@@ -336,7 +336,7 @@ class LocalController:
             if decision.committed in self.parts:
                 yield from self._apply(decision, promise)
             yield from self._release()
-        above = self._above(decision.round)
+        above = self.above_of(decision.round)
         if decision.round >= above.kept_below and decision.round not in self.closed:
             yield from self._keep_closed(above)  # closed by hearsay alone; what is acknowledged outlives a crash
         yield Acknowledgement(self.name, decision.round, self._told(above), above.name)
@@ -359,22 +359,22 @@ class LocalController:
         promise = self.promises.pop(number, None)
         if promise is not None and promise.promised:
             yield Keep(f"promise/{number}", None)
-        above = self._above(number)
+        above = self.above_of(number)
         if number >= above.closed_below:
             self.closed.add(number)
         yield from self._keep_closed(above)
 
     def _keep_closed(self, above: Above) -> Iterator[Effect]:
         above.kept_below = above.closed_below
-        numbers = sorted(n for n in self.closed if self._above(n) is above)
+        numbers = sorted(n for n in self.closed if self.above_of(n) is above)
         yield Keep(closed_key(above.name), (above.closed_below, numbers))
 
     def _close_below(self, above: Above, number: int) -> Iterator[Effect]:
         """Forget the rounds that nobody will speak of again; one promised and unheard of was aborted by a restart."""
         if number > above.closed_below:
             above.closed_below = number
-            self.closed = {closed for closed in self.closed if closed >= number or self._above(closed) is not above}
-            if aborted := [n for n in self.promises if n < number and self._above(n) is above]:
+            self.closed = {closed for closed in self.closed if closed >= number or self.above_of(closed) is not above}
+            if aborted := [n for n in self.promises if n < number and self.above_of(n) is above]:
                 for promised in aborted:
                     yield from self._end(promised)
                 yield from self._release()
@@ -455,11 +455,12 @@ class LocalController:
         """The coordinator whose round it is."""
         return self.coordinators[number % len(self.coordinators)]
 
-    def _above(self, number: int) -> Above:
+    def above_of(self, number: int) -> Above:
+        """What is known of the coordinator whose round it is."""
         return self.above[self.coordinator_of(number)]
 
     def _is_closed(self, number: int) -> bool:
-        return number < self._above(number).closed_below or number in self.closed
+        return number < self.above_of(number).closed_below or number in self.closed
 
     def _disturbs_promises(self, transition: Compiled) -> bool:
         return any(transition.disturbs(promise.writes, promise.reads) for promise in self.promises.values())

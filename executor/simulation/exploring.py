@@ -78,6 +78,14 @@ class Explorer(Repertoire):
             yield from self._arrives(at, message)
         for which in range(len(self.coordinators), len(self.names)):
             yield from self._acts_of(at, which)
+        yield from self._of_cell(at)
+        if not at.under_way:
+            for which in range(len(self.names)):
+                yield from self._does(at, "repeat", which, None, lambda machine: machine.resend())
+        yield from self._faults(at)
+
+    def _of_cell(self, at: Configuration) -> Iterator[tuple[Step, Configuration]]:
+        """What machines of the cell do, and what sensors show."""
         for place, entry, how in at.jobs:
             if how is Reached.SENT:
                 yield from self._taken(at, place, entry)
@@ -87,10 +95,6 @@ class Explorer(Repertoire):
             which = self.owner_of[sensor]
             for value in (False, True):
                 yield from self._does(at, "sense", which, (sensor, value), partial(_sense, sensor, value))
-        if not at.under_way:
-            for which in range(len(self.names)):
-                yield from self._does(at, "repeat", which, None, lambda machine: machine.resend())
-        yield from self._faults(at)
 
     def _arrives(self, at: Configuration, message: Message) -> Iterator[tuple[Step, Configuration]]:
         to_controller = isinstance(message, VoteRequest | Decision | Hello)

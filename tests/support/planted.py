@@ -180,7 +180,7 @@ class AppliesTwice(LocalController):
     """An order that comes again is carried out again."""
 
     def _is_closed(self, number: int) -> bool:
-        return number < self._above(number).closed_below
+        return number < self.above_of(number).closed_below
 
     def _apply(self, decision: Decision, _promise: Promise | None) -> Iterator[Effect]:
         yield from self._fire(self.parts[str(decision.committed)])
@@ -191,7 +191,7 @@ class VotesFromMemory(LocalController):
 
     def _vote(self, request: VoteRequest) -> Iterator[Effect]:
         if not self._is_closed(request.round):
-            readiness = self._above(request.round).readiness
+            readiness = self.above_of(request.round).readiness
             self.promises.setdefault(request.round, Promise(readiness.transitions, 0, 0))
             yield Vote(self.name, request.round, self.promises[request.round].promised, readiness, request.coordinator)
 

@@ -1,0 +1,210 @@
+"""Controllers explored alone: what they do among all machines is there, and each act is actions of the proof."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from support import planted
+from support.examples import FACTOR, FIRST_SEED
+from support.free_parts import freed
+from support.gated_nets import GATE_READ_AGAIN, SENSOR, SHOWN
+from support.layered_nets import shared_robot
+from support.local_tie import LocalTie
+from support.reference import load_net
+
+from firable.decompose.splitting.cut import split
+from firable.executor.protocol.controller import LocalController
+from firable.executor.protocol.messages import EPOCH_BITS, Message, ProtocolError, ToController, ToCoordinator
+from firable.executor.simulation.alone import Alone
+from firable.executor.simulation.exploring import Explorer, explore, wander
+from firable.executor.simulation.numbering import Collecting, Ranking, apply, apply_message
+from firable.executor.simulation.repertoire import Budget, Configuration, Step
+from firable.executor.simulation.snapshots import clone, frozen
+from firable.executor.simulation.surroundings import Reach
+from firable.nets.catalogue import catalogue_net
+from firable.nets.decomposition import Decomposition
+
+CRASH = Budget(crashes=1)
+
+
+@cache
+def decomposition_of(name: str) -> Decomposition:
+    family, _, net = name.rpartition(" ")
+    if net in CELLS:
+        found = split(catalogue_net(net))
+    else:
+        known = {"gate_read_again": GATE_READ_AGAIN, "sensor": SENSOR, "shown": SHOWN}
+        found = split(shared_robot() if net == "shared_robot" else known.get(net) or load_net(net))
+    return freed(found) if family else found
+
+
+CELLS = ("one_robot", "two_robots_shared", "two_robots_separate", "two_cells")
+
+
+# --- What is met among all machines is met alone
+
+
+def told(explorer: Explorer, number: int, message: Message | None, reach: Reach) -> Hashable | None:
+    """A controller and what it meets, by what an exploration alone tells apart; None beyond what it reaches."""
+    stored = explorer.machines[number]
+    machine, kept = clone(stored.machine), stored.kept
+    assert isinstance(machine, LocalController)
+    known = {*machine.promises, *machine.closed}
+    for above in machine.above.values():
+        above.seen = above.seen if above.seen == above.told else -1
+        above.dismissed = above.dismissed if above.dismissed == above.readiness.sequence else -1
+    if isinstance(message, ToController):
+        above = machine.above[message.coordinator]
+        seen = above.told if message.seen == above.told else -1
+        if (above.seen == above.told and message.epoch == above.epoch) or message.epoch < above.epoch:
+            seen = above.seen
+        below = message.closed_below
+        if below <= above.closed_below:
+            below = above.closed_below if above.closed_below >> EPOCH_BITS <= message.epoch else 0
+        known = {n for n in known if machine.above_of(n) is not above or n >= message.closed_below}
+        if (n := getattr(message, "round", -1)) >= max(above.closed_below, message.closed_below):
+            known.add(n)
+        if message.epoch > reach.restarts:
+            return None
+        message = replace(message, seen=seen, closed_below=below)
+    if len(known) > reach.rounds or any(above.epoch > reach.restarts for above in machine.above.values()):
+        return None
+    collecting = Collecting()
+    apply(clone(machine), kept, collecting)
+    if message is not None:
+        apply_message(message, collecting)
+    ranking = Ranking(collecting.found.items(), explorer.coordinators)
+    kept = apply(machine, kept, ranking)
+    met = None if message is None else apply_message(message, ranking)
+    return frozen(machine), frozen(sorted(kept.items())), met
+
+
+class Acts:
+    """A watcher that notes what each controller meets."""
+
+    def __init__(self, reach: Reach, crashes: int) -> None:
+        self.reach, self.crashes = reach, crashes
+        self.found: dict[str, set[Hashable]] = {}
+        self.beyond = 0
+        self.known: set[Hashable] = set()
+
+    def __call__(self, explorer: Explorer, at: Configuration, step: Step, after: Configuration) -> None:
+        del at, after
+        key = (step.machine, step.before, step.about, step.kind)
+        if step.machine < len(explorer.coordinators) or key in self.known:
+            return
+        self.known.add(key)
+        machine = explorer.machine(step.before)
+        assert isinstance(machine, LocalController)
+        message = step.about if isinstance(step.about, Message) else None
+        act = told(explorer, step.before, message, self.reach)
+        if act is None or machine.epoch > self.crashes:
+            self.beyond += 1
+        else:
+            self.found.setdefault(machine.name, set()).add((step.kind, act))
+
+
+def alone(decomposition: Decomposition, reach: Reach, budget: Budget) -> Acts:
+    acts = Acts(reach, budget.crashes)
+    for subnet in decomposition.subnets:
+        assert explore(Alone(decomposition, subnet.name, reach), budget, watch=acts).complete
+    return acts
+
+
+@pytest.mark.parametrize(
+    ("name", "faults"),
+    [
+        ("remote_gate", Budget(losses=1, copies=1)),
+        ("local_conflict", Budget(losses=1)),
+        ("gate_read_again", Budget(losses=1)),
+        ("free ring", Budget()),
+    ],
+)
+def test_whatever_controllers_do_among_all_machines_they_do_alone(name: str, faults: Budget) -> None:
+    decomposition, reach = decomposition_of(name), Reach()
+    among_all = Acts(reach, 0)
+    assert explore(Explorer(decomposition), faults, max_configurations=30_000, watch=among_all).complete
+    contained(among_all, alone(decomposition, reach, Budget()))
+    assert among_all.beyond == 0
+
+
+@pytest.mark.seeds
+def test_whatever_controllers_do_around_a_crash_they_do_alone() -> None:
+    decomposition, reach = decomposition_of("remote_gate"), Reach()
+    among_all = Acts(reach, 1)
+    explore(Explorer(decomposition), CRASH, max_configurations=2000 * FACTOR, watch=among_all)
+    contained(among_all, alone(decomposition, reach, CRASH))
+
+
+def test_of_the_cell_every_act_is_some_actions_of_the_proof_whatever_arrives_and_those_on_ways_are_among_them() -> None:
+    """Of the system controller, with parts free of promise as bundles have them: all that there is."""
+    decomposition, reach = decomposition_of("free one_robot"), Reach()
+    by_itself, among_all, tie = Acts(reach, 0), Acts(reach, 0), Tie(decomposition)
+
+    def watch(explorer: Explorer, at: Configuration, step: Step, after: Configuration) -> None:
+        tie(explorer, at, step, after)
+        by_itself(explorer, at, step, after)
+
+    assert explore(Alone(decomposition, "system", reach), watch=watch).complete
+    assert tie.actions["apply-free"] > 0
+    wander(Explorer(decomposition), Budget(losses=2, copies=2), FIRST_SEED, 400, among_all)
+    assert len(among_all.found["system"]) > 5
+    assert among_all.found["system"] <= by_itself.found["system"]
+
+
+def contained(among_all: Acts, by_itself: Acts) -> None:
+    assert among_all.found
+    for name, acts in among_all.found.items():
+        assert acts <= by_itself.found[name], next(iter(acts - by_itself.found[name]))
+
+
+# --- Each act is actions of the proof
+
+
+class Tie(LocalTie):
+    """Holds each act to the proof, and each vote that stands to what an order relies on besides."""
+
+    def __call__(self, explorer: Explorer, before: Configuration, step: Step, after: Configuration) -> None:
+        super().__call__(explorer, before, step, after)
+        machine = explorer.machine(step.after)
+        reports = [] if step.kind.endswith("crash") else [e for e in step.effects if isinstance(e, ToCoordinator)]
+        if isinstance(machine, LocalController) and reports:
+            for t in reports[-1].readiness.transitions & machine.free:
+                assert not machine.parts[t].takes & machine.unsent, f"'{t}' is voted for before a command is taken"
+
+
+@pytest.mark.seeds  # a campaign goes further
+@pytest.mark.parametrize("budget", [Budget(), CRASH], ids=["no crash", "crash"])
+@pytest.mark.parametrize("net", [*CELLS, "free one_robot"])
+def test_every_act_of_controllers_of_cells_is_some_actions_of_the_proof_as_far_as_it_is_explored(
+    net: str, budget: Budget
+) -> None:
+    decomposition = decomposition_of(net)
+    tie = Tie(decomposition)
+    for subnet in decomposition.subnets:
+        explore(Alone(decomposition, subnet.name, Reach()), budget, max_configurations=8 * FACTOR**2, watch=tie)
+    assert tie.actions
+
+
+# --- A drift of the code is found, on a cell
+
+CODE: list[tuple[type[LocalController], str, str, Budget]] = [
+    (planted.AppliesTwice, "one_robot", "system", Budget()),
+    (planted.KeepsNoPromise, "one_robot", "system", CRASH),
+    (planted.KeepsNoMarking, "one_robot", "system", CRASH),
+    (planted.ForgetsClosedRounds, "one_robot", "system", CRASH),
+    (planted.SignalsUnlocked, "free one_robot", "mc", Budget()),
+    (planted.LeavesUntaken, "free one_robot", "conveyor", Budget()),
+]
+
+
+@pytest.mark.parametrize(("fault", "net", "name", "budget"), CODE, ids=[fault.__name__ for fault, *_ in CODE])
+def test_a_drift_of_the_code_in_a_controller_of_the_cell_is_no_action_of_the_proof(
+    fault: type[LocalController], net: str, name: str, budget: Budget
+) -> None:
+    explorer = Alone(decomposition_of(net), name, Reach(), controller=fault)
+    with pytest.raises((AssertionError, ProtocolError)):
+        explore(explorer, budget, max_configurations=2000, watch=Tie(decomposition_of(net)))
