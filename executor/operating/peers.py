@@ -63,6 +63,8 @@ class Peers:
         """Those that some machine here talks to."""
         self.connected_to: set[str] = set()
         self.met: set[str] = set()
+        self.turned_away: dict[str, str] = {}
+        """What is said of each that was refused and has not come back as it should."""
         self.is_due = False
         """Whether all should have come by now."""
         self.timer: asyncio.TimerHandle | None = None
@@ -97,7 +99,7 @@ class Peers:
     def waits(self) -> Iterator[str]:
         """What waits for another machine, in a sentence each."""
         yield from waits(self.acts.coordinators, self.acts.controllers, self.names - self.connected_to)
-        yield from map(_missing, self.never_met)
+        yield from map(self._missing, self.never_met)
 
     def absent(self) -> Iterator[str]:
         """Those that some machine here talks to and that are lost, in a sentence each.
@@ -145,6 +147,7 @@ class Peers:
         if peer in self.names:
             self.connected_to.add(peer)
             self.met.add(peer)
+            self.turned_away.pop(peer, None)
             self.told("connected", f"{called(peer)} is connected")
             self.acts.repeat()
             self.something_new()
@@ -158,14 +161,16 @@ class Peers:
 
     def refused(self, peer: str, problem: Diagnostic) -> None:
         """A host was refused."""
-        self.told("refused", f"{called(peer)} is refused: {problem.message}; {problem.hint}")
+        said = self.turned_away[peer] = f"{called(peer)} is refused: {problem.message}; {problem.hint}"
+        self.told("refused", said)
 
     # Time
 
     def _should_have_come(self) -> None:
         self.is_due = True
         for name in self.never_met:
-            self.told("never-met", _missing(name))
+            if name not in self.turned_away:
+                self.told("never-met", self._missing(name))
 
     def _repeat_later(self, after_seconds: float) -> None:
         if self.timer is not None:
@@ -177,6 +182,7 @@ class Peers:
         self.acts.repeat()
         self._repeat_later(min(2 * self.pause_seconds, max(REPEAT_SECONDS_MAX, self.repeat_seconds)))
 
-
-def _missing(name: str) -> str:
-    return f"{called(name)} was never reached: is its host started, and the address right?"
+    def _missing(self, name: str) -> str:
+        """What is said of one that has not come: it was refused, or nobody has heard of it."""
+        unheard = f"{called(name)} was never reached: is its host started, and the address right?"
+        return self.turned_away.get(name, unheard)

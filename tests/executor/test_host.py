@@ -23,6 +23,7 @@ from firable.executor.operating.situation import State
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.messages import Decision, Stored, Vote, VoteRequest
 from firable.nets.catalogue import catalogue_net, catalogue_plant
+from firable.nets.diagnostics import Diagnostic
 from firable.nets.net import Place
 from firable.nets.text import parse_net
 from firable.semantics.trace import Fired, Noted, parse_trace, read_trace
@@ -451,6 +452,25 @@ def test_a_machine_that_never_comes_is_told_by_name_and_no_more_when_it_has_come
         assert cell.firings() > 5
         await cell.stop()
         cell.replayed()
+
+    run_in_virtual_time(main())
+
+
+def test_a_machine_that_was_refused_is_not_told_to_be_missing(tmp_path: Path) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path, (CENTRE, ("system", "mc", "conveyor")))
+        await asyncio.sleep(1)
+        centre = cell.hosts[CENTRE]
+        centre.peers.refused("robot", Diagnostic("F5020", "'robot' holds another bundle", "give it this one"))
+        await asyncio.sleep(9)
+        assert not [sentence for kind, sentence in cell.told if kind == "never-met"]
+        assert "'robot' is refused: 'robot' holds another bundle; give it this one" in centre.situation().message
+        assert "was never reached" not in centre.situation().message
+        cell.journals[ROBOT] = MemoryJournal()
+        cell.start(ROBOT)
+        await asyncio.sleep(20)
+        assert "refused" not in centre.situation().message
+        await cell.stop()
 
     run_in_virtual_time(main())
 
