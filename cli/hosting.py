@@ -248,6 +248,11 @@ def _link(bundle: Bundle, machines: tuple[str, ...], options: HostOptions) -> tu
         return make_link(bundle, machines, SerialLine(options.serial, options.baud, options.lease)), ()
     if not options.listen and not options.join:
         raise click.UsageError("say with --listen, --join or --serial how this host is linked to the others")
+    secured = [address for address in (*options.listen, *options.join) if address.startswith("tls/")]
+    if secured and options.tls is None:
+        raise click.UsageError(f"{secured[0]} asks for certificates: name those of this host with --tls CA CERT KEY")
+    if options.tls is not None and not secured:
+        raise click.UsageError("--tls is for tls/ addresses, and without one nothing is encrypted: write tls/HOST:PORT")
     link = make_link(bundle, machines, Network(options.listen, options.join, options.tls, options.lease))
     from firable.executor.links.zenoh_link import open_to_the_network
 

@@ -33,6 +33,11 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "no port": (["--controller", "robot", "--dry-run", "1", "--listen", "tcp/127.0.0.1"], "write tcp/HOST:PORT"),
     "a port too high": (["--controller", "robot", "--dry-run", "1", "--join", "tls/[::1]:65536"], "no address"),
     "another protocol": (["--controller", "robot", "--dry-run", "1", "--join", "udp/[::1]:1"], "no address"),
+    "TLS without certificates": (["--controller", "robot", "--dry-run", "1", "--join", "tls/[::1]:1"], "with --tls CA"),
+    "certificates without TLS": (
+        ["--controller", "robot", "--dry-run", "1", "--join", "tcp/[::1]:1", "--tls", "{bundle}", "no-cert", "no-key"],
+        "nothing is encrypted",
+    ),
     "no certificates": (
         ["--controller", "robot", "--dry-run", "1", "--join", "tls/[::1]:1", "--tls", "{bundle}", "no-cert", "no-key"],
         "no-cert:1:1: error[F1001]",
