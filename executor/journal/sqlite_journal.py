@@ -160,6 +160,8 @@ class SqliteJournal:
         problems = [str(problem) for (problem,) in run("pragma integrity_check") if problem != "ok"]
         if problems:
             self._damaged(problems[0])
+        if not run("select count(*) from sqlite_master").fetchone()[0]:
+            self._damaged(f"it is gone or empty, and {printable(self.witness.name)} beside it tells of one")
         headers = run("select format, digest, machines, generation, total from header").fetchall()
         if len(headers) != 1 or not isinstance(headers[0][3], int):
             self._damaged("its header is missing")

@@ -259,6 +259,15 @@ def test_journal_without_the_file_beside_it_is_refused(tmp_path: Path) -> None:
     assert message.endswith("cell.journal.generation beside it is missing or empty")
 
 
+def test_a_journal_that_is_gone_while_the_file_beside_it_is_there_is_refused_in_these_words(tmp_path: Path) -> None:
+    filled(tmp_path).close()
+    (tmp_path / "cell.journal").unlink()
+    for _ in range(2):  # the refusal leaves nothing behind that a second start would take for a journal
+        code, message = refused(lambda: sqlite(tmp_path))
+        assert code == "F5032"
+        assert message.endswith("it is gone or empty, and cell.journal.generation beside it tells of one")
+
+
 HOLDER = """
 import sys, time
 from firable.executor.journal.journal import sync_now
