@@ -2,9 +2,10 @@
 
 All machines of a cell together have too many interleavings to be explored one by one. But a controller sees nothing of
 the others than messages, and `surroundings` says which may arrive in whatever it holds. So each controller is explored
-on its own, with its machines of the cell, its sensors and its stable storage, and comes to an end after some hundred
-configurations; any number of messages is lost, doubled and late in them. What it does in any run of the cell, as far
-as `Reach` and the budget of its own crashes go, it does here.
+on its own, with its machines of the cell, its sensors and its stable storage; any number of messages is lost, doubled
+and late. A controller that mostly votes comes to an end after some hundred configurations, one with many steps of its
+own after thousands, or not in minutes. Where it ends, what the controller does in any run of the cell it does here, as
+far as `Reach` and the budget of its own crashes go.
 
 Numbers are counted from the beginning as in the exploration of all machines, and then with gaps between them, so that
 there are numbers for what arrives. Zero is not moved: it is where a controller begins that has heard of nothing, and
