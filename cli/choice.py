@@ -20,7 +20,6 @@ class OneOf(_Choice):
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
-            from firable.nets.diagnostics import did_you_mean
+            from firable.nets.diagnostics import with_meant
 
-            near = did_you_mean(str(value), self.choices).rstrip()
-            self.fail(f"{error.message.removesuffix('.')}; {near}" if near else error.message, param, ctx)
+            self.fail(with_meant(error.message, str(value), self.choices), param, ctx)

@@ -25,13 +25,12 @@ def explain(code: str) -> int:
     CODE stands in brackets where it is told: error[F2003], or hint: [F3011]. Without the F, and in small letters, it
     will do too.
     """
-    from firable.nets.diagnostics import CODES, did_you_mean
+    from firable.nets.diagnostics import CODES, with_meant
 
     wanted = re.sub(r"[\[\]]|^(error|warning)", "", code.strip()).upper()
     wanted = wanted if wanted.startswith("F") else f"F{wanted}"
     if wanted not in CODES:
-        near = did_you_mean(wanted, list(CODES)).rstrip()
-        raise click.UsageError(f"'{code}' is no code of firable{f'; {near}' if near else '.'}")
+        raise click.UsageError(with_meant(f"'{code}' is no code of firable.", wanted, list(CODES)))
     for line in page_of(wanted).removesuffix("\n").splitlines():
         if not line.startswith("```"):
             click.echo(click.style(line.removeprefix("# "), bold=True) if line.startswith("# ") else line)

@@ -89,10 +89,9 @@ class _Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The command that is named; raises `click.UsageError` with the one that was probably meant."""
         if args[0] not in COMMANDS and not args[0].startswith("-"):
-            from firable.nets.diagnostics import did_you_mean
+            from firable.nets.diagnostics import with_meant
 
-            near = did_you_mean(args[0], list(COMMANDS)).rstrip()
-            ctx.fail(f"No such command '{args[0]}'{f'; {near}' if near else '.'}")
+            ctx.fail(with_meant(f"No such command '{args[0]}'.", args[0], list(COMMANDS)))
         return super().resolve_command(ctx, args)
 
 

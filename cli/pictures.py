@@ -97,10 +97,10 @@ def net_picture(
     if marking is not None:
         names = [name.strip() for name in marking.split(",") if name.strip()]
         if unknown := [name for name in names if name not in net.place_index]:
-            from firable.nets.diagnostics import did_you_mean
+            from firable.nets.diagnostics import with_meant
 
-            near = did_you_mean(unknown[0], list(net.place_index)).rstrip()
-            raise click.UsageError(f"the net has no place '{unknown[0]}'{f'; {near}' if near else ''}")
+            message = f"the net has no place '{unknown[0]}'"
+            raise click.UsageError(with_meant(message, unknown[0], list(net.place_index)))
         shown = net.marking(names)
     return draw(marking=shown)
 
@@ -109,10 +109,10 @@ def refuse_unknown(net: Net, collapse: tuple[str, ...]) -> None:
     """Refuse to collapse what the net does not have."""
     names = {"all", *net.place_index, *(controller.name for controller in net.controllers)}
     if unknown := [name for name in collapse if name not in names]:
-        from firable.nets.diagnostics import did_you_mean
+        from firable.nets.diagnostics import with_meant
 
-        near = did_you_mean(unknown[0], sorted(names)).rstrip()
-        raise click.UsageError(f"the net has no place and no controller '{unknown[0]}'{f'; {near}' if near else ''}")
+        message = f"the net has no place and no controller '{unknown[0]}'"
+        raise click.UsageError(with_meant(message, unknown[0], sorted(names)))
 
 
 def _layouter(name: str) -> Layouter:

@@ -229,7 +229,7 @@ def _files_beside(journal: str | None) -> tuple[str, ...]:
 def _said(net: Net, say: tuple[str, ...], journal: str | None) -> dict[str, Answer]:
     """What the operator says of commands, by place."""
     from firable.executor import Answer
-    from firable.nets.diagnostics import did_you_mean
+    from firable.nets.diagnostics import with_meant
 
     if say and journal is None:
         raise click.UsageError("--say is of a run that is taken up: name its --journal")
@@ -239,8 +239,8 @@ def _said(net: Net, say: tuple[str, ...], journal: str | None) -> dict[str, Answ
         place, _, word = option.partition("=")
         commanding = [p.name for p in net.places if p.command is not None]
         if place not in commanding:
-            near = did_you_mean(place, commanding).rstrip()
-            raise click.UsageError(f"--say {option}: no place '{place}' sends a command{near and f'; {near}'}")
+            message = f"--say {option}: no place '{place}' sends a command"
+            raise click.UsageError(with_meant(message, place, commanding))
         if word not in words:
             raise click.UsageError(f"--say {option}: say {', '.join(words)}")
         said[place] = words[word]

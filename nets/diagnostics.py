@@ -233,6 +233,16 @@ def did_you_mean(name: str, known: Sequence[str]) -> str:
     return f"did you mean '{close[0]}'? " if close else ""
 
 
+def with_meant(message: str, name: str, known: Sequence[str]) -> str:
+    """A message about a name that nothing has, with the known name that was probably meant.
+
+    >>> with_meant("there is no 'jso'.", "jso", ["json", "text"])
+    "there is no 'jso'; did you mean 'json'?"
+    """
+    near = did_you_mean(name, known).rstrip()
+    return f"{message.removesuffix('.')}; {near}" if near else message
+
+
 def unknown_name(code: str, kind: str, name: str, known: Collection[str], subject: Subject) -> Diagnostic:
     """The diagnostic on a name that nothing has, with the known name that was probably meant."""
     local = min((full for full in known if full.rpartition(".")[2] == name), default=None)
