@@ -87,9 +87,9 @@ def ended(answer: Coroutine[Any, Any, dict[str, Any]]) -> dict[str, Any]:
         return thread.submit(asyncio.run, answer).result()
 
 
-def begin(page: Page) -> None:
+def begin(page: Page, text: str = TEXT) -> None:
     page.get_by_role("button", name="Edit", exact=True).click()
-    expect(page.get_by_label("Text of the net file")).to_have_value(TEXT)
+    expect(page.get_by_label("Text of the net file")).to_have_value(text)
 
 
 def done(page: Page, words: str) -> None:
@@ -132,7 +132,7 @@ def test_a_net_is_edited_in_the_picture_and_by_names_and_all_is_undone(
         assert file.read_text() == expected
         page.get_by_role("button", name="← Play").click()
         expect(page.locator('[id="place:mc.moving"]')).to_be_attached()
-        page.get_by_role("button", name="Edit", exact=True).click()
+        begin(page, expected)
         for words in (
             "mc.busy renamed to moving",
             "robot.busy given to mc",

@@ -139,6 +139,7 @@ def served(then: Then) -> tuple[list[list[Writes]], Commands]:
         await asyncio.wait((task,), timeout=PATIENCE_S)
         assert kept.is_safe
 
+    gc.collect()  # what others have left behind is not ours
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         asyncio.run(main())
