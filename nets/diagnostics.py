@@ -135,6 +135,7 @@ CODES: Final[dict[str, str]] = {
     "F5022": "a link that is open to the network",
     "F5023": "a bundle without the signature that is demanded",
     "F5024": "a key or signatures that are none, or damaged",
+    "F5025": "a host without the journal that it had",
     "F5031": "the journal of another bundle",
     "F5032": "the journal is damaged",
     "F5033": "the journal is in use",

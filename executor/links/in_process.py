@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 
-from firable.executor.links.link import Greeting, LinkListener, objection
+from firable.executor.links.link import Greeting, LinkListener, come_back_without, known_otherwise, objection
 from firable.executor.protocol.messages import Message
 
 
@@ -87,13 +87,21 @@ class InProcessLink:
 
     def meet(self, other: InProcessLink) -> None:
         """Greet another host."""
+        here, there = self._tell(), other._tell()
+        ours, theirs = here.memory, there.memory
         problem = objection(self.greeting, other.greeting)
+        come_back = theirs.met_otherwise(other.greeting.names, by=ours)
+        forgotten = ours.met_otherwise(self.greeting.names, by=theirs)
         for name in other.greeting.names:
             if problem is not None:
-                self._tell().refused(name, problem)
+                here.refused(name, problem)
+            elif come_back:
+                here.refused(name, come_back_without(come_back))
+            elif forgotten:
+                here.disowned(name, known_otherwise(forgotten, name))
             else:
                 self.peers[name] = other
-                self._tell().connected(name)
+                here.connected(name, theirs.storage)
 
     def lose(self, other: InProcessLink) -> None:
         """Another host is no longer reached."""

@@ -31,7 +31,15 @@ from pydantic import TypeAdapter, ValidationError
 
 from firable.executor.links.encoding import EncodingError, decode, encode
 from firable.executor.links.framing import PAYLOAD_BYTES_MAX, Frame, FrameReader, Kind, pack_frame
-from firable.executor.links.link import Greeting, LinkListener, cannot_open, objection
+from firable.executor.links.link import (
+    Greeting,
+    LinkListener,
+    Memory,
+    cannot_open,
+    come_back_without,
+    known_otherwise,
+    objection,
+)
 from firable.executor.protocol.messages import Message
 from firable.nets.interchange import canonical_json
 
@@ -53,6 +61,8 @@ class _Said:
 
     greeting: Greeting
     instance: str
+    memory: Memory = field(default_factory=Memory)
+    """Hosts of older versions say none, and are refused by their version."""
 
 
 _SAID: Final = TypeAdapter(_Said)
@@ -222,7 +232,8 @@ class SerialLink:
     def _frame(self, to: int, peer: _Peer, number: int, *, greet: bool = False) -> bytes:
         """A frame for a host: the greeting as long as it is not connected, then as many messages as go into one."""
         if greet or not peer.names:
-            payload = canonical_json(_SAID.dump_python(_Said(self.greeting, self.instance), mode="json"))
+            said = _Said(self.greeting, self.instance, self._tell().memory)
+            payload = canonical_json(_SAID.dump_python(said, mode="json"))
             return pack_frame(Frame(to, self.own, Kind.GREETING, number, payload))
         lines: list[bytes] = []
         while peer.queue and (not lines or len(peer.queue[0]) + sum(map(len, lines)) <= BATCH_BYTES_MAX):
@@ -245,21 +256,30 @@ class SerialLink:
         except ValidationError:
             self.reader.damaged += 1
             return
+        here, ours, theirs = self._tell(), self._tell().memory, said.memory
+        come_back = theirs.met_otherwise(said.greeting.names, by=ours)
+        forgotten = ours.met_otherwise(self.greeting.names, by=theirs)
         problem = objection(self.greeting, said.greeting)
+        if problem is None and come_back:
+            problem = come_back_without(come_back)
+        is_fit = problem is None and not forgotten
         if peer.names and self.own == MASTER:
             self._lose(peer)  # it was asked for messages, and does not know us: the next poll is a greeting
             return
-        if peer.names and (said.instance != peer.instance or problem is not None):
+        if peer.names and (said.instance != peer.instance or not is_fit):
             self._lose(peer)  # it has been started anew: whatever was under way is gone
-        if problem is not None:
+        if not is_fit:
             if peer.refused != said.instance:
                 peer.refused = said.instance
                 for name in said.greeting.names:
-                    self._tell().refused(name, problem)
+                    if problem is not None:
+                        here.refused(name, problem)
+                    else:
+                        here.disowned(name, known_otherwise(forgotten, name))
         elif not peer.names:
             peer.names, peer.instance = said.greeting.names, said.instance
             for name in peer.names:
-                self._tell().connected(name)
+                here.connected(name, theirs.storage)
 
     def _message(self, peer: _Peer, line: bytes) -> None:
         try:

@@ -3,11 +3,14 @@
 A greeting is a *liveliness token*, which Zenoh shows to every peer and takes back when the session ends, its TCP
 connection breaks or its lease is over. Its key says all that the greeting has to:
 
-    firable/VERSION/DIGEST/alive/NAME/SESSION            a machine is reached
+    firable/VERSION/DIGEST/alive/NAME/SESSION            a machine is there
+    firable/VERSION/DIGEST/heard/NAME/SESSION/by/SESSION/ANSWER    it is heard by that host, or is not and why
     firable/VERSION/DIGEST/to/NAME/SESSION/from/NAME/SESSION    a message
 
 Keys of messages bear version, digest and both sessions, so that nothing of another bundle, or meant for the process
-that ran the machine before, is even routed. Of two hosts that claim one machine the first is heard and the other
+that ran the machine before, is even routed. A SESSION is Zenoh's identity of it and the storage of its host (`Memory`).
+Two hosts are connected when each has answered all machines of the other that it hears them: what one refuses, the other
+must know, before anything moves there. Of two hosts that claim one machine the first is heard and the other
 refused; where the first is dead and nobody has noticed yet, the second takes its place when the lease is over.
 
 The *lease* is set, and not left at Zenoh's ten seconds: a frozen host is noticed after it. A killed one is noticed at
@@ -33,12 +36,13 @@ from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Final
 from urllib.parse import quote, unquote
 
 import zenoh
 
+from firable.executor.links.claims import Answer, Claims, session_of
 from firable.executor.links.encoding import EncodingError, decode, encode
 from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Arrival, Greeting, LinkListener, cannot_open, objection
@@ -84,8 +88,9 @@ class ZenohLink:
         self.listener: LinkListener | None = None
         self.identity = ""
         self.broken: asyncio.Future[None] | None = None
-        self.claims: dict[str, list[str]] = {}
-        """For each peer the sessions that say they are it; the first is."""
+        self.claims: Claims | None = None
+        self.answers: dict[tuple[str, str], Any] = {}  # tokens, the end of which Zenoh gives no type
+        """To a machine of a session."""
         self.publishers: dict[tuple[str, str, str], zenoh.Publisher] = {}
         """For each sender here, receiver and session of the receiver."""
         self.damaged = 0
@@ -102,38 +107,39 @@ class ZenohLink:
             session = await asyncio.to_thread(zenoh.open, self._configuration())
         except zenoh.ZError as error:
             raise cannot_open(", ".join((*self.listen, *self.join)), str(error).partition(" at /")[0]) from None
-        self.session, self.listener, self.identity = session, listener, str(session.info.zid())
+        self.session, self.listener = session, listener
+        self.identity = session_of(str(session.info.zid()), listener.memory.storage)
+        self.claims = Claims(self.greeting.names, listener, self._answer)
         self.lending = loop if isinstance(loop, LendingLoop) else None
         try:
-            ours = self._key(self.greeting.version, self.greeting.digest)
+            ours, tokens = self._ours(), session.liveliness()
             kept: list[object] = []
             for name in self.greeting.names:
                 at = f"{ours}/to/{_spelled(name)}/{self.identity}/{_REST}"
                 kept.append(session.declare_subscriber(at, lambda s: self._on(loop, s, is_message=True)))
             for name in self.greeting.names:
-                kept.append(session.liveliness().declare_token(f"{ours}/alive/{_spelled(name)}/{self.identity}"))
-            alive = "firable/*/*/alive/*/*"
-            tokens = session.liveliness()
-            kept.append(tokens.declare_subscriber(alive, lambda s: self._on(loop, s, is_message=False), history=True))
+                kept.append(tokens.declare_token(f"{ours}/alive/{_spelled(name)}/{self.identity}"))
+            for heard in (f"{ours}/heard/*/{self.identity}/by/*/*", "firable/*/*/alive/*/*"):
+                take = partial(self._on, loop, is_message=False)
+                kept.append(tokens.declare_subscriber(heard, take, history=True))
             self.broken = loop.create_future()
             await self.broken
         finally:
-            self.session = self.listener = None
-            self.claims.clear()
+            self.session = self.listener = self.claims = None
             self.publishers.clear()
+            self.answers.clear()
             await asyncio.to_thread(session.close)
             self.samples.clear()  # what an earlier session has told is not so in a later one
 
     def send(self, sender: str, receiver: str, message: Message) -> None:
         """Publish a message; where its receiver is not connected it is lost."""
-        sessions = self.claims.get(receiver)
-        if self.session is None or not sessions:
+        peer = None if self.claims is None else self.claims.reached.get(receiver)
+        if self.session is None or peer is None:
             return
-        to = (sender, receiver, sessions[0])
+        to = (sender, receiver, peer)
         publisher = self.publishers.get(to)
         if publisher is None:
-            ours = self._key(self.greeting.version, self.greeting.digest)
-            key = f"{ours}/to/{_spelled(receiver)}/{sessions[0]}/from/{_spelled(sender)}/{self.identity}"
+            key = f"{self._ours()}/to/{_spelled(receiver)}/{peer}/from/{_spelled(sender)}/{self.identity}"
             drop = zenoh.CongestionControl.DROP
             if self.lending is not None and self.lending.is_lent:  # on Zenoh's own thread nothing waits for Zenoh
                 self.lending.call_soon(self.send, sender, receiver, message)
@@ -175,9 +181,9 @@ class ZenohLink:
             configuration.insert_json5(key, json.dumps(value))
         return configuration
 
-    @staticmethod
-    def _key(version: int, digest: str) -> str:
-        return f"firable/{version}/{_spelled(digest)}"
+    def _ours(self) -> str:
+        """What keys between hosts with this bundle begin with."""
+        return f"firable/{self.greeting.version}/{_spelled(self.greeting.digest)}"
 
     def _on(self, loop: asyncio.AbstractEventLoop, sample: zenoh.Sample, *, is_message: bool) -> None:
         """A sample has come, on a thread of Zenoh; after the loop's end nobody hears it."""
@@ -225,8 +231,8 @@ class ZenohLink:
                 else:
                     self._told(came)
                     came = []
-                    if self.listener is not None:
-                        self._host(self.listener, key, gone)
+                    if self.listener is not None and self.claims is not None:
+                        self._host(self.listener, self.claims, key, gone)
             self._told(came)
         except Exception as error:
             if self.broken is not None and not self.broken.done():
@@ -236,36 +242,32 @@ class ZenohLink:
         if came and self.listener is not None:
             self.listener.arrived_together(came)
 
-    def _host(self, listener: LinkListener, key: str, gone: bool) -> None:
-        _, version, digest, _, name, session = key.split("/")
-        if session == self.identity:
-            return
-        peer = _read(name)
-        greeting = Greeting(_read(digest), (peer,), int(version) if version.isdecimal() else -1)
-        if (problem := objection(self.greeting, greeting)) is not None:
-            if not gone:
+    def _host(self, listener: LinkListener, claims: Claims, key: str, gone: bool) -> None:
+        _, version, digest, what, name, session, *by = key.split("/")
+        if what == "heard":
+            with suppress(ValueError):  # no answer that there is
+                claims.answered(_read(name), by[1], Answer(by[2]), taken_back=gone)
+        elif session != self.identity:
+            peer = _read(name)
+            greeting = Greeting(_read(digest), (peer,), int(version) if version.isdecimal() else -1)
+            if (problem := objection(self.greeting, greeting)) is None:
+                (claims.given_up if gone else claims.claimed)(peer, session)
+            elif not gone:
                 listener.refused(peer, problem)
-            return
-        claims = self.claims.setdefault(peer, [])
-        first = claims[:1]
-        if gone and session in claims:
-            claims.remove(session)
-        elif not gone and session not in claims:
-            claims.append(session)
-            if len(claims) > 1:
-                twice = Greeting(greeting.digest, greeting.names)
-                listener.refused(peer, _required(objection(twice, twice)))
-        if claims[:1] != first:
-            if first:
-                self.publishers = {to: kept for to, kept in self.publishers.items() if to[1:] != (peer, *first)}
-                listener.lost(peer)
-            if claims:
-                listener.connected(peer)
+        self.publishers = {to: kept for to, kept in self.publishers.items() if claims.reached.get(to[1]) == to[2]}
+
+    def _answer(self, machine: str, session: str, answer: Answer | None) -> None:
+        """Say to a machine of a session whether it is heard, in place of what was said before."""
+        if (said := self.answers.pop((machine, session), None)) is not None:
+            said.undeclare()
+        if answer is not None and self.session is not None:
+            key = f"{self._ours()}/heard/{_spelled(machine)}/{session}/by/{self.identity}/{answer}"
+            self.answers[machine, session] = self.session.liveliness().declare_token(key)
 
     def _message(self, key: str, payload: bytes, gone: bool) -> Sequence[Arrival]:
         receiver, peer, session = _parsed(key)
         # Only from the process that is known to run the machine: another one, or one not yet met, is not heard.
-        if gone or self.claims.get(peer, [])[:1] != [session]:
+        if gone or self.claims is None or self.claims.reached.get(peer) != session:
             return ()
         try:
             message = decode(payload)
@@ -293,12 +295,6 @@ def _is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
-
-
-def _required(problem: Diagnostic | None) -> Diagnostic:
-    if problem is None:
-        raise AssertionError("a host with the same machines is refused")
-    return problem
 
 
 @lru_cache(maxsize=1000)

@@ -169,6 +169,11 @@ class Acts:
         for machine, coordinator in self.coordinators.items():
             self.act(machine, coordinator.permit(firings))
 
+    def halt(self) -> None:
+        """Let nothing fire here by itself any more; rounds that are not decided are aborted."""
+        self.halted = True
+        self.permit(0)
+
     def go_on(self) -> None:
         """End a halt: what was withheld is answered, and everybody has a turn."""
         self.halted = False
@@ -296,6 +301,11 @@ class Acts:
         if self.clock is not None and (due := controller.deadline(held)) is not None:
             delay = self.clock.loop_delay_seconds(due)
             self.ticks[machine] = self.clock.loop.call_later(delay, self.hear, machine, None)
+
+    def remember(self, key: str, keep: Keep) -> None:
+        """Have the journal keep something that is no machine's, with the next sync."""
+        self.journal.write(key, [keep])
+        self.unsynced = True
 
     # What comes of it
 

@@ -137,7 +137,10 @@ class Host:
             self.dispatch.left,
         )
         self.coordinators, self.controllers = self.acts.coordinators, self.acts.controllers
-        self.peers = Peers(self.decomposition, self.acts, self.link, self.told, self.groups.at_once)
+        at_once, go_on = self.groups.at_once, self._go_on
+        self.peers = Peers(self.decomposition, self.acts, self.link, self.told, at_once, go_on, self.broken)
+        if self.peers.is_unmet:
+            self.acts.halt()
         self.owner_of = {signal.name: name for name, c in self.controllers.items() for signal in c.subnet.signals}
         self.taking_up: restart.TakingUp | None = None
         """What a restart has found out, as long as the controllers are held."""
@@ -218,8 +221,13 @@ class Host:
         if self.paused:
             self.paused = False
             self.note("resumed")
-            self.acts.go_on()
+            self._go_on()
         return True
+
+    def _go_on(self) -> None:
+        """End a halt, unless something else keeps everything standing."""
+        if not self.paused and not self.peers.is_unmet:
+            self.acts.go_on()
 
     async def step(self) -> str | None:
         """While paused, fire one transition; returns its name, or None where none is enabled."""

@@ -10,33 +10,44 @@ decision whoever is gone (O6), and one that has not goes on alone as far as its 
 decide, and an idle cell would talk for ever. As soon as something new is said the repeats begin anew, and a peer that
 is back is told at once.
 
+*Memory*: a host keeps by which storage it met each machine, and is refused, or refuses, where that is another (F5025).
+It keeps it before anything leaves that rests on what the machine said. Until it has met one of those that its machines
+talk to, ever, nothing moves here: a journal that was mistyped or left out looks like the first start of a cell, and
+only the others know better. If they do before anybody else was met, this host ends: its places of the start are wrong.
+
 Where all machines are on one host there are no others, and this does nothing.
 """
 
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
-from firable.executor.links.link import Arrival, Link, called
+from firable.executor.links.link import Arrival, Link, Memory, called
 from firable.executor.operating.acts import Acts
 from firable.executor.operating.waits import reached, waits
 from firable.executor.protocol.deciders import coordinators
-from firable.executor.protocol.messages import Message, ToController
+from firable.executor.protocol.messages import Keep, Message, ToController
 from firable.nets.decomposition import Decomposition
-from firable.nets.diagnostics import Diagnostic
+from firable.nets.diagnostics import Diagnostic, InputError
 
 REPEAT_SECONDS: Final = 0.2
 REPEAT_SECONDS_MAX: Final = 3.2
 MEET_SECONDS: Final = 3.0
 """A peer that has not been met by then is told."""
+HOSTS: Final = "\nhosts"
+"""The name under which the journal keeps the memory of other hosts; no machine has it."""
+_STORAGE: Final = "storage"
+_OF: Final = "of/"
 
 
 class Peers:
     """The machines of other hosts, behind a link; `told` hears of them, by the kind of news and a sentence.
 
-    `work` has done at once what has been posted.
+    `work` has done at once what has been posted; `begin` is called when something may move here that might not until
+    then, and `end` ends the run by an error.
     """
 
     def __init__(
@@ -46,10 +57,14 @@ class Peers:
         link: Link | None,
         told: Callable[[str, str], None],
         work: Callable[[], None],
+        begin: Callable[[], None],
+        end: Callable[[InputError], None],
         repeat_seconds: float = REPEAT_SECONDS,
     ) -> None:
         self.acts = acts
         self.work = work
+        self.begin = begin
+        self.end = end
         self.link = link
         self.told = told
         self.repeat_seconds = self.pause_seconds = repeat_seconds
@@ -61,6 +76,13 @@ class Peers:
         }
         self.needed = tuple(sorted((deciding | voting) - here))
         """Those that some machine here talks to."""
+        kept = acts.journal.kept(HOSTS)
+        self.memory = Memory(
+            str(kept.get(_STORAGE) or os.urandom(4).hex()),
+            {key.removeprefix(_OF): str(storage) for key, storage in kept.items() if key.startswith(_OF)},
+        )
+        if link is not None and _STORAGE not in kept:
+            acts.remember(HOSTS, Keep(_STORAGE, self.memory.storage))
         self.connected_to: set[str] = set()
         self.met: set[str] = set()
         self.turned_away: dict[str, str] = {}
@@ -68,6 +90,11 @@ class Peers:
         self.is_due = False
         """Whether all should have come by now."""
         self.timer: asyncio.TimerHandle | None = None
+
+    @property
+    def is_unmet(self) -> bool:
+        """Whether nobody that the machines here talk to was ever met: then nothing moves here."""
+        return self.link is not None and bool(self.needed) and self.memory.known.keys().isdisjoint(self.needed)
 
     async def run(self) -> None:
         """Be linked to them until cancelled; raises `InputError` where the link cannot be opened, or fails."""
@@ -99,6 +126,8 @@ class Peers:
     def waits(self) -> Iterator[str]:
         """What waits for another machine, in a sentence each."""
         yield from waits(self.acts.coordinators, self.acts.controllers, self.names - self.connected_to)
+        if self.is_unmet:
+            yield "nothing moves here before another host of the cell has been met"
         yield from map(self._missing, self.never_met)
 
     def absent(self) -> Iterator[str]:
@@ -142,15 +171,24 @@ class Peers:
         self.told("dropped", f"{called(sender)} sent a {type(message).__name__} that is not its to send")
         return False
 
-    def connected(self, peer: str) -> None:
+    def connected(self, peer: str, storage: str) -> None:
         """A peer can be reached: what it has missed is said again."""
         if peer in self.names:
+            if peer not in self.memory.known:
+                self._remember(peer, storage)
             self.connected_to.add(peer)
             self.met.add(peer)
             self.turned_away.pop(peer, None)
             self.told("connected", f"{called(peer)} is connected")
             self.acts.repeat()
             self.something_new()
+
+    def _remember(self, peer: str, storage: str) -> None:
+        was_unmet = self.is_unmet
+        self.memory = Memory(self.memory.storage, {**self.memory.known, peer: storage})
+        self.acts.remember(HOSTS, Keep(f"{_OF}{peer}", storage))
+        if was_unmet and not self.is_unmet:
+            self.begin()
 
     def lost(self, peer: str) -> None:
         """A peer can no longer be reached."""
@@ -161,7 +199,16 @@ class Peers:
 
     def refused(self, peer: str, problem: Diagnostic) -> None:
         """A host was refused."""
-        said = self.turned_away[peer] = f"{called(peer)} is refused: {problem.message}; {problem.hint}"
+        self._turn_away(peer, f"{called(peer)} is refused", problem)
+
+    def disowned(self, peer: str, problem: Diagnostic) -> None:
+        """A host knows a machine here by another storage: if nobody was met before, this host knows nothing of it."""
+        self._turn_away(peer, f"{called(peer)} refuses this host", problem)
+        if not self.met:
+            self.end(InputError([problem]))
+
+    def _turn_away(self, peer: str, what: str, problem: Diagnostic) -> None:
+        said = self.turned_away[peer] = f"{what}: {problem.message}; {problem.hint}"
         self.told("refused", said)
 
     # Time

@@ -25,7 +25,7 @@ async def step(run: Host) -> str | None:
     before = dict(run.recorder.firings)
     names = [*run.coordinators, *run.controllers]
     for name in names[run.turn :] + names[: run.turn]:
-        if not run.paused or run.stopping or run.is_over:
+        if not run.paused or run.stopping or run.is_over or run.peers.is_unmet:
             return None
         if name in run.controllers:
             run.acts.fire(name)

@@ -131,6 +131,41 @@ def test_a_host_with_another_bundle_is_refused_by_name(bundle: str, tmp_path: Pa
             process.communicate()
 
 
+def test_a_host_that_is_started_again_without_its_journal_is_refused_with_one_clear_error(
+    bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    at = f"tcp/127.0.0.1:{free_port()}"
+    run = [sys.executable, "-m", "firable.cli", "run", bundle, "--dry-run", "0.05"]
+    robot = [*run, "--controller", "robot", "--controller", "conveyor", "--join", at]
+    with_journal = [*robot, "--journal", str(tmp_path / "robot.journal"), "--trace", str(tmp_path / "robot.trace")]
+    system = [*run, "--controller", "system", "--controller", "mc", "--listen", at]
+    system += ["--journal", str(tmp_path / "system.journal"), "--trace", str(tmp_path / "system.trace")]
+    processes = [subprocess.Popen(one, stderr=subprocess.DEVNULL) for one in (system, with_journal)]
+
+    def rounds() -> int:
+        return (tmp_path / "system.trace").read_text().count('"round"')
+
+    try:
+        until(lambda: (tmp_path / "system.trace").exists() and rounds() > 5, "rounds")
+        processes[1].kill()
+        processes[1].wait()
+        mistyped = ["--journal", str(tmp_path / "rbot.journal")]
+        refused = subprocess.run([*robot, *mistyped], capture_output=True, text=True, timeout=PATIENCE_SECONDS)
+        assert refused.returncode == 2
+        assert "error[F5025]: " in refused.stderr
+        assert "Traceback" not in refused.stderr
+        done = rounds()
+        processes[1] = subprocess.Popen([*with_journal, "--resume"], stderr=subprocess.DEVNULL)
+        until(lambda: rounds() > done + 5, "rounds after the restart")
+    finally:
+        for process in processes:
+            process.send_signal(signal.SIGINT)
+        ended = [process.wait(PATIENCE_SECONDS) for process in processes]
+    assert ended == [0, 0]
+    assert main(["replay", str(tmp_path / "system.trace"), str(tmp_path / "robot.trace"), "--net", bundle]) == 0
+    capsys.readouterr()
+
+
 def test_an_operator_stops_the_machines_of_one_host_although_its_coordinator_never_came(
     bundle: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

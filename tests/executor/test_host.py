@@ -343,6 +343,7 @@ def test_a_command_that_is_decided_when_the_driver_fails_is_asked_after_at_the_r
         host = Host(decomposition, driver, recorder, machines=("a",), link=link, journal=journal)
         ending = asyncio.create_task(host.main())
         await asyncio.sleep(0.05)
+        host.peers.connected("", "of another host")
         host.peers.arrived("", "a", VoteRequest("a", 0, ("hand",), 0, -1))
         await asyncio.sleep(0.05)
         host.peers.arrived("", "a", Decision("a", 0, "hand", 0, -1))

@@ -26,7 +26,7 @@ from firable.cli.view.moment import moment_of
 from firable.decompose.protocol.exploring import explore_protocol
 from firable.decompose.protocol.wrong import WRONG, example
 from firable.executor.journal.sqlite_journal import SqliteJournal
-from firable.executor.links.link import Greeting, objection
+from firable.executor.links.link import Greeting, come_back_without, objection
 from firable.executor.links.zenoh_link import open_to_the_network
 from firable.executor.operating.control import Endpoint, listening
 from firable.nets.catalogue import catalogue_net
@@ -94,6 +94,10 @@ def a_protocol_that_reads_copies_of_gates(_: Path) -> str:
 
 def a_host_with_another_bundle(_: Path) -> str:
     return str(objection(Greeting("0" * 64, ("",)), Greeting("1" * 64, ("robot",))))
+
+
+def a_host_without_its_journal(_: Path) -> str:
+    return str(come_back_without(["robot"]))
 
 
 def an_address_without_tls(_: Path) -> str:
@@ -186,6 +190,14 @@ error[F5020]: 'robot' holds another bundle: 1111111111111111…, and this host 0
         """\
 warning[F5022]: tcp/0.0.0.0:7447 is open to the network: whoever reaches it can take part in the cell
   hint: use tls/ with the certificates of the site, or a network that nobody else is on
+""",
+    ),
+    "F5025": (
+        a_host_without_its_journal,
+        """\
+error[F5025]: 'robot' came back without what was kept there: the journal is another one, or there is none
+  hint: start it with the journal that it had (--journal); where that is lost, bring the cell to its initial marking,\
+ and start all hosts anew, each with a new journal
 """,
     ),
     "F5033": (

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Arrival, Greeting, Link
+from firable.executor.links.link import COORDINATOR, Arrival, Greeting, Link, Memory
 from firable.executor.links.serial_line import MASTER, SerialLink, addresses_on_a_line
 from firable.executor.links.zenoh_link import ZenohLink
 from firable.executor.protocol.messages import Message
@@ -29,6 +29,7 @@ class Heard:
     messages: list[tuple[str, str, Message]] = field(default_factory=list)
     problems: list[Diagnostic] = field(default_factory=list)
     waiters: list[asyncio.Future[None]] = field(default_factory=list)
+    memory: Memory = field(default_factory=lambda: Memory(os.urandom(4).hex()))
 
     def arrived_together(self, messages: Sequence[Arrival]) -> None:
         """The same of several."""
@@ -39,7 +40,8 @@ class Heard:
         self.messages.append((sender, receiver, message))
         self._wake()
 
-    def connected(self, peer: str) -> None:
+    def connected(self, peer: str, storage: str) -> None:
+        self.memory = Memory(self.memory.storage, {peer: storage, **self.memory.known})
         self.told.append(("connected", peer))
         self._wake()
 
@@ -49,6 +51,11 @@ class Heard:
 
     def refused(self, peer: str, problem: Diagnostic) -> None:
         self.told.append(("refused", peer))
+        self.problems.append(problem)
+        self._wake()
+
+    def disowned(self, peer: str, problem: Diagnostic) -> None:
+        self.told.append(("disowned", peer))
         self.problems.append(problem)
         self._wake()
 
@@ -72,9 +79,9 @@ class Heard:
 
 
 @asynccontextmanager
-async def running(link: Link) -> AsyncIterator[Heard]:
-    """A link that runs, and what it tells."""
-    heard = Heard()
+async def running(link: Link, memory: Memory | None = None) -> AsyncIterator[Heard]:
+    """A link that runs, and what it tells; with the memory of a host that was there before, or a new one."""
+    heard = Heard() if memory is None else Heard(memory=memory)
     task = asyncio.create_task(link.run(heard))
     try:
         yield heard

@@ -10,7 +10,7 @@ import pytest
 from support.link_rigs import PATIENCE_SECONDS, Heard, Rig, in_process, over_a_serial_line, over_zenoh, running
 
 from firable.executor.links.lending import LendingLoop
-from firable.executor.links.link import COORDINATOR, Greeting, Link
+from firable.executor.links.link import COORDINATOR, Greeting, Link, Memory
 from firable.executor.protocol.messages import Acknowledgement, Decision, Message, Readiness, Report, Vote, VoteRequest
 
 Make = Callable[[], AbstractAsyncContextManager[Rig]]
@@ -127,13 +127,58 @@ class TestLink:
             async with make() as rig:
                 here = rig.link(CENTRE)
                 async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre:
+                    memory = Memory("r1")
                     for _ in range(2):
                         there = rig.link(ROBOT)
-                        async with running(there) as robot:
+                        async with running(there, memory) as robot:
                             await robot.until_told(("connected", COORDINATOR))
                             await centre.until(lambda: centre.told[-1:] == [("connected", "robot")])
                             await deliver(here, robot, COORDINATOR, "robot", TO_CONTROLLER)
+                        memory = robot.memory
                     assert [told for told, _ in centre.told][:3] == ["connected", "lost", "connected"]
+
+        run(make, main())
+
+    def test_a_host_that_comes_back_with_another_storage_is_refused_and_told_so(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                here = rig.link(CENTRE)
+                async with asyncio.timeout(PATIENCE_SECONDS), running(here) as centre:
+                    async with running(rig.link(ROBOT), Memory("r1")):
+                        await centre.until_told(("connected", "robot"))
+                    await centre.until_told(("lost", "robot"))
+                    there = rig.link(ROBOT)
+                    async with running(there, Memory("r2")) as robot:
+                        await centre.until_told(("refused", "robot"))
+                        await robot.until_told(("disowned", COORDINATOR))
+                        there.send("robot", COORDINATOR, TO_COORDINATOR[0])
+                        here.send(COORDINATOR, "robot", TO_CONTROLLER[0])
+                        await asyncio.sleep(0.1)
+                        assert not centre.messages
+                        assert not robot.messages
+                        assert ("connected", COORDINATOR) not in robot.told
+                        assert not robot.memory.known
+                    assert [problem.code for problem in centre.problems] == ["F5025"]
+                    assert centre.told.count(("connected", "robot")) == 1
+                    async with running(rig.link(ROBOT), Memory("r1")):
+                        await centre.until(lambda: centre.told.count(("connected", "robot")) == 2)
+
+        run(make, main())
+
+    def test_of_two_machines_of_a_host_one_that_is_known_otherwise_keeps_both_away(self, make: Make) -> None:
+        async def main() -> None:
+            async with make() as rig:
+                both = rig.link(replace(ROBOT, names=("system", "robot")))
+                centre_knows = Memory("c1", {"system": "r1"})
+                async with running(rig.link(CENTRE), centre_knows) as centre, running(both, Memory("r2")) as stranger:
+                    await centre.until_told(("refused", "system"))
+                    await stranger.until_told(("disowned", COORDINATOR))
+                    await asyncio.sleep(0.2)
+                    assert "connected" not in {told for told, _ in stranger.told}
+                    both.send("robot", COORDINATOR, TO_COORDINATOR[0])
+                    await asyncio.sleep(0.1)
+                    assert not centre.messages
+                    assert centre.told.count(("connected", "robot")) == centre.told.count(("lost", "robot"))
 
         run(make, main())
 
@@ -142,12 +187,14 @@ class TestLink:
             async with make() as rig:
                 there = rig.link(ROBOT)
                 async with asyncio.timeout(PATIENCE_SECONDS), running(there) as robot:
+                    memory = Memory("c1")
                     for _ in range(2):
                         here = rig.link(CENTRE)
-                        async with running(here) as centre:
+                        async with running(here, memory) as centre:
                             await robot.until(lambda: robot.told[-1:] == [("connected", COORDINATOR)])
                             await centre.until_told(("connected", "robot"))
                             await deliver(there, centre, "robot", COORDINATOR, TO_COORDINATOR)
+                        memory = centre.memory
                     assert [told for told, _ in robot.told][:3] == ["connected", "lost", "connected"]
 
         run(make, main())

@@ -153,8 +153,11 @@ def test_a_message_with_a_field_that_has_no_one_spelling_is_refused_when_the_pro
         _Form(Odd)
 
 
-SHAPES = {2: "f8449b1cb1bf4c25", 3: "377b67d513818ce9", 4: "b9084ed7cd0575f6"}
-"""What the messages of each version of the protocol look like; one that was in use keeps its line."""
+SHAPES = {2: "f8449b1cb1bf4c25", 3: "377b67d513818ce9", 4: "b9084ed7cd0575f6", 5: "b9084ed7cd0575f6"}
+"""What the messages of each version of the protocol look like; one that was in use keeps its line.
+
+Version 5 differs in how hosts greet.
+"""
 
 
 def test_the_version_of_the_protocol_is_that_of_its_messages() -> None:

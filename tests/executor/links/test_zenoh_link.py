@@ -14,7 +14,7 @@ from support.link_rigs import PATIENCE_SECONDS, Heard, free_port, running
 
 from firable.executor.drivers.bench import until
 from firable.executor.links.encoding import encode
-from firable.executor.links.link import COORDINATOR, PROTOCOL_VERSION, Greeting
+from firable.executor.links.link import COORDINATOR, PROTOCOL_VERSION, Greeting, Memory
 from firable.executor.links.zenoh_link import Certificates, ZenohLink, open_to_the_network
 from firable.executor.protocol.messages import Decision, Readiness, Report
 from firable.nets.diagnostics import InputError, Severity
@@ -64,19 +64,21 @@ def test_of_two_hosts_with_one_name_the_first_is_heard_until_it_ends() -> None:
         here, first, second = ZenohLink(CENTRE, listen=[at]), ZenohLink(ROBOT, join=[at]), ZenohLink(ROBOT, join=[at])
         message = Decision("robot", 1, None, 0, 0)
         async with running(here) as centre, AsyncExitStack() as until_it_ends:
-            one = await until_it_ends.enter_async_context(running(first))
+            one = await until_it_ends.enter_async_context(running(first, Memory("r1")))
             await centre.until_told(("connected", "robot"))
-            async with asyncio.timeout(PATIENCE_SECONDS), running(second) as two:
+            async with asyncio.timeout(PATIENCE_SECONDS), running(second, Memory("r1")) as two:
                 await centre.until_told(("refused", "robot"))
                 assert [problem.code for problem in centre.problems] == ["F5020"]
                 assert "two hosts" in centre.problems[0].message
-                await two.until_told(("connected", COORDINATOR))
+                await two.until_told(("refused", COORDINATOR))
+                assert "'robot' is run by two hosts" in {problem.message for problem in two.problems}
                 while not one.messages:
                     second.send("robot", COORDINATOR, Report("robot", Readiness(0, frozenset())))
                     here.send(COORDINATOR, "robot", message)
                     await asyncio.sleep(0.02)
                 assert not two.messages
                 assert not centre.messages
+                assert ("connected", COORDINATOR) not in two.told
                 await until_it_ends.aclose()
                 await centre.until(lambda: centre.told.count(("connected", "robot")) == 2)
                 while not two.messages:

@@ -1,0 +1,196 @@
+"""Hosts remember each other's journals: one that comes back without its own is refused, and moves nothing."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from support.hosts import ONE_EACH, Cell
+
+from firable.decompose import split
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.journal.sqlite_journal import SqliteJournal
+from firable.executor.links.in_process import Exchange, InProcessLink
+from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.operating.host import Host
+from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.situation import Situation, State
+from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.net import Place
+from firable.nets.text import parse_net
+
+CENTRE, ROBOT, CONVEYOR = (COORDINATOR,), ("robot",), ("conveyor",)
+SPLIT = split(
+    parse_net("""\
+firable: 1
+cell: cell
+controllers:
+  a: {start: free, places: {free: , lamp: {send: {machine: A, command: OPEN}}, over: }}
+  b: {start: idle, places: {idle: , has: }}
+transitions:
+  alone: {from: a.free, to: a.lamp}
+  hand: {from: [a.lamp, b.idle], to: [a.over, b.has]}
+""")
+)
+
+
+class Counting(DryRunDriver):
+    """Machines that count what they are given."""
+
+    sent = 0
+
+    def send(self, place: Place, entry: int) -> None:
+        super().send(place, entry)
+        self.sent += 1
+
+
+class Hosts:
+    """The host of a, which fires a transition alone, and that of b and the coordinator."""
+
+    def __init__(self) -> None:
+        self.exchange = Exchange()
+        self.driver = Counting([SPLIT.subnet("a")], 1.0)
+
+    def host(self, machines: tuple[str, ...], journal: Journal) -> Host:
+        """A host that is not started yet."""
+        link = InProcessLink(self.exchange, Greeting("d", machines))
+        driver = self.driver if machines == ("a",) else DryRunDriver([SPLIT.subnet("b")], 1.0)
+        recorder = Recorder(SPLIT.net, "", None, None, machines)
+        return Host(SPLIT, driver, recorder, machines=machines, link=link, journal=journal)
+
+
+async def refusal(task: asyncio.Task[Situation]) -> Diagnostic:
+    """With what a run ends, in time, that is refused."""
+    await asyncio.wait([task], timeout=30)
+    assert task.done()
+    with pytest.raises(InputError) as refused:
+        await task
+    (problem,) = refused.value.diagnostics
+    return problem
+
+
+@pytest.mark.parametrize("lost", ONE_EACH, ids=lambda machines: machines[0] or "coordinator")
+@pytest.mark.parametrize("after_seconds", [0.5, 2.5, 7.9])
+def test_a_host_without_its_journal_ends_and_the_others_go_on_when_it_has_it_again(
+    lost: tuple[str, ...], after_seconds: float, tmp_path: Path
+) -> None:
+    async def main() -> None:
+        cell = Cell(tmp_path)
+        await asyncio.sleep(after_seconds)
+        await cell.kill(lost)
+        trace, kept = cell.path(lost).read_bytes(), cell.journals[lost]
+        cell.journals[lost] = MemoryJournal()
+        cell.start(lost)
+        problem = await refusal(cell.tasks[lost])
+        assert problem.code == "F5025"
+        assert "has worked with another journal of" in problem.message
+        assert not sum(cell.hosts[lost].recorder.firings.values())
+        assert any("came back without what was kept there" in sentence for kind, sentence in cell.told)
+        cell.path(lost).write_bytes(trace)
+        cell.journals[lost] = kept
+        before = cell.firings()
+        cell.start(lost, resume=True)
+        await asyncio.sleep(30)
+        await cell.stop()
+        assert cell.replayed().firings == cell.firings() > before + 10
+
+    run_in_virtual_time(main())
+
+
+def test_a_host_that_begins_anew_moves_nothing_before_it_has_met_another() -> None:
+    async def main() -> None:
+        hosts = Hosts()
+        run = hosts.host(("a",), journal := MemoryJournal())
+        ending = asyncio.create_task(run.main())
+        await asyncio.sleep(10)
+        assert hosts.driver.sent == 0
+        assert run.marking == ("a.free",)
+        assert "nothing moves here before another host of the cell has been met" in run.situation().message
+        run.pause()
+        assert await run.step() is None
+        assert run.resume()
+        await asyncio.sleep(1)
+        assert hosts.driver.sent == 0
+        other = asyncio.create_task(hosts.host(("b", COORDINATOR), MemoryJournal()).main())
+        await asyncio.sleep(10)
+        assert hosts.driver.sent == 1
+        assert run.marking == ("a.over",)
+        assert "nothing moves" not in run.situation().message
+        run.stop()
+        assert (await ending).state is State.STOPPED
+        # It knows them now, and needs nobody to go on with what it does alone.
+        other.cancel()
+        await other
+        assert not hosts.host(("a",), journal).peers.is_unmet
+
+    run_in_virtual_time(main())
+
+
+def test_a_pause_outlasts_the_first_meeting() -> None:
+    async def main() -> None:
+        hosts = Hosts()
+        run = hosts.host(("a",), MemoryJournal())
+        tasks = [asyncio.create_task(run.main())]
+        await asyncio.sleep(1)
+        run.pause()
+        tasks.append(asyncio.create_task(hosts.host(("b", COORDINATOR), MemoryJournal()).main()))
+        await asyncio.sleep(5)
+        assert (run.marking, hosts.driver.sent) == (("a.free",), 0)
+        assert run.resume()
+        await asyncio.sleep(5)
+        assert run.marking == ("a.over",)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks)
+
+    run_in_virtual_time(main())
+
+
+def test_a_cell_that_was_begun_anew_is_not_ended_by_a_host_of_the_old_one(tmp_path: Path) -> None:
+    """It remembers other journals, and is held after its restart; who is at work is only told."""
+
+    async def main() -> None:
+        old = Cell(tmp_path)
+        await asyncio.sleep(3)
+        await old.stop()
+        folder = tmp_path / "anew"
+        folder.mkdir()
+        cell = Cell(folder, (CENTRE, ("system",), ("mc",), CONVEYOR))
+        await asyncio.sleep(3)
+        cell.journals[ROBOT] = old.journals[ROBOT]
+        old.path(ROBOT).rename(cell.path(ROBOT))
+        cell.start(ROBOT)
+        await asyncio.sleep(3)
+        assert not any(cell.tasks[machines].done() for machines in (CENTRE, ("system",), ("mc",), CONVEYOR))
+        refused = [sentence for kind, sentence in cell.told if kind == "refused"]
+        assert any("the coordinator came back without what was kept there" in sentence for sentence in refused)
+        ours = "'robot' refuses this host: 'robot' has worked with another journal of the coordinator than this"
+        assert any(ours in sentence for sentence in refused)
+        assert cell.hosts[ROBOT].situation().state is State.HELD
+        for task in cell.tasks.values():
+            task.cancel()
+        await asyncio.gather(*cell.tasks.values())
+
+    run_in_virtual_time(main())
+
+
+def test_what_a_host_remembers_outlives_it_in_its_journal(tmp_path: Path) -> None:
+    async def main() -> None:
+        hosts = Hosts()
+        journal = SqliteJournal(tmp_path / "a.journal", "d", ("a",))
+        run = hosts.host(("a",), journal)
+        other = hosts.host(("b", COORDINATOR), MemoryJournal())
+        tasks = [asyncio.create_task(each.main()) for each in (run, other)]
+        await asyncio.sleep(5)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks)
+        journal.close()
+        again = SqliteJournal(tmp_path / "a.journal", "d", ("a",))
+        memory = hosts.host(("a",), again).peers.memory
+        assert memory == run.peers.memory
+        assert memory.known == dict.fromkeys(("b", COORDINATOR), other.peers.memory.storage)
+        again.close()
+
+    asyncio.run(main())
