@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import click
@@ -12,6 +14,8 @@ from firable.cli.options import analysis_options, budget, refuse_a_net
 
 if TYPE_CHECKING:
     from firable.analysis.spaces.reachability import Budget
+    from firable.executor.journal.takeover import Takeover
+    from firable.executor.protocol.messages import Stored
     from firable.nets.net import Net
     from firable.nets.verdict import Verdict
 
@@ -21,55 +25,108 @@ _ASKED = "taken-over"
 @click.command(short_help="Let a new bundle go on where an old one has stopped.")
 @click.argument("old", metavar="OLD")
 @click.argument("new", metavar="NEW")
-@click.option("--journal", metavar="FILE", required=True, help="The journal of the run of OLD, which has stopped.")
-@click.option("--into", metavar="FILE", required=True, help="Where to write the journal for the run of NEW.")
+@click.option(
+    "--journal",
+    "journals",
+    metavar="FILE",
+    multiple=True,
+    required=True,
+    help="The journal of the run of OLD, which has stopped; of each of its hosts, where there are several.",
+)
+@click.option(
+    "--into",
+    metavar="FILE",
+    multiple=True,
+    required=True,
+    help="Where to write the journal for the run of NEW: one for each --journal, in their order.",
+)
 @analysis_options
 def takeover(
-    old: str, new: str, journal: str, into: str, max_markings: int, max_memory: int, max_seconds: float | None
+    old: str,
+    new: str,
+    journals: tuple[str, ...],
+    into: tuple[str, ...],
+    max_markings: int,
+    max_memory: int,
+    max_seconds: float | None,
 ) -> int:
     """Take the marking of a stopped cell over from bundle OLD to bundle NEW, by the names of its places.
 
     It is done only in a marking that NEW can reach, because NEW was proved for those alone; with no vote open, and with
-    the same command in every place that has a token. The journal of OLD is left as it is. `firable run NEW --journal`
-    then goes on: held, until the machines are asked where they are and the operator resumes.
+    the same command in every place that has a token. The journals of OLD are left as they are. `firable run NEW
+    --journal` then goes on: held, until the machines are asked where they are and the operator resumes.
     """
-    from firable.executor.journal.journal import sync_now
-    from firable.executor.journal.sqlite_journal import SqliteJournal
-    from firable.executor.journal.takeover import take_over
+    from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of
+    from firable.executor.journal.takeover import dealt_out, take_over
     from firable.executor.operating.running import load
     from firable.executor.protocol.deciders import coordinators
-    from firable.executor.protocol.messages import Keep
     from firable.nets.bundle import read_bundle
+    from firable.nets.writing import write_whole
 
+    if len(into) != len(journals):
+        raise click.UsageError("name a file --into for each --journal")
     for bundle in (old, new):
         refuse_a_net(bundle, "a cell is taken over from bundle to bundle")
     before, after = read_bundle(old), load(new)
-    _refuse_missing(journal)
+    for file in journals:
+        _refuse_missing(file)
     _refuse_standing(into)
-    machines = [*coordinators(before.decomposition), *(subnet.name for subnet in before.decomposition.subnets)]
-    read = SqliteJournal(journal, before.digest, machines)
-    try:
-        kept = {machine: dict(read.kept(machine)) for machine in machines}
-    finally:
-        read.close()
-    moved = take_over(before.decomposition, after.decomposition, kept, coordinators(after.decomposition))
+    deciding = coordinators(after.decomposition)
+    machines = {file: machines_of(file) for file in journals}
+    kept: dict[str, dict[str, Stored]] = {}
+    for file, names in machines.items():
+        with closing(SqliteJournal(file, before.digest, names)) as read:
+            kept |= {name: dict(read.kept(name)) for name in names}
+    dealt = dealt_out(
+        machines,
+        [*coordinators(before.decomposition), *(subnet.name for subnet in before.decomposition.subnets)],
+        [*deciding, *(subnet.name for subnet in after.decomposition.subnets)],
+    )
+    moved = take_over(before.decomposition, after.decomposition, kept, deciding)
     _demand_reachable(after.net, moved.marking, budget(max_markings, max_memory, max_seconds))
-    names = [*coordinators(after.decomposition), *(subnet.name for subnet in after.decomposition.subnets)]
-    written = SqliteJournal(into, after.digest, names)
-    try:
-        for machine, of in moved.kept.items():
-            written.write(machine, [Keep(key, value) for key, value in of.items()])
-        sync_now(written)
-    finally:
-        written.close()
-    if Path(f"{journal}.cell").is_file():  # the simulated cell that the journal is of, if it is one
-        shutil.copyfile(f"{journal}.cell", f"{into}.cell")
-    click.echo(f"{into}: '{after.net.name}' goes on with tokens on {', '.join(moved.marking)}")
+    targets = dict(zip(journals, into, strict=True))
+    if len(journals) == 1 and Path(f"{journals[0]}.cell").is_file():  # the simulated cell, if the journal is of one
+        write_whole(f"{into[0]}.cell", Path(f"{journals[0]}.cell").read_bytes())
+    _write({targets[file]: names for file, names in dealt.items() if names}, after.digest, moved)
+    click.echo(f"{', '.join(into)}: '{after.net.name}' goes on with tokens on {', '.join(moved.marking)}")
     if moved.under_way:
         click.echo(f"  under way, and asked after at the start: the commands of {', '.join(moved.under_way)}")
     click.echo("  begun anew: whose turn it is where arbiters alternate; what sensors show is read at the start")
-    click.echo(f"  next: firable run {new} --journal {into}, with the plant or binding of the cell")
+    for file, names in dealt.items():
+        if names:
+            host = "".join(f" --controller {name}" for name in names if name not in deciding) if len(dealt) > 1 else ""
+            with_what = "its links, and the binding" if len(dealt) > 1 else "the plant or binding"
+            click.echo(f"  next: firable run {new}{host} --journal {targets[file]}, with {with_what} of the cell")
+        else:
+            click.echo(f"  {targets[file]} is not written: '{after.net.name}' has none of the machines of that host")
     return 0
+
+
+def _write(journals: Mapping[str, Sequence[str]], digest: str, moved: Takeover) -> None:
+    """Write the journals, with their machines: aside first, so that none is there that is not whole."""
+    from firable.executor.journal.journal import sync_now
+    from firable.executor.journal.memory import HOSTS, keeping, new_storage
+    from firable.executor.journal.sqlite_journal import SqliteJournal, witness_of
+    from firable.executor.links.link import Memory
+    from firable.executor.protocol.messages import Keep
+    from firable.nets.writing import write_whole
+
+    storages = {file: new_storage() for file in journals}
+    of = {name: storages[file] for file, names in journals.items() for name in names}
+    with TemporaryDirectory() as aside:
+        whole: dict[str, bytes] = {}
+        for number, (file, names) in enumerate(journals.items()):
+            written = Path(aside, str(number))
+            others = Memory(storages[file], {name: storage for name, storage in of.items() if name not in names})
+            with closing(SqliteJournal(written, digest, names)) as journal:
+                for name in names:
+                    journal.write(name, [Keep(key, value) for key, value in moved.kept[name].items()])
+                if others.known:
+                    journal.write(HOSTS, keeping(others))
+                sync_now(journal)
+            whole[str(witness_of(file))], whole[file] = witness_of(written).read_bytes(), written.read_bytes()
+        for file, data in whole.items():  # a witness without its journal is refused, and nothing begins anew
+            write_whole(file, data)
 
 
 def _demand_reachable(net: Net, marking: tuple[str, ...], allowed: Budget) -> None:
@@ -111,10 +168,14 @@ def _refuse_missing(journal: str) -> None:
         raise InputError([Diagnostic("F1001", message, "name the file that `firable run OLD --journal` wrote")])
 
 
-def _refuse_standing(into: str) -> None:
+def _refuse_standing(into: Sequence[str]) -> None:
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable
 
-    if Path(into).exists():
-        message = f"{printable(into)}: a file stands there, and may be the journal of a cell"
+    for file in into:
+        message = f"{printable(file)}: a file stands there, and may be the journal of a cell"
+        if into.count(file) > 1:
+            message = f"{printable(file)}: two journals would be written there"
+        elif not Path(file).exists():
+            continue
         raise InputError([Diagnostic("F1017", message, "name another file")])

@@ -24,7 +24,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, NoReturn
@@ -56,7 +56,7 @@ class SqliteJournal:
     def __init__(self, path: Path | str, digest: str, machines: Iterable[str]) -> None:
         self.path = Path(path)
         self.machines = tuple(sorted(machines))
-        self.witness = self.path.with_name(self.path.name + ".generation")
+        self.witness = witness_of(self.path)
         self.rows: dict[_Row, Stored] = {}
         self.changed: dict[_Row, None] = {}
         """The rows written since the last sync, in any number of acts."""
@@ -65,11 +65,11 @@ class SqliteJournal:
         self.total = 0
         self.generation = 0
         self.failed: InputError | None = None
-        with self._failures("opened"):
+        with _failures(self.path, "opened"):
             # One thread at a time uses it, and not always the same.
             self.connection = sqlite3.connect(self.path, timeout=0, isolation_level=None, check_same_thread=False)
         try:
-            with self._failures("opened"):
+            with _failures(self.path, "opened"):
                 self._open(digest)
         except BaseException:
             self.connection.close()
@@ -116,7 +116,7 @@ class SqliteJournal:
         self, written: list[tuple[str, str, str, int]], deleted: list[_Row], generation: int, total: int
     ) -> None:
         try:
-            with self._failures("written"):
+            with _failures(self.path, "written"):
                 run = self.connection.execute
                 run("begin immediate")
                 self.connection.executemany("insert or replace into kept values (?, ?, ?, ?)", written)
@@ -159,31 +159,34 @@ class SqliteJournal:
         run = self.connection.execute
         problems = [str(problem) for (problem,) in run("pragma integrity_check") if problem != "ok"]
         if problems:
-            self._damaged(problems[0])
+            _damaged(self.path, problems[0])
         if not run("select count(*) from sqlite_master").fetchone()[0]:
-            self._damaged(f"it is gone or empty, and {printable(self.witness.name)} beside it tells of one")
+            _damaged(self.path, f"it is gone or empty, and {printable(self.witness.name)} beside it tells of one")
         headers = run("select format, digest, machines, generation, total from header").fetchall()
         if len(headers) != 1 or not isinstance(headers[0][3], int):
-            self._damaged("its header is missing")
+            _damaged(self.path, "its header is missing")
         its_format, its_digest, machines, self.generation, total = headers[0]
         if (its_format, its_digest, machines) != (FORMAT, digest, json.dumps(self.machines)):
             self._foreign(its_format, its_digest, str(machines), digest)
         for machine, key, value, check in run("select machine, key, value, checked from kept"):
             is_text = isinstance(machine, str) and isinstance(key, str) and isinstance(value, str)
             if not is_text or check != _check(machine, key, value):
-                self._damaged(f"what '{printable(str(machine))}' kept under '{printable(str(key))}' has changed")
+                _damaged(self.path, f"what '{printable(str(machine))}' kept under '{printable(str(key))}' has changed")
             self.rows[machine, key] = json.loads(value)
             self.checks[machine, key] = check
         self.total = sum(self.checks.values())
         if self.total != total:
-            self._damaged("rows are missing, or are older than the others")
+            _damaged(self.path, "rows are missing, or are older than the others")
         durable = self._durable()
         if not durable.isdigit():
-            self._damaged(
-                f"{printable(self.witness.name)} beside it is {'no number' if durable else 'missing or empty'}"
+            _damaged(
+                self.path,
+                f"{printable(self.witness.name)} beside it is {'no number' if durable else 'missing or empty'}",
             )
         if int(durable) > self.generation:
-            self._damaged(f"it has lost what was stored: it is at sync {self.generation}, and {int(durable)} were done")
+            _damaged(
+                self.path, f"it has lost what was stored: it is at sync {self.generation}, and {int(durable)} were done"
+            )
 
     def _durable(self) -> str:
         """What the witness says; before the first sync it need not be there, or be written."""
@@ -192,15 +195,6 @@ class SqliteJournal:
 
     def _bear_witness(self, generation: int) -> None:
         os.pwrite(self.witness_descriptor, f"{generation:020}\n".encode(), 0)
-
-    def _damaged(self, what: str) -> NoReturn:
-        message = f"{printable(str(self.path))}: the journal is damaged: {what}"
-        name = printable(self.path.name)
-        hint = (
-            "what the cell did last is not known from it: look at the machines and bring the cell to its initial "
-            f"marking, then move {name}, {name}.generation and {name}.cell away (those there are), and start anew"
-        )
-        raise InputError([Diagnostic("F5032", message, hint)])
 
     def _foreign(self, its_format: Any, its_digest: Any, machines: str, digest: str) -> NoReturn:
         path = printable(str(self.path))
@@ -213,27 +207,57 @@ class SqliteJournal:
         hint = "name another folder, or run the bundle that the journal belongs to"
         raise InputError([Diagnostic("F5031", message, hint)])
 
-    @contextmanager
-    def _failures(self, done: str) -> Iterator[None]:
-        path = printable(str(self.path))
-        try:
-            yield
-        except (sqlite3.Error, OSError, ValueError) as error:  # ValueError: a path with a NUL in it, a row that is none
-            name = getattr(error, "sqlite_errorname", "")
-            if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
-                message = f"{path}: the journal is in use by another process"
-                hint = "one process at a time runs these machines: stop that one first, or name another folder"
-                raise InputError([Diagnostic("F5033", message, hint)]) from None
-            if name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB", "SQLITE_ERROR")) or not (
-                name or isinstance(error, OSError)
-            ):
-                self._damaged(str(error))
-            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-            if name.startswith("SQLITE_CANTOPEN"):
-                reason = _why_not_opened(self.path) or reason
-            message = f"{path}: the journal cannot be {done}: {reason}"
-            hint = "name a folder on a disk with room, that you may write to"
-            raise InputError([Diagnostic("F5034", message, hint)]) from None
+
+def witness_of(path: Path | str) -> Path:
+    """The file beside a journal that tells of its last sync."""
+    return Path(path).with_name(Path(path).name + ".generation")
+
+
+def machines_of(path: Path | str) -> tuple[str, ...]:
+    """The machines that a journal is of, as its header names them; nothing else of it is looked at.
+
+    Raises `InputError` F5032 where it is damaged, F5033 where it is in use, F5034 where it cannot be read.
+    """
+    path = Path(path)
+    with _failures(path, "read"), closing(sqlite3.connect(path, timeout=0)) as connection:
+        headers = connection.execute("select machines from header").fetchall()
+        names = json.loads(headers[0][0]) if len(headers) == 1 and isinstance(headers[0][0], str) else None
+        if not isinstance(names, list):
+            _damaged(path, "its header is missing")
+    return tuple(map(str, names))
+
+
+def _damaged(path: Path, what: str) -> NoReturn:
+    message = f"{printable(str(path))}: the journal is damaged: {what}"
+    name = printable(path.name)
+    hint = (
+        "what the cell did last is not known from it: look at the machines and bring the cell to its initial "
+        f"marking, then move {name}, {name}.generation and {name}.cell away (those there are), and start anew"
+    )
+    raise InputError([Diagnostic("F5032", message, hint)])
+
+
+@contextmanager
+def _failures(path: Path, done: str) -> Iterator[None]:
+    shown = printable(str(path))
+    try:
+        yield
+    except (sqlite3.Error, OSError, ValueError) as error:  # ValueError: a path with a NUL in it, a row that is none
+        name = getattr(error, "sqlite_errorname", "")
+        if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
+            message = f"{shown}: the journal is in use by another process"
+            hint = "one process at a time runs these machines: stop that one first, or name another folder"
+            raise InputError([Diagnostic("F5033", message, hint)]) from None
+        if name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB", "SQLITE_ERROR")) or not (
+            name or isinstance(error, OSError)
+        ):
+            _damaged(path, str(error))
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        if name.startswith("SQLITE_CANTOPEN"):
+            reason = _why_not_opened(path) or reason
+        message = f"{shown}: the journal cannot be {done}: {reason}"
+        hint = "name a folder on a disk with room, that you may write to"
+        raise InputError([Diagnostic("F5034", message, hint)]) from None
 
 
 def _check(machine: str, key: str, value: str) -> int:

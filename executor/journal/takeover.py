@@ -17,6 +17,10 @@ It is refused unless
 The old net allows its own marking, since its run has led there. After a takeover every controller is held, as after any
 restart: machines are asked where they are, sensors are read anew, and nothing moves until the operator says so.
 
+Where the cell runs on several hosts each has a journal of its own. All of them are taken over together, so that the
+marking is joint, and each machine stays on its host. The new journals know each other (`memory.py`): a host that is
+started without its own is refused from the beginning.
+
 Rejected: a map from old to new markings in a file. It would be one more thing to prove, and a name that changes can be
 changed in a release of its own, while the cell is empty.
 """
@@ -26,6 +30,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from firable.executor.links.link import called
 from firable.executor.protocol.commands import PREFIX, Stage
 from firable.executor.protocol.deciders import closed_key
 from firable.executor.protocol.messages import EPOCH_BITS, Stored
@@ -35,6 +40,7 @@ from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.formula import And, Holds, Not
 from firable.nets.net import Net
+from firable.nets.source import printable
 
 Kept = Mapping[str, Stored]
 """What the journal of one machine keeps."""
@@ -67,6 +73,36 @@ def take_over(
     if problems := list(moving.problems()):
         raise InputError(problems)
     return Takeover(moving.taken_over(coordinators), moving.marking, tuple(moving.commands))
+
+
+def dealt_out(
+    journals: Mapping[str, tuple[str, ...]], old: Iterable[str], new: Iterable[str]
+) -> dict[str, tuple[str, ...]]:
+    """For each journal of the old cell, with its machines, the machines of the new cell that go on from it.
+
+    A machine stays where it is; what only the new cell has goes to the journal of the whole cell, if there is one.
+    Raises `InputError` F5050 where a machine of the old cell is in no journal or in two, or one of the new has no host.
+    """
+    problems, names = [], tuple(new)
+    for name in old:
+        holding = [journal for journal, machines in journals.items() if name in machines]
+        if not holding:
+            hint = "name the journals of all hosts: a marking is taken over whole"
+            problems.append(_against(f"none of the journals is of {called(name)}", hint))
+        elif len(holding) > 1:
+            hint = "name one journal for each host, that of its last run"
+            shown = " and ".join(map(printable, holding))
+            problems.append(_against(f"{called(name)} is in {len(holding)} journals: {shown}", hint))
+    if len(journals) == 1 and not problems:
+        return dict.fromkeys(journals, names)
+    of = {name: journal for journal, machines in journals.items() for name in machines}
+    for name in names:
+        if name not in of:
+            hint = "keep the controllers while the cell runs on several hosts; others can be added while it is empty"
+            problems.append(_against(f"no host runs {called(name)}, which only the new net has", hint))
+    if problems:
+        raise InputError(problems)
+    return {journal: tuple(name for name in names if of[name] == journal) for journal in journals}
 
 
 def formula_of(net: Net, marking: Iterable[str]) -> And:

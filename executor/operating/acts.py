@@ -302,9 +302,9 @@ class Acts:
             delay = self.clock.loop_delay_seconds(due)
             self.ticks[machine] = self.clock.loop.call_later(delay, self.hear, machine, None)
 
-    def remember(self, key: str, keep: Keep) -> None:
+    def remember(self, whose: str, keeps: Collection[Keep]) -> None:
         """Have the journal keep something that is no machine's, with the next sync."""
-        self.journal.write(key, [keep])
+        self.journal.write(whose, keeps)
         self.unsynced = True
 
     # What comes of it

@@ -21,15 +21,15 @@ Where all machines are on one host there are no others, and this does nothing.
 from __future__ import annotations
 
 import asyncio
-import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
+from firable.executor.journal.memory import HOSTS, keeping, remembered
 from firable.executor.links.link import Arrival, Link, Memory, called
 from firable.executor.operating.acts import Acts
 from firable.executor.operating.waits import reached, waits
 from firable.executor.protocol.deciders import coordinators
-from firable.executor.protocol.messages import Keep, Message, ToController
+from firable.executor.protocol.messages import Message, ToController
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import Diagnostic, InputError
 
@@ -37,10 +37,6 @@ REPEAT_SECONDS: Final = 0.2
 REPEAT_SECONDS_MAX: Final = 3.2
 MEET_SECONDS: Final = 3.0
 """A peer that has not been met by then is told."""
-HOSTS: Final = "\nhosts"
-"""The name under which the journal keeps the memory of other hosts; no machine has it."""
-_STORAGE: Final = "storage"
-_OF: Final = "of/"
 
 
 class Peers:
@@ -76,13 +72,9 @@ class Peers:
         }
         self.needed = tuple(sorted((deciding | voting) - here))
         """Those that some machine here talks to."""
-        kept = acts.journal.kept(HOSTS)
-        self.memory = Memory(
-            str(kept.get(_STORAGE) or os.urandom(4).hex()),
-            {key.removeprefix(_OF): str(storage) for key, storage in kept.items() if key.startswith(_OF)},
-        )
-        if link is not None and _STORAGE not in kept:
-            acts.remember(HOSTS, Keep(_STORAGE, self.memory.storage))
+        self.memory = remembered(acts.journal.kept(HOSTS))
+        if link is not None:
+            acts.remember(HOSTS, keeping(self.memory))
         self.connected_to: set[str] = set()
         self.met: set[str] = set()
         self.turned_away: dict[str, str] = {}
@@ -186,7 +178,7 @@ class Peers:
     def _remember(self, peer: str, storage: str) -> None:
         was_unmet = self.is_unmet
         self.memory = Memory(self.memory.storage, {**self.memory.known, peer: storage})
-        self.acts.remember(HOSTS, Keep(f"{_OF}{peer}", storage))
+        self.acts.remember(HOSTS, keeping(self.memory))
         if was_unmet and not self.is_unmet:
             self.begin()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,10 @@ import pytest
 from firable.cli.main import main
 from firable.decompose.splitting.cut import split
 from firable.executor.journal.journal import sync_now
+from firable.executor.journal.memory import HOSTS, remembered
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.journal.takeover import take_over
-from firable.executor.links.link import COORDINATOR
+from firable.executor.links.link import COORDINATOR, Memory
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
 from firable.executor.protocol.messages import EPOCH_BITS, Keep, Stored, VoteRequest
@@ -21,6 +23,7 @@ from firable.nets.catalogue import catalogue_path
 from firable.nets.decomposition import Decomposition
 from firable.nets.diagnostics import InputError
 from firable.nets.text import parse_net
+from firable.nets.writing import write_whole
 
 OLD = """\
 firable: 1
@@ -169,9 +172,11 @@ def bundles(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return bundle(folder, "old", OLD), bundle(folder, "new", WITH_INSPECTION)
 
 
-def journal(path: Path, of: Path, marking: set[str]) -> Path:
+def journal(path: Path, of: Path, marking: set[str], machines: tuple[str, ...] = ()) -> Path:
+    """The journal of a whole cell, or of the host of some of its machines."""
     read = read_bundle(of)
     kept = kept_in(marking, read.decomposition)
+    kept = {machine: records for machine, records in kept.items() if not machines or machine in machines}
     written = SqliteJournal(path, read.digest, kept)
     for machine, records in kept.items():
         written.write(machine, [Keep(key, value) for key, value in records.items()])
@@ -243,3 +248,105 @@ def test_a_run_on_the_simulated_cell_goes_on_under_the_new_bundle(
     Path(f"{after}.cell").unlink()
     assert main(["run", str(new), *plant, "--journal", after]) == 2
     assert "empty or gone" in capsys.readouterr().err
+
+
+HOSTS_OF_OLD = {"system": (COORDINATOR, "line"), "robot": ("robot",), "table": ("table",)}
+
+
+def hosts(bundles: tuple[Path, Path], folder: Path, *without: str) -> list[str]:
+    """The options of a takeover on several hosts, at the end of the robot's work."""
+    options = []
+    for name, machines in HOSTS_OF_OLD.items():
+        if name not in without:
+            at = journal(folder / f"{name}.old", bundles[0], {"robot.worked_out", "table.full"}, machines)
+            options += ["--journal", str(at), "--into", str(folder / f"{name}.new")]
+    return options
+
+
+def test_a_cell_on_several_hosts_is_taken_over_together_and_its_hosts_know_each_other(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["takeover", *map(str, bundles), *hosts(bundles, tmp_path)]) == 0
+    told = capsys.readouterr().out
+    assert f"  next: firable run {bundles[1]} --controller robot --journal {tmp_path / 'robot.new'}, with" in told
+    read = read_bundle(bundles[1])
+    kept, memories = dict[str, Mapping[str, Stored]](), dict[str, Memory]()
+    for name, machines in HOSTS_OF_OLD.items():
+        with closing(SqliteJournal(tmp_path / f"{name}.new", read.digest, machines)) as opened:
+            kept |= {machine: opened.kept(machine) for machine in machines}
+            memories[name] = remembered(opened.kept(HOSTS))
+    assert joint_marking(read.decomposition, kept) == {"robot.worked_out", "table.full"}
+    storages = {machine: memories[name].storage for name, machines in HOSTS_OF_OLD.items() for machine in machines}
+    assert len(set(storages.values())) == len(HOSTS_OF_OLD)
+    for name, machines in HOSTS_OF_OLD.items():
+        assert memories[name].known == {of: storage for of, storage in storages.items() if of not in machines}
+
+
+def test_a_marking_is_taken_over_whole_from_one_journal_for_each_machine(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    takeover = ["takeover", *map(str, bundles)]
+    assert main([*takeover, *hosts(bundles, tmp_path, "table")]) == 2
+    assert "error[F5050]: none of the journals is of 'table'" in capsys.readouterr().err
+    again = journal(tmp_path / "again.old", bundles[0], {"robot.free"}, ("robot",))
+    twice = ["--journal", str(again), "--into", str(tmp_path / "again.new")]
+    assert main([*takeover, *hosts(bundles, tmp_path), *twice]) == 2
+    assert "error[F5050]: 'robot' is in 2 journals: " in capsys.readouterr().err
+    assert main([*takeover, *hosts(bundles, tmp_path), "--journal", str(again)]) == 2
+    assert "name a file --into for each --journal" in capsys.readouterr().err
+    same = hosts(bundles, tmp_path)
+    same[-1] = same[-5]
+    assert main([*takeover, *same]) == 2
+    assert "two journals would be written there" in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.new*"))
+
+
+def test_a_controller_that_only_the_new_net_has_needs_a_host(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = OLD.replace("transitions:", "  lamp: {start: dark, places: {dark: , lit: }}\ntransitions:")
+    more += "  light: {from: lamp.dark, to: lamp.lit}\n  darken: {from: lamp.lit, to: lamp.dark}\n"
+    new = bundle(tmp_path, "more", more)
+    assert main(["takeover", str(bundles[0]), str(new), *hosts(bundles, tmp_path)]) == 2
+    assert "error[F5050]: no host runs 'lamp', which only the new net has" in capsys.readouterr().err
+
+
+def test_a_host_of_which_the_new_net_has_nothing_has_no_journal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old = bundle(tmp_path, "old", OLD.replace("  table:\n", "  spare: {places: {}}\n  table:\n"))
+    new = bundle(tmp_path, "new", OLD)
+    of_spare = journal(tmp_path / "spare.old", old, set(), ("spare",))
+    options = [*hosts((old, new), tmp_path), "--journal", str(of_spare), "--into", str(tmp_path / "spare.new")]
+    assert main(["takeover", str(old), str(new), *options]) == 0
+    assert "spare.new is not written: 'cell' has none of the machines of that host" in capsys.readouterr().out
+    assert (tmp_path / "robot.new").exists()
+    assert not (tmp_path / "spare.new").exists()
+
+
+def test_a_takeover_that_breaks_off_leaves_no_journal_that_begins_anew(
+    bundles: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written: list[str] = []
+
+    def breaking(path: Path | str, data: bytes | str) -> None:
+        if len(written) == at:
+            raise KeyboardInterrupt
+        written.append(str(path))
+        write_whole(path, data)
+
+    monkeypatch.setattr("firable.nets.writing.write_whole", breaking)
+    for at in range(6):
+        folder = tmp_path / str(at)
+        folder.mkdir()
+        written.clear()
+        assert main(["takeover", *map(str, bundles), *hosts(bundles, folder)]) == 3
+        capsys.readouterr()
+        for name, machines in HOSTS_OF_OLD.items():
+            new = folder / f"{name}.new"
+            if new.exists():
+                with closing(SqliteJournal(new, read_bundle(bundles[1]).digest, machines)) as opened:
+                    assert all(opened.kept(machine) for machine in machines)
+            elif Path(f"{new}.generation").exists():
+                with pytest.raises(InputError, match="F5032"):
+                    SqliteJournal(new, read_bundle(bundles[1]).digest, machines)
