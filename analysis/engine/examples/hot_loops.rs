@@ -1,10 +1,12 @@
 //! The engine's hot loops on nets of a fixed size: what `benchmarks/instructions.py` counts instructions of.
 //!
 //! `hot_loops NET WORK [ROUNDS]`: a net by its name and size (`philosophers 10`, `interlocked 9 60`, the second number
-//! being places that never change), and what is done after exploring it: `explore` (nothing), `two` (nothing, after two
+//! being places that never change) or, as `-`, from standard input in the form of `hash_sets`, and what is done after
+//! exploring it: `explore` (nothing), `two` (nothing, after two
 //! threads have explored it), `bottoms`, `edges`, `backward`, `endless`. Prints markings, edges, and the CPU seconds of the exploration and of the work, best of the
 //! rounds.
 
+use std::io::Read;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -44,6 +46,20 @@ fn interlocked(count: u32, spare: u32) -> Net {
     Net::new((3 * count + spare) as usize, transitions, &initial).expect("well formed")
 }
 
+/// A net in words: the number of places and those with a token; then of each transition its inputs, outputs, permissive and
+/// inhibitive gates.
+fn from_text(text: &str) -> Net {
+    let numbers = |part: &str| part.split_whitespace().map(|n| n.parse().expect("a place")).collect::<Vec<u32>>();
+    let mut lines = text.lines();
+    let first = numbers(lines.next().expect("the number of places"));
+    let transitions = lines.map(|line| {
+        let sets: Vec<Vec<u32>> = line.split(';').map(numbers).collect();
+        let [inputs, outputs, permissive, inhibitive] = sets.as_slice() else { panic!("four sets a transition") };
+        Transition::new(inputs, outputs, permissive, inhibitive, &[])
+    });
+    Net::new(first[0] as usize, transitions.collect(), &first[1..]).expect("well formed")
+}
+
 /// CPU seconds of this process.
 fn cpu_seconds() -> f64 {
     let schedstat = std::fs::read_to_string("/proc/self/schedstat").expect("Linux");
@@ -57,12 +73,17 @@ fn main() {
     let rounds: usize = rounds.first().map_or(1, |rounds| rounds.parse().expect("a number of rounds"));
     let parts: Vec<&str> = name.split(' ').collect();
     let size = |at: usize| parts.get(at).map_or(0, |size| size.parse().expect("a size"));
+    let mut text = String::new();
+    if parts == ["-"] {
+        std::io::stdin().read_to_string(&mut text).expect("a net on standard input");
+    }
     let (mut best, mut best_work) = (f64::MAX, f64::MAX);
     let mut found = (0, 0);
     for _ in 0..rounds {
         let net = match parts[0] {
             "philosophers" => philosophers(size(1)),
             "interlocked" => interlocked(size(1), size(2)),
+            "-" => from_text(&text),
             other => panic!("no net {other}"),
         };
         let limits = Limits { step: false, markings: 1 << 31, memory_bytes: 3 << 30, time: None };
