@@ -11,12 +11,14 @@ import click
 from firable.cli.options import CATALOGUE, catalogue_file, load_net, write_text
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from firable.executor.cell.disturbances import Disturbance
     from firable.executor.cell.plant import Plant
     from firable.executor.drivers.binding import Binding
     from firable.executor.drivers.far_side.cell import CellServer
     from firable.executor.drivers.far_side.end import FarEnd
-    from firable.nets.machines.plant_file import PlantModel
+    from firable.nets.machines.plant_file import Action, Machine, PlantModel
     from firable.nets.net import Net
 
 _PRESSED_SECONDS = 1.0
@@ -85,11 +87,11 @@ def sim(
 
     async def served() -> str:
         with ended_by_signals():
-            binding, ends = await _bound(loaded, protocols, bind, model)
+            binding, ends, write = await _bound(loaded, protocols, bind, model)
             if problems := binding_misfits(binding, loaded):
                 raise InputError(problems)
             cell = Plant(model, workpieces=workpieces, seed=seed, disturbances=disturbances)
-            return await _serve(binding, loaded, cell, ends, speed, press, seconds)
+            return await _serve(binding, loaded, cell, ends, write, speed, press, seconds)
 
     try:
         fault = asyncio.run(served())
@@ -102,14 +104,14 @@ def sim(
 
 async def _bound(
     net: Net, protocols: list[str], bind: str | None, model: PlantModel
-) -> tuple[Binding, dict[str, FarEnd]]:
-    """The binding, made or read, and the ends that it leads to."""
+) -> tuple[Binding, dict[str, FarEnd], Callable[[], None]]:
+    """The binding, made or read, the ends that it leads to, and what writes one that was made, once these are there."""
     from firable.executor.drivers.binding import parse_binding, read_binding
     from firable.executor.drivers.far_side.ends import PORTS, binding_text, ends_of
 
     if not protocols:
         binding = read_binding(str(bind))
-        return binding, ends_of(binding)
+        return binding, ends_of(binding), lambda: None
     path = bind or f"{net.name}.bind.yaml"
     _refuse_what_is_not_ours(path)
     ends: dict[str, FarEnd] = {}
@@ -122,9 +124,12 @@ async def _bound(
         ports["serial"] = line.line.near
     text = binding_text(net, ports, model.sensors)
     binding = parse_binding(text, path)
-    write_text(path, text)
-    click.echo(f"{path}: {', '.join(f'{name} at {port}' for name, port in ports.items())}")
-    return binding, ends | ends_of(binding.without(set(ends)))
+
+    def write() -> None:
+        write_text(path, text)
+        click.echo(f"{path}: {', '.join(f'{name} at {port}' for name, port in ports.items())}")
+
+    return binding, ends | ends_of(binding.without(set(ends))), write
 
 
 def _refuse_what_is_not_ours(path: str) -> None:
@@ -147,6 +152,7 @@ async def _serve(
     net: Net,
     plant: Plant,
     ends: dict[str, FarEnd],
+    write: Callable[[], None],
     speed: float,
     press: float | None,
     seconds: float | None,
@@ -167,6 +173,7 @@ async def _serve(
         except RuntimeError as error:  # a port that is taken, or a broker that is not installed
             hint = "end what else serves there, or name other ports in a binding of your own, with --bind alone"
             raise InputError([Diagnostic("F5104", f"the cell cannot be served: {error}", hint)]) from None
+        write()  # a binding that leads to nothing would be in the place of one that another cell serves
         click.echo(f"serving '{net.name}'; Ctrl-C ends it")
         if press is not None:
             loop = asyncio.get_running_loop()
@@ -179,6 +186,9 @@ async def _serve(
         except asyncio.CancelledError:
             if not cell.fault:
                 raise
+        finally:
+            for line in _missed(plant, None if press is None or press <= cell.now_seconds() else press):
+                click.echo(line)
     finally:
         await cell.stop()
     return cell.fault
@@ -219,13 +229,45 @@ def _disturbances(
         if value not in {"0", "1"} or not (at or "0").replace(".", "", 1).isdecimal():
             raise click.UsageError(f"--stuck {text}: write SIGNAL=0 or SIGNAL=1, and @SECONDS behind it if later")
         found.append(StuckSensor(sensor, value == "1", float(at or 0)))
+    commands = {f"{m}.{c}": (body, action) for m, body in model.machines.items() for c, action in body.commands.items()}
     for kind, texts in ((Drops, drop), (NeverCompletes, hang)):
         for text in texts:
             name, _, occurrence = text.partition("#")
+            if name not in commands or not (occurrence or "1").isdecimal():
+                hint = did_you_mean(name, list(commands))
+                raise click.UsageError(f"the cell has no command '{text}'; {hint}it has {', '.join(commands)}")
+            if int(occurrence or 1) < 1:
+                raise click.UsageError(f"'{text}' never comes: the first time is #1")
+            if kind is Drops and not _may_hold(*commands[name]):
+                holding = [one for one in commands if _may_hold(*commands[one])]
+                named = f"name one of {', '.join(holding)}" if holding else "no command of this cell ends so"
+                raise click.UsageError(f"--drop {text}: nothing is held when '{name}' ends; {named}")
             machine, _, command = name.partition(".")
-            known_commands = [f"{m}.{c}" for m, body in model.machines.items() for c in body.commands]
-            if name not in known_commands or not (occurrence or "1").isdecimal():
-                hint = did_you_mean(name, known_commands)
-                raise click.UsageError(f"the cell has no command '{text}'; {hint}it has {', '.join(known_commands)}")
             found.append(kind(machine, command, int(occurrence or 1)))
     return found
+
+
+def _may_hold(machine: Machine, action: Action) -> bool:
+    """Whether a machine may hold something when a command ends: it can take something up, and does not lay it down."""
+    from firable.nets.machines.plant_file import Carry, Grasp, Put, Stop
+
+    return not isinstance(action, Carry | Put | Stop) and any(
+        isinstance(one, Grasp | Carry) for one in machine.commands.values()
+    )
+
+
+def _missed(plant: Plant, press: float | None) -> Iterator[str]:
+    """What was asked to go wrong and has not come, in sentences; `press` is when the emergency stop would have."""
+    from firable.executor.cell.disturbances import StuckSensor
+
+    came = [disturbance for disturbance, _ in plant.befallen]
+    for one in plant.disturbances.several:
+        if isinstance(one, StuckSensor):
+            if one not in came:
+                yield f"'{one.signal}' was to be stuck at {one.from_seconds:g} s, and the cell has ended before"
+        elif one not in came:
+            given = plant.machines[one.machine].times.get(one.command, 0)
+            often = {0: "never given", 1: "given once"}.get(given, f"given {given} times")
+            yield f"'{one.machine}.{one.command}#{one.occurrence}' has not come: it was {often}"
+    if press is not None:
+        yield f"the emergency stop was to be pressed at {press:g} s, and the cell has ended before"

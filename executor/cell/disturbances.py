@@ -7,8 +7,9 @@ as it is of its seed. Rejected: mishaps that are drawn. A test of what follows f
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeVar
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,33 +40,33 @@ class Drops:
 
 
 Disturbance = NeverCompletes | StuckSensor | Drops
+T = TypeVar("T", NeverCompletes, Drops)
 
 
 class Disturbances:
     """All that is asked for in one cell.
 
     >>> asked = Disturbances([StuckSensor("s", True, 3.0), NeverCompletes("R", "MOVE", 2)])
-    >>> asked.shown("s", 2.9), asked.shown("s", 3.0), list(asked.moments())
-    (None, True, [3.0])
+    >>> asked.shown("s", 2.9), asked.shown("s", 3.0)
+    (None, True)
     >>> asked.hangs("R", "MOVE", 1), asked.hangs("R", "MOVE", 2), asked.drops("R", "MOVE", 2)
-    (False, True, False)
+    (None, NeverCompletes(machine='R', command='MOVE', occurrence=2), None)
     """
 
     def __init__(self, several: Iterable[Disturbance]) -> None:
         self.several = tuple(several)
         self.stuck = [one for one in self.several if isinstance(one, StuckSensor)]
 
-    def moments(self) -> Iterator[float]:
-        """When something goes wrong by itself."""
-        return (one.from_seconds for one in self.stuck)
+    def hangs(self, machine: str, command: str, occurrence: int) -> NeverCompletes | None:
+        """What makes a machine take a command, given to it so often by now, and never end it."""
+        return self._asked(NeverCompletes(machine, command, occurrence))
 
-    def hangs(self, machine: str, command: str, occurrence: int) -> bool:
-        """Whether a machine takes a command, given to it so often by now, and never ends it."""
-        return NeverCompletes(machine, command, occurrence) in self.several
+    def drops(self, machine: str, command: str, occurrence: int) -> Drops | None:
+        """What makes a machine that ends a command lose what it holds."""
+        return self._asked(Drops(machine, command, occurrence))
 
-    def drops(self, machine: str, command: str, occurrence: int) -> bool:
-        """Whether a machine that ends a command loses what it holds."""
-        return Drops(machine, command, occurrence) in self.several
+    def _asked(self, one: T) -> T | None:
+        return one if one in self.several else None
 
     def shown(self, signal: str, at_seconds: float) -> bool | None:
         """What a sensor shows whatever it sees; None where it is right."""

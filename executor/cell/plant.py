@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 
-from firable.executor.cell.disturbances import Disturbance, Disturbances
+from firable.executor.cell.disturbances import Disturbance, Disturbances, StuckSensor
 from firable.nets.machines.plant_file import (
     Carry,
     Clamp,
@@ -105,7 +105,9 @@ class _Press:
 
 @dataclass(frozen=True, slots=True)
 class _Stick:
-    """A sensor gets stuck."""
+    """A sensor gets stuck: `_seen` looks at the disturbances."""
+
+    stuck: StuckSensor
 
 
 _Event = _Arrival | _Departure | _Finish | _Press | _Stick
@@ -135,6 +137,8 @@ class Plant:
         self.model = model
         self.random = random.Random(seed)
         self.disturbances = Disturbances(disturbances)
+        self.befallen: list[tuple[Disturbance, str]] = []
+        """What was asked to go wrong and has come, with what became of it, in words."""
         self.machines = {name: _MachineNow(machine, machine.hand) for name, machine in model.machines.items()}
         self.stations: dict[str, Workpiece | None] = dict.fromkeys(model.stations)
         self.clamped: set[str] = set()
@@ -152,8 +156,8 @@ class Plant:
         self.now_seconds = 0.0
         if workpieces:
             self._in(0.0, model.arrivals.jitter_s, _Arrival())
-        for moment in self.disturbances.moments():
-            self._in(moment, 0.0, _Stick())
+        for stuck in self.disturbances.stuck:
+            self._in(stuck.from_seconds, 0.0, _Stick(stuck))
 
     @property
     def next_seconds(self) -> float | None:
@@ -226,8 +230,8 @@ class Plant:
             case _Press(signal):
                 if self.machines[str(self.model.sensors[signal].acknowledges)].busy is None:
                     self.pressed.add(signal)
-            case _Stick():
-                pass  # `_seen` looks at the disturbances
+            case _Stick(stuck):
+                self.befallen.append((stuck, f"{stuck.signal} is stuck at {int(stuck.value)}"))
 
     def _arrive(self) -> None:
         arrivals = self.model.arrivals
@@ -290,8 +294,10 @@ class Plant:
                     raise _FaultError(f"{name} machines workpiece {workpiece.id}, which is not clamped")
                 if workpiece.processed:
                     raise _FaultError(f"{name} machines workpiece {workpiece.id} a second time")
-        if not self.disturbances.hangs(name, busy.command, machine.times[busy.command]):
+        if (hangs := self.disturbances.hangs(name, busy.command, machine.times[busy.command])) is None:
             self._in(action.takes_s, action.jitter_s, _Finish(name, busy))
+        else:
+            self.befallen.append((hangs, f"{name} has {busy.command} and will never end it"))
 
     def _finish(self, name: str, busy: _Busy) -> Iterator[PlantReport]:
         machine = self.machines[name]
@@ -322,7 +328,9 @@ class Plant:
                 self._lying(station, f"{name} machines on {station}").processed += 1
             case Release(station=station):
                 self.clamped.discard(station)
-        if self.disturbances.drops(name, busy.command, machine.times[busy.command]):
+        if (drops := self.disturbances.drops(name, busy.command, machine.times[busy.command])) is not None:
+            held = "nothing, for it holds nothing" if machine.holding is None else f"workpiece {machine.holding.id}"
+            self.befallen.append((drops, f"{name} drops {held}, as {busy.command} ends"))
             machine.holding = None
         machine.busy = None
         yield CommandDone(busy.ticket)

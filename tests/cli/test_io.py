@@ -17,7 +17,7 @@ from support.served_cells import halved, unhurried
 from support.waiting import PATIENCE_SECONDS, heard_in_time
 
 from firable.cli.main import main
-from firable.executor.drivers.far_side.ends import binding_text
+from firable.executor.drivers.far_side.ends import PORTS, binding_text
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.machines.plant_file import read_plant
 from firable.semantics.replaying import replay
@@ -165,6 +165,12 @@ def test_bundle_runs_on_the_machines_of_a_binding_until_it_is_stopped(cell: Cell
         (["sim", "catalogue:one_robot", "--modbus", "--stuck", "robot.tuch=1"], "did you mean 'robot.touch'?"),
         (["sim", "catalogue:one_robot", "--modbus", "--stuck", "robot.touch=2"], "write SIGNAL=0 or SIGNAL=1"),
         (["sim", "catalogue:one_robot", "--modbus", "--drop", "R.MOV"], "did you mean 'R.MOVE'?"),
+        (
+            ["sim", "catalogue:one_robot", "--modbus", "--drop", "R.PUT"],
+            "nothing is held when 'R.PUT' ends; name one of R.",
+        ),
+        (["sim", "catalogue:one_robot", "--modbus", "--drop", "MC.CLAMP#2"], "nothing is held when 'MC.CLAMP' ends"),
+        (["sim", "catalogue:one_robot", "--modbus", "--hang", "R.MOVE#0"], "'R.MOVE#0' never comes"),
         (["sim", "catalogue:philosophers-3", "--modbus"], "say with --plant which cell to serve"),
     ],
 )
@@ -173,6 +179,42 @@ def test_mistakes_of_who_serves_a_cell_are_told(
 ) -> None:
     assert main(arguments) == 2
     assert message in capsys.readouterr().err
+
+
+def test_what_was_to_go_wrong_and_has_not_is_told_at_the_end(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ["--drop", "R.MOVE#7", "--hang", "CV1.RUN", "--stuck", "robot.touch=1@50", "--stuck", "mc.part_present=1"]
+    command = ["sim", "catalogue:one_robot", "--serial", "--bind", str(tmp_path / "c.bind.yaml"), *asked]
+    assert main([*command, "--press", "60", "--for", "0.2"]) == 0
+    said = capsys.readouterr().out
+    assert "as asked for: mc.part_present is stuck at 1" in said
+    assert said.splitlines()[-4:] == [
+        "'robot.touch' was to be stuck at 50 s, and the cell has ended before",
+        "'R.MOVE#7' has not come: it was never given",
+        "'CV1.RUN#1' has not come: it was never given",
+        "the emergency stop was to be pressed at 60 s, and the cell has ended before",
+    ]
+
+
+def test_binding_that_another_cell_serves_stays_as_it_is_where_no_port_is_free(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bind = tmp_path / "c.bind.yaml"
+    before = binding_text(NET, {"opcua": "14999"}, SENSORS)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        monkeypatch.setitem(PORTS, "modbus", str(taken.getsockname()[1]))
+        command = ["sim", "catalogue:one_robot", "--modbus", "--bind", str(bind)]
+        assert main(command) == 2
+        assert not bind.exists()
+        bind.write_text(before)
+        assert main(command) == 2
+    assert bind.read_text() == before
+    said = capsys.readouterr()
+    assert "error[F5104]: the cell cannot be served: modbus: " in said.err
+    assert "modbus at" not in said.out
 
 
 def test_device_that_cannot_be_served_here_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

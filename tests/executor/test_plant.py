@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from firable.executor.cell.disturbances import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.cell.disturbances import Disturbance, Drops, NeverCompletes, StuckSensor
 from firable.executor.cell.plant import CommandDone, Plant, PlantFault, PlantReport, SensorChanged
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.diagnostics import InputError
@@ -220,12 +220,25 @@ def test_disturbed_command_is_taken_and_never_done() -> None:
     bench = Bench(NeverCompletes("R", "MOVE", occurrence=2))
     assert bench.do("R", "MOVE", to="ENTRY") == [CommandDone(1)]
     assert bench.do("R", "MOVE", to="HOME") == []
+    assert [what for _, what in bench.plant.befallen] == ["R has MOVE and will never end it"]
+
+
+def test_what_is_dropped_is_told_and_that_nothing_was_held() -> None:
+    first, second = Drops("R", "MOVE", 1), Drops("R", "MOVE", 2)
+    bench = Bench(first, second, Drops("R", "MOVE", 99))
+    bench.fetch()
+    bench.do("R", "MOVE", to="HOME")
+    assert bench.plant.befallen == [
+        (first, "R drops nothing, for it holds nothing, as MOVE ends"),
+        (second, "R drops workpiece 1, as MOVE ends"),
+    ]
 
 
 def test_stuck_sensor_shows_one_value_from_its_time_on() -> None:
     bench = Bench(StuckSensor("entry", value=False, from_seconds=3.0))
     assert bench.plant.shown["entry"]
     assert bench.wait(3.0) == [SensorChanged("entry", value=False)]
+    assert [what for _, what in bench.plant.befallen] == ["entry is stuck at 0"]
 
 
 @pytest.mark.parametrize("cell", CELLS)

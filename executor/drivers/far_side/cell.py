@@ -81,7 +81,7 @@ class CellServer:
         """What each machine is at."""
         self.next_ticket = 0
         self.begun_seconds = 0.0
-        self.delivered = 0
+        self.delivered = self.befallen = 0
         self.fault = ""
         self.awake = asyncio.Event()
 
@@ -212,6 +212,9 @@ class CellServer:
                     for device in self.devices.values():
                         self._stop(device, "what has happened")
                     self.awake.set()
+        for _, what in self.plant.befallen[self.befallen :]:
+            self.tell(self.now_seconds(), f"as asked for: {what}")
+        self.befallen = len(self.plant.befallen)
         if len(self.plant.delivered) > self.delivered:
             self.delivered = len(self.plant.delivered)
             self.tell(self.now_seconds(), f"workpiece {self.plant.delivered[-1].id} is carried out")

@@ -16,7 +16,7 @@ from firable.executor.drivers.far_side.end import FarEnd
 from firable.nets.diagnostics import InputError
 from firable.nets.net import Command, Net, Place
 
-PORTS: Final = {"modbus": "15020", "opcua": "14840", "mqtt": "11883", "serial": ""}
+PORTS: Final[dict[str, str]] = {"modbus": "15020", "opcua": "14840", "mqtt": "11883", "serial": ""}
 """The protocols, and the port of this host at which each is served; a serial line gets its name when it is made."""
 
 HEARTBEAT_S: Final = 0.2
