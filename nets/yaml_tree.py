@@ -92,8 +92,8 @@ def is_ambiguous(word: str) -> bool:
     return word in _WORDS_REFUSED or word in {"true", "false", "y", "n", "Y", "N"}
 
 
-def parse_tree(source: Source) -> Node:
-    """Read one YAML document.
+def parse_tree(source: Source, file: str = "net file", begins: str = "`firable: 1` and `cell: NAME`") -> Node:
+    """Read one YAML document, of a `file` of this kind, which begins so.
 
     Raises `InputError`: F1002 empty, F1003 too many nodes, F1005 not YAML or nested too deeply, F1006 duplicate keys,
     F1007 ambiguous. The syntax stops at the first error; duplicate keys and ambiguous words are all reported.
@@ -103,7 +103,7 @@ def parse_tree(source: Source) -> Node:
         before = source.text[: found.start()]
         raise source.refuse(
             "F1007" if character in "\x85\u2028\u2029" else "F1005",
-            f"the character U+{ord(character):04X} may not stand in a net file",
+            f"the character U+{ord(character):04X} may not stand in a {file}",
             "delete it, or write it as an escape in double quotes",
             before.count("\n") + 1,
             found.start() - (before.rfind("\n") + 1) + 1,
@@ -121,7 +121,8 @@ def parse_tree(source: Source) -> Node:
         raise InputError(builder.problems)
     root = builder.root
     if root is None or (isinstance(root, Scalar) and root.plain and not root.text):
-        raise source.refuse("F1002", "the file holds no net", "a net file begins with `firable: 1` and `cell: NAME`")
+        what = "holds comments alone" if source.text.strip() else "is empty"
+        raise source.refuse("F1002", f"this is not a {file}: it {what}", f"a {file} begins with {begins}")
     return root
 
 

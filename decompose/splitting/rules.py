@@ -118,7 +118,7 @@ def rules_of_options(options: Iterable[str]) -> dict[str, list[str]]:
 def read_rules(path: str | Path) -> dict[str, list[str]]:
     """The rules of a file. Raises `InputError` as for a net file, F1010 for what is no rule."""
     source = read_source(path, SIZE_BYTES_MAX)
-    tree = parse_tree(source)
+    tree = parse_tree(source, "file of rules", f"a controller: {_HINT}")
     problems: list[Diagnostic] = []
     rules: dict[str, list[str]] = {}
     if not isinstance(tree, Mapping) or not tree.entries:

@@ -281,7 +281,7 @@ def _problem(source: Source, tree: Node, code: str, path: TreePath, message: str
 
 
 def _parse(source: Source) -> Binding:
-    tree = parse_tree(source)
+    tree = parse_tree(source, SHAPE.file, f"`{SHAPE.version}: 1` and `cell: NAME`; docs/drivers.md has a whole one")
     if problem := version_problem(source, tree, SHAPE):
         raise InputError([problem])
     try:

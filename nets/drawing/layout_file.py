@@ -87,7 +87,7 @@ def parse_layout(text: str, file: str = "<layout>") -> Arrangement:
 
 
 def _parse(source: Source) -> Arrangement:
-    tree = parse_tree(source)
+    tree = parse_tree(source, "layout file", f"`firable_layout: 1`; {_HINT}")
     try:
         model = LayoutModel.model_validate(data(tree))
     except ValidationError as error:

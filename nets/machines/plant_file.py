@@ -204,7 +204,7 @@ def parse_plant(text: str, file: str = "<plant>") -> PlantModel:
 
 
 def _parse(source: Source) -> PlantModel:
-    tree = parse_tree(source)
+    tree = parse_tree(source, "plant file", "`firable_plant: 1` and `plant: NAME`; docs/machines.md describes it")
     try:
         model = PlantModel.model_validate(data(tree))
     except ValidationError as error:

@@ -75,7 +75,7 @@ def filled(template: str, values: dict[str, str]) -> str:
 
 
 def _parse(source: Source) -> Catalogue:
-    tree = parse_tree(source)
+    tree = parse_tree(source, doc.SHAPE.file, f"`{doc.SHAPE.version}: 1` and `tasks:`")
     if problem := version_problem(source, tree, doc.SHAPE):
         raise InputError([problem])
     try:

@@ -11,7 +11,13 @@ import pytest
 
 import firable.analysis.check
 from firable.cli.main import main
+from firable.executor.drivers.binding import parse_binding
 from firable.nets.catalogue import catalogue_path
+from firable.nets.diagnostics import InputError
+from firable.nets.drawing.layout_file import parse_layout
+from firable.nets.machines.plant_file import parse_plant
+from firable.nets.tasks.text import parse_tasks
+from firable.nets.text import parse_net
 
 NET = """\
 firable: 1
@@ -163,6 +169,29 @@ def test_an_output_that_cannot_be_written_leaves_nothing_behind(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
     assert (tmp_path / "file").read_text() == "kept"
     assert list((tmp_path / "folder").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("parse", "what", "begins"),
+    [
+        (parse_net, "net file", "`firable: 1` and `cell: NAME`"),
+        (parse_binding, "binding", "`firable_bind: 1` and `cell: NAME`"),
+        (parse_plant, "plant file", "`firable_plant: 1` and `plant: NAME`"),
+        (parse_tasks, "file of tasks", "`firable_tasks: 1`"),
+        (parse_layout, "layout file", "`firable_layout: 1`"),
+    ],
+)
+def test_a_file_without_anything_in_it_is_told_as_what_it_should_be(
+    parse: Callable[[str, str], object], what: str, begins: str
+) -> None:
+    for text, why in (("", "is empty"), (" \n", "is empty"), ("# to be written\n", "holds comments alone")):
+        with pytest.raises(InputError) as refusal:
+            parse(text, "cell.yaml")
+        (problem,) = refusal.value.diagnostics
+        assert (problem.code, problem.message) == ("F1002", f"this is not a {what}: it {why}")
+        assert problem.span is not None
+        assert (problem.span.file, problem.span.line) == ("cell.yaml", 1)
+        assert problem.hint.startswith(f"a {what} begins with {begins}")
 
 
 def test_a_mistake_in_a_file_of_tasks_or_in_its_use_is_one_clear_error(
