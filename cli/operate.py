@@ -54,6 +54,10 @@ class ServeOptions:
             return None
         if self.operators is not None and self.serve_tls is None:
             raise click.UsageError("--operators is of TLS: name --serve-tls, too")
+        if self.operators is not None and self.token_file is not None:
+            raise click.UsageError(
+                "with --operators a certificate says who comes, and no token: leave out --token-file"
+            )
         from firable.executor.operating.control import Endpoint, new_token, tls_context
         from firable.executor.operating.service import Service
 
@@ -67,7 +71,10 @@ class ServeOptions:
         return Service(endpoint, partial(self._served, token), partial(_page, bundle=bundle, plant=plant))
 
     def _served(self, token: str, address: str) -> None:
-        _tell_served(token, self.token_file, address)
+        who = f"the token {token}" if self.token_file is None else f"the token in {self.token_file}"
+        if self.operators is not None:
+            who = f"a certificate of the authority in {self.operators}"
+        click.echo(f"operate this run at {address} with {who}", err=True)
         if self.open:
             from firable.cli.view.command import show
 
@@ -132,45 +139,66 @@ def operate(
         raise click.UsageError(
             f"'{address}' is no address: write it as the run has printed it, with http:// or https://"
         )
-    token = "" if token_file is None else _token_read(Path(token_file))
-    context = _client_tls(ca, cert) if address.startswith("https://") else None
+    if (cert or ca) and not address.startswith("https://"):
+        raise click.UsageError("--cert and --ca are of https:// addresses")
     place, is_said, word = (what or "").partition("=")
     if (command == "say") != bool(is_said and place and word) or (what is not None and command != "say"):
         raise click.UsageError("say what became of a command: say PLACE=done, =working or =not-received")
+    caller = Caller(
+        "" if token_file is None else _token_read(Path(token_file)),
+        _client_tls(ca, cert) if address.startswith("https://") else None,
+        has_authority=ca is not None,
+        has_certificate=cert is not None,
+    )
     said = {"place": place, "answer": word.replace("-", " ")} if command == "say" else {}
-    answer, is_refused = asyncio.run(_asked(address.rstrip("/"), command, said, token, context))
+    answer, is_refused = asyncio.run(ask(address.rstrip("/"), command, said, caller))
     click.echo(answer, nl=command != "metrics")
     return 1 if is_refused else 0
 
 
-async def _asked(
-    address: str, command: str, said: dict[str, str], token: str, context: ssl.SSLContext | None
-) -> tuple[str, bool]:
-    """What the run answers, and whether it has refused to do it."""
+@dataclass(frozen=True)
+class Caller:
+    """Who asks a run, and whom they believe."""
+
+    token: str = ""
+    tls: ssl.SSLContext | None = None
+    has_authority: bool = False
+    has_certificate: bool = False
+
+
+async def ask(address: str, command: str, said: dict[str, str], caller: Caller) -> tuple[str, bool]:
+    """What the run answers, and whether it has refused to do it; raises `InputError` F5063."""
     import aiohttp
 
+    from firable.cli.unreached import refusal, unreached
+
     method = "GET" if command in _READING else "POST"
-    headers = {"Authorization": f"Bearer {token}"} if token else {}
+    headers = {"Authorization": f"Bearer {caller.token}"} if caller.token else {}
     timeout = aiohttp.ClientTimeout(total=_SECONDS)
+    hint = "is that the address that the run has printed?"
     try:
         async with (
             aiohttp.ClientSession(timeout=timeout) as session,
             session.request(
-                method, f"{address}/{command}", params=said, headers=headers, ssl=context or True
+                method, f"{address}/{command}", params=said, headers=headers, ssl=caller.tls or True
             ) as answer,
         ):
             if answer.status == 401:
-                raise _refusal(f"{address} does not let you in", "show the token, or the certificate, of this run")
+                raise refusal(f"{address} does not let you in", "show the token, or the certificate, of this run")
             if answer.status != 200:
-                raise _refusal(f"{address} answers {answer.status}", "is that the address that the run has printed?")
+                raise refusal(f"{address} answers {answer.status}", hint)
             if command == "metrics":
                 return await answer.text(), False
             told = await answer.json()
+            if not isinstance(told, dict) or not told.keys() >= {"state", "message", "marking", "blocked"}:
+                raise refusal(f"{address} answers as no run does", hint)
             return _told(told), bool(told.get("refused"))
-    except (aiohttp.ClientError, ssl.SSLError, OSError, TimeoutError) as error:
-        reason = str(error) or "it does not answer"
-        hint = "has the run ended? is the address, or the certificate, another one?"
-        raise _refusal(f"{address} cannot be reached: {reason}", hint) from None
+    except aiohttp.InvalidURL:
+        raise click.UsageError(f"'{address}' is no address: write it as the run has printed it") from None
+    except (aiohttp.ClientError, OSError, TimeoutError) as error:
+        raise unreached(
+            address, error, has_authority=caller.has_authority, has_certificate=caller.has_certificate
+        ) from None
 
 
 def _told(answer: dict[str, Any]) -> str:
@@ -180,11 +208,6 @@ def _told(answer: dict[str, Any]) -> str:
     lines[:0] = [f"refused: {why}" for why in answer.get("refused", ())]
     lines.append(f"  tokens on {', '.join(answer['marking'])}")
     return "\n".join([*lines, *(f"  {blocked}" for blocked in answer["blocked"])])
-
-
-def _tell_served(token: str, token_file: str | None, address: str) -> None:
-    who = f"the token in {token_file}" if token_file is not None else f"the token {token}"
-    click.echo(f"operate this run at {address} with {who}", err=True)
 
 
 def _token_kept(path: Path) -> str:
@@ -205,9 +228,12 @@ def _token_kept(path: Path) -> str:
 
 def _token_read(path: Path) -> str:
     try:
-        return path.read_text(encoding="ascii").strip()
+        token = path.read_text(encoding="ascii").strip()
     except (OSError, ValueError) as error:
         raise _file_refusal("F1001", path, error) from None
+    if not token or not token.isprintable() or " " in token:
+        raise _file_refusal("F1001", path, ValueError("it is empty" if not token else "it is not one word in one line"))
+    return token
 
 
 def _file_refusal(code: str, path: Path, error: Exception) -> InputError:
@@ -219,19 +245,20 @@ def _file_refusal(code: str, path: Path, error: Exception) -> InputError:
 
 
 def _client_tls(ca: str | None, cert: tuple[str, str] | None) -> ssl.SSLContext:
+    from firable.executor.operating.own_certificate import fault_of, unloaded
     from firable.nets.diagnostics import Diagnostic, InputError
 
+    what, files, hint = "the certificate of the authority", [ca] if ca else [], "name PEM files"
+    fault = None
     try:
         context = ssl.create_default_context(cafile=ca)
         if cert is not None:
+            what, files = "your certificate", list(cert)
             context.load_cert_chain(*cert)
-    except (OSError, ssl.SSLError) as error:
-        message = f"the certificate, or that of the authority, cannot be used: {error.strerror or error}"
-        raise InputError([Diagnostic("F5062", message, "name PEM files")]) from None
+            if fault := fault_of(*cert, is_server=False):
+                hint = "renew it, or set the clock of this host"
+    except (OSError, ValueError) as error:
+        fault = unloaded(error, *files)
+    if fault is not None:
+        raise InputError([Diagnostic("F5062", f"{what} cannot be used: {fault}", hint)])
     return context
-
-
-def _refusal(message: str, hint: str) -> InputError:
-    from firable.nets.diagnostics import Diagnostic, InputError
-
-    return InputError([Diagnostic("F5063", message, hint)])

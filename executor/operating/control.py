@@ -38,6 +38,7 @@ from typing import Final, Protocol
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
+from firable.executor.operating.own_certificate import fault_of, unloaded
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import Answer
 from firable.nets.diagnostics import Diagnostic, InputError
@@ -260,9 +261,14 @@ def tls_context(certificate: str, key: str, client_authority: str | None) -> ssl
         if client_authority is not None:
             context.load_verify_locations(client_authority)
             context.verify_mode = ssl.CERT_REQUIRED
-    except (OSError, ssl.SSLError) as error:
-        message = f"the certificate of the operator's endpoint cannot be used: {error.strerror or error}"
-        raise InputError([Diagnostic("F5062", message, "name PEM files of a certificate and its key")]) from None
+        fault = fault_of(certificate, key, is_server=True)
+        hint = "renew it, or set the clock of this host"
+    except (OSError, ValueError) as error:
+        fault = unloaded(error, certificate, key, *([] if client_authority is None else [client_authority]))
+        hint = "name PEM files of a certificate and its key"
+    if fault is not None:
+        message = f"the certificate of the operator's endpoint cannot be used: {fault}"
+        raise InputError([Diagnostic("F5062", message, hint)])
     return context
 
 

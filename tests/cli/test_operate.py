@@ -12,9 +12,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from support.certificates import Site
 from support.waiting import PATIENCE_SECONDS, until
 
 from firable.cli.main import main
+from firable.cli.operate import ServeOptions
 from firable.executor.operating.control import new_token
 from firable.semantics.trace import CommandSent, Noted, read_trace
 
@@ -166,6 +168,20 @@ def test_the_token_is_for_its_owner_alone_and_no_other_gets_in(
     assert "tokens on" in operate(address, "situation", folder, capsys)
 
 
+def test_who_may_operate_is_told_as_it_is_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    own = Site(tmp_path / "site").host("run")
+    tls = (own.certificate, own.key)
+    for options, who in (
+        (ServeOptions("127.0.0.1:0"), "with the token "),
+        (ServeOptions("127.0.0.1:0", token_file=str(tmp_path / "token")), "with the token in "),
+        (ServeOptions("127.0.0.1:0", serve_tls=tls, operators=own.authority), "with a certificate of the authority in"),
+    ):
+        service = options.service("cell.bundle")
+        assert service is not None
+        service.served("https://127.0.0.1:8080")
+        assert f"operate this run at https://127.0.0.1:8080 {who}" in capsys.readouterr().err
+
+
 def test_a_run_that_is_not_there_is_one_clear_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "token").write_text(new_token())
     assert main(["operate", "http://127.0.0.1:9", "stop", "--token-file", str(tmp_path / "token")]) == 2
@@ -182,6 +198,10 @@ def test_a_run_that_is_not_there_is_one_clear_error(tmp_path: Path, capsys: pyte
         (["--serve", "0.0.0.0:8080", "--speed", "1"], "F5060"),
         (["--token-file", "t"], "say with --serve"),
         (["--serve", "127.0.0.1:8080", "--speed", "1", "--operators", "ca.pem"], "name --serve-tls"),
+        (
+            ["--serve", ":1", "--speed", "1", "--serve-tls", "c", "k", "--operators", "a", "--token-file", "t"],
+            "a certificate says who comes, and no token",
+        ),
     ],
 )
 def test_what_cannot_be_served_is_refused_before_the_run_begins(

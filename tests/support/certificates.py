@@ -10,6 +10,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 
 from firable.executor.links.zenoh_link import Certificates
 
+HERE = "127.0.0.1"
 Signer = tuple[x509.Name, ec.EllipticCurvePrivateKey]
 
 
@@ -25,12 +26,12 @@ class Site:
         signed = self._certificate(self.name, self.key, is_authority=True)
         self.authority.write_bytes(signed.public_bytes(serialization.Encoding.PEM))
 
-    def host(self, name: str) -> Certificates:
-        """The files of a host at 127.0.0.1."""
+    def host(self, name: str, *, valid_days: tuple[float, float] = (-0.1, 1.0), address: str = HERE) -> Certificates:
+        """The files of a host at an address, which are valid between two days from now."""
         key = ec.generate_private_key(ec.SECP256R1())
         subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
         certificate, secret = self.folder / f"{name}.pem", self.folder / f"{name}.key"
-        signed = self._certificate(subject, key, is_authority=False)
+        signed = self._certificate(subject, key, is_authority=False, valid_days=valid_days, at=address)
         certificate.write_bytes(signed.public_bytes(serialization.Encoding.PEM))
         secret.write_bytes(
             key.private_bytes(
@@ -40,19 +41,25 @@ class Site:
         return Certificates(str(self.authority), str(certificate), str(secret))
 
     def _certificate(
-        self, subject: x509.Name, key: ec.EllipticCurvePrivateKey, *, is_authority: bool
+        self,
+        subject: x509.Name,
+        key: ec.EllipticCurvePrivateKey,
+        *,
+        is_authority: bool,
+        valid_days: tuple[float, float] = (-0.1, 1.0),
+        at: str = HERE,
     ) -> x509.Certificate:
         now = datetime.datetime.now(datetime.UTC)
-        address = x509.IPAddress(ipaddress.ip_address("127.0.0.1"))
+        begins, ends = (now + datetime.timedelta(days=days) for days in valid_days)
         return (
             x509.CertificateBuilder()
             .subject_name(subject)
             .issuer_name(self.name)
             .public_key(key.public_key())
             .serial_number(x509.random_serial_number())
-            .not_valid_before(now - datetime.timedelta(hours=1))
-            .not_valid_after(now + datetime.timedelta(days=1))
+            .not_valid_before(begins)
+            .not_valid_after(ends)
             .add_extension(x509.BasicConstraints(ca=is_authority, path_length=None), critical=True)
-            .add_extension(x509.SubjectAlternativeName([address]), critical=False)
+            .add_extension(x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address(at))]), critical=False)
             .sign(self.key, hashes.SHA256())
         )
