@@ -112,6 +112,8 @@ def test_an_operator_resets_an_emergency_stop_says_what_a_machine_did_and_resume
     process, address, folder = served
     assert "there is no emergency stop" in operate(address, "reset", folder, capsys, code=1)
     until_told(address, "robot.to_cv1", folder, capsys)
+    operate(address, "pause", folder, capsys)
+    operate(address, "step", folder, capsys)  # it is over when all that waits for a disk has left, the command too
     operate(address, "emergency-stop", folder, capsys)
     until_told(address, "latched", folder, capsys)
     assert operate(address, "reset", folder, capsys).startswith("held")
