@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from firable.executor.protocol.enabled import EnabledSet
-from firable.executor.protocol.messages import Keep, Stored
+from firable.executor.protocol.messages import Keep, ProtocolError, Stored
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.diagnostics import Diagnostic, InputError
 from firable.nets.net import Marking, Net
@@ -168,9 +168,15 @@ class Recorder:
         return self.player.marking(self.word)
 
     def fired(self, at_seconds: float, transition: str, number: int | None = None) -> None:
-        """A transition has fired, by the decision of a round or in its controller alone."""
+        """A transition has fired, by the decision of a round or in its controller alone.
+
+        Raises `ProtocolError` where the joint marking does not let it: a firing that is told twice would be undone.
+        """
         if not self.machines:
-            self.word = self.player.transitions[transition].fire(self.word)
+            compiled, word = self.player.transitions[transition], self.word
+            if word & compiled.takes != compiled.takes or word & compiled.puts:
+                raise ProtocolError(f"'{transition}' is told as fired where its tokens are not")
+            self.word = compiled.fire(word)
         self.firings[transition] += 1
         self.at_seconds = at_seconds
         if self.stream is not None or self.observers:

@@ -13,7 +13,9 @@ from support.owned_nets import owned_net
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.disturbances import Disturbance, NeverCompletes, StuckSensor
+from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bench import until
+from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.drivers.simulated import SimulatedDriver
 from firable.executor.operating.host import Host
 from firable.executor.operating.items import Item
@@ -438,11 +440,37 @@ def test_deadlock_of_a_run_is_the_deadlock_of_the_reference(seed: int) -> None:
 
 def test_recorder_fires_by_the_rule_of_the_token_player() -> None:
     recorder = Recorder(catalogue_net("one_robot"), "", None)
-    recorder.signal(0.0, "robot.at_cv1", value=True)
+    recorder.fired(0.0, "G1")
+    recorder.signal(0.5, "robot.at_cv1", value=True)
     before, player = recorder.word, recorder.player
     recorder.fired(1.0, "G2")
     assert recorder.word == player.transitions["G2"].fire(before)
     assert not recorder.word & player.signal_bit("robot.at_cv1")  # its command is sent in the same act
+
+
+def test_a_firing_that_is_told_twice_or_out_of_turn_is_an_error_of_the_program_and_no_silence() -> None:
+    recorder = Recorder(catalogue_net("one_robot"), "", None)
+    recorder.fired(0.0, "G1")
+    before, counted = recorder.word, dict(recorder.firings)
+    for transition in ("G1", "G3"):
+        with pytest.raises(ProtocolError, match=f"'{transition}' is told as fired where its tokens are not"):
+            recorder.fired(1.0, transition)
+    assert (recorder.word, recorder.firings) == (before, counted)
+
+
+def test_a_run_in_which_a_firing_is_told_twice_ends_by_that_error_with_its_machines_stopped() -> None:
+    class Doubled(Recorder):
+        def fired(self, at_seconds: float, transition: str, number: int | None = None) -> None:
+            super().fired(at_seconds, transition, number)
+            if transition == "G2":
+                super().fired(at_seconds, transition, number)
+
+    decomposition = decomposition_of("one_robot")
+    driver = DryRunDriver(decomposition.subnets, 1.0)
+    host = Host(decomposition, driver, Doubled(decomposition.net, "", None))
+    with pytest.raises(ProtocolError, match="'G2' is told as fired"):
+        run_in_virtual_time(host.main())
+    assert driver.is_stopped
 
 
 def test_command_order_of_a_wrong_net_crashes_in_the_cell() -> None:

@@ -25,7 +25,7 @@ from firable.executor.journal.journal import Journal, MemoryJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
 from firable.executor.links.link import Greeting
 from firable.executor.operating.host import Host
-from firable.executor.operating.recorder import Recorder
+from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.situation import State
 from firable.executor.protocol.messages import Effect, Firing, Sending
 from firable.nets.interchange import net_digest
@@ -75,7 +75,7 @@ async def present(_: Host) -> None:
 
 
 def whole(driver: Queue, journal: Journal, *, resume: bool = False) -> Host:
-    recorder = Recorder(NET, net_digest(NET), io.StringIO())
+    recorder = Recorder(NET, net_digest(NET), io.StringIO(), journal.kept(TRACE).get(KEY))
     return Host(SPLIT, driver, recorder, journal=journal, operator=present, overdue_seconds=30, resume=resume)
 
 

@@ -18,7 +18,7 @@ from firable.executor.drivers.bench import PATIENCE_S
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import MemoryJournal, Storing
 from firable.executor.operating.host import Host
-from firable.executor.operating.recorder import Recorder, TraceFile
+from firable.executor.operating.recorder import KEY, TRACE, Recorder, TraceFile
 from firable.executor.operating.situation import Situation
 from firable.executor.protocol.commands import Answer
 from firable.executor.protocol.messages import Stored
@@ -131,7 +131,7 @@ class Rig:
         async def present(_: Host) -> None:
             await asyncio.get_running_loop().create_future()
 
-        recorder = Recorder(net, net_digest(net), trace or self.stream)
+        recorder = Recorder(net, net_digest(net), trace or self.stream, self.journal.kept(TRACE).get(KEY))
         self.host = Host(decomposition, self.machines, recorder, journal=self.journal, operator=present)
 
     @asynccontextmanager
