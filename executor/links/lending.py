@@ -24,10 +24,12 @@ from contextvars import Context
 from threading import Lock
 from typing import TypeVarTuple
 
+from firable.executor.own_time import ListeningSelector, OwnTimeLoop
+
 Ts = TypeVarTuple("Ts")
 
 
-class _LettingGo(selectors.DefaultSelector):
+class _LettingGo(ListeningSelector):
     """A selector that holds the lock but while it waits."""
 
     def __init__(self) -> None:
@@ -35,18 +37,18 @@ class _LettingGo(selectors.DefaultSelector):
         self.lock = Lock()
         self.lock.acquire()
 
-    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+    def look(self, timeout: float) -> list[tuple[selectors.SelectorKey, int]]:
         """What is ready; others may have the lock until then."""
-        if timeout is not None and timeout <= 0:
-            return super().select(timeout)
+        if timeout <= 0:
+            return super().look(timeout)
         self.lock.release()
         try:
-            return super().select(timeout)
+            return super().look(timeout)
         finally:
             self.lock.acquire()
 
 
-class LendingLoop(asyncio.SelectorEventLoop):
+class LendingLoop(OwnTimeLoop):
     """An event loop on which other threads may work while it sleeps."""
 
     def __init__(self) -> None:
@@ -67,6 +69,7 @@ class LendingLoop(asyncio.SelectorEventLoop):
             self.is_lent, self._has_news = True, False
             asyncio._set_running_loop(self)
             try:
+                self.listening.account()  # before anything is begun in a time that is set back when the loop wakes
                 work()
             finally:
                 asyncio._set_running_loop(None)

@@ -25,11 +25,15 @@ from firable.executor.operating.situation import Situation, State
 from firable.semantics.joining import APPLIED, STANDS, VOTED
 from firable.semantics.trace import Event, Noted
 
+FROZEN: Final = "frozen"
+"""The kind of note of a time in which this process did not run."""
+
 LEVELS: Final[Mapping[str, int]] = MappingProxyType(
     {
         **dict.fromkeys(("fault", "divergence", "emergency stop", "latched", HANGS), logging.ERROR),
         **dict.fromkeys(
-            ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold"), logging.WARNING
+            ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold", FROZEN),
+            logging.WARNING,
         ),
     }
 )

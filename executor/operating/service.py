@@ -12,14 +12,17 @@ import gc
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.bound import BoundDriver
 from firable.executor.drivers.driver import Driver, Quality
 from firable.executor.operating.host import Host
+from firable.executor.operating.log import FROZEN
 from firable.executor.operating.situation import Situation
 from firable.executor.operating.uncut import STOP_SECONDS, Guard, Patience, ended_by_signals
+from firable.executor.own_time import OwnTimeLoop
 from firable.nets.net import Net
 
 if TYPE_CHECKING:  # these need the extra `serve`
@@ -66,7 +69,7 @@ def run_to_the_end(
     work = terminable(host) if service is None or figures is None else _serving(host, service, figures)
     guard = Guard(host.patience.seconds)
     try:
-        with _short_collections(), asyncio.Runner(loop_factory=_loop_for(host)) as runner:
+        with _short_collections(), asyncio.Runner(loop_factory=partial(_loop_for, host)) as runner:
             try:
                 ended = runner.run(work)
             finally:
@@ -76,13 +79,21 @@ def run_to_the_end(
     return ended
 
 
-def _loop_for(host: Host) -> type[asyncio.AbstractEventLoop] | None:
-    """The kind of loop: one that a link's threads may work on while it sleeps, where there is a link."""
+def _loop_for(host: Host) -> asyncio.AbstractEventLoop:
+    """A loop in its own time; where there is a link, one that its threads may work on while it sleeps."""
     if host.is_whole:
-        return None
-    from firable.executor.links.lending import LendingLoop
+        loop = OwnTimeLoop()
+    else:
+        from firable.executor.links.lending import LendingLoop
 
-    return LendingLoop
+        loop = LendingLoop()
+    loop.listening.thawed = partial(_tell_thawed, host, loop)
+    return loop
+
+
+def _tell_thawed(host: Host, loop: OwnTimeLoop, seconds: float) -> None:
+    sentence = f"this process did not run for {seconds:.1f} s; its time limits stood still meanwhile"
+    loop.call_soon(host.told, FROZEN, sentence)
 
 
 @contextmanager

@@ -17,7 +17,9 @@ from support.served_cells import halved, unhurried
 from support.waiting import PATIENCE_SECONDS, heard_in_time
 
 from firable.cli.main import main
+from firable.executor.drivers.binding import parse_binding
 from firable.executor.drivers.far_side.ends import PORTS, binding_text
+from firable.executor.drivers.fitting import misfits
 from firable.nets.catalogue import catalogue_net, catalogue_path
 from firable.nets.machines.plant_file import read_plant
 from firable.semantics.replaying import replay
@@ -215,6 +217,14 @@ def test_binding_that_another_cell_serves_stays_as_it_is_where_no_port_is_free(
     said = capsys.readouterr()
     assert "error[F5104]: the cell cannot be served: modbus: " in said.err
     assert "modbus at" not in said.out
+
+
+@pytest.mark.parametrize("path", catalogue_path("one_robot").parent.glob("*.plant.yaml"), ids=lambda path: path.stem)
+def test_a_binding_that_is_made_fits_its_net_whatever_that_has(path: Path) -> None:
+    net = catalogue_net(path.name.removesuffix(".plant.yaml"))
+    assert (
+        misfits(parse_binding(binding_text(net, PORTS | {"serial": "/dev/ttyS0"}, read_plant(path).sensors)), net) == ()
+    )
 
 
 def test_device_that_cannot_be_served_here_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

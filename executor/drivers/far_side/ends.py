@@ -14,7 +14,7 @@ from firable.executor.drivers.binding import Binding, writes
 from firable.executor.drivers.device import Point, Value
 from firable.executor.drivers.far_side.end import FarEnd
 from firable.nets.diagnostics import InputError
-from firable.nets.net import Command, Net, Place
+from firable.nets.net import Command, Net, Place, SignalKind
 
 PORTS: Final[dict[str, str]] = {"modbus": "15020", "opcua": "14840", "mqtt": "11883", "serial": ""}
 """The protocols, and the port of this host at which each is served; a serial line gets its name when it is made."""
@@ -106,6 +106,8 @@ def binding_text(net: Net, ports: Mapping[str, str], sensed: Collection[str]) ->
         lines += ["", "emergency_stop:", f"  button: {{device: {layout.protocol}, read: {read}}}"]
     lines += ["", "signals:"]
     for i, signal in enumerate(net.signals):
+        if signal.kind is SignalKind.TIMER:
+            continue
         at = owners.get(signal.owner, layouts[0])
         read = f"{{device: {at.protocol}, {at.sensor(signal.name, i)}}}"
         lines.append(f"  {signal.name}: {read if signal.name in sensed else 'acknowledged'}")
