@@ -20,6 +20,7 @@ libraries. Rejected: a clock that stands still while a process is stopped: Linux
 from __future__ import annotations
 
 import asyncio
+import math
 import selectors
 import time
 from collections.abc import Callable
@@ -40,7 +41,7 @@ class ListeningSelector(selectors.DefaultSelector):
         super().__init__()
         self.unheard_seconds = 0.0
         """All the time that does not count."""
-        self.looked_seconds = time.monotonic()
+        self.looked_seconds = math.inf  # before the first look nobody was to be heard
         self.wait_seconds = 0.0
         """So much of the time since then was asked for."""
         self.thawed: Callable[[float], None] = lambda _: None
