@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.operating import latch, restart
-from firable.executor.operating.situation import Situation, State, blocked, blocked_here
+from firable.executor.operating.situation import Situation, State, blocked, blocked_here, deadlocked
 from firable.executor.operating.uncut import Patience, uncut
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.net import Net, SignalKind
@@ -61,8 +61,7 @@ def _situation(run: Host) -> Situation:
     if not run.is_quiet and not run.paused:
         return Situation(State.RUNNING, run.marking, (), others)
     if run.is_whole and run.recorder.is_deadlock:
-        message = "no transition can fire any more, whatever the signals do"
-        return Situation(State.DEADLOCK, run.marking, waiting, message)
+        return Situation(State.DEADLOCK, run.marking, waiting, deadlocked(run.net, run.recorder.marking))
     return Situation(State.PAUSED if run.paused else State.WAITING, run.marking, waiting, others)
 
 

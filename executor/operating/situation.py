@@ -21,6 +21,8 @@ from enum import StrEnum
 from firable.executor.links.link import called
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.token_player import TokenPlayer, Word
+from firable.nets.net import Marking, Net
+from firable.semantics.waiting import circle
 
 
 class State(StrEnum):
@@ -87,6 +89,13 @@ def is_deadlock(player: TokenPlayer, word: Word) -> bool:
     It is asked at each quiescence, so it does not play by the reference; the tests hold it to what `judge` says.
     """
     return not any(c.openable and c.firable(word, player.places) for c in player.transitions.values())
+
+
+def deadlocked(net: Net, marking: Marking) -> str:
+    """A deadlock in words: whose tokens wait for each other in a circle, by their places, where there is one."""
+    told = [wait.told(net.place(wait.place).description) for wait in circle(net, marking)]
+    around = f"; in a circle, each waiting for the next: {'; '.join(told)}" if told else ""
+    return f"no transition can fire any more, whatever the signals do{around}"
 
 
 def blocked(player: TokenPlayer, word: Word, untaken: Collection[str] = ()) -> Iterator[Blocked]:

@@ -108,6 +108,11 @@ def test_deadlock_is_told_while_running_with_what_waits_for_what() -> None:
     assert told["G4"].empty == ("mc.free",)
     assert "robot.free" in told["G6"].empty
     assert str(told["G6"]).startswith("G6 waits for a token on robot.free")
+    assert report.situation.message == (
+        "no transition can fire any more, whatever the signals do; in a circle, each waiting for the next: "
+        "robot.put_mc (putting on MC) waits in G4 for mc.free, which comes from mc.release by G6 and G7; "
+        "mc.release (releasing and then waiting) waits in G6 for robot.free, which comes from robot.put_mc by G4 and G5"
+    )
     assert trace.end is not None
     assert trace.end.reason == "deadlock"
 
