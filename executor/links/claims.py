@@ -1,16 +1,22 @@
-"""Who is heard on a link without a middle: processes claim machines, and each host answers every one of them.
+"""Who is heard on a link without a middle: hosts claim their machines, and each answers every other one.
 
-A process claims its machines for as long as it is there. Every other host answers for each: *heard*; the *second*
-that claims the machine, and not heard before the first is gone; or *estranged*, because its storage is not the one with
-which the machine was met (`link.Memory`). Two hosts are connected when each hears all machines of the other: what one
-of them refuses the other has to know before it moves anything, and so does the person who has started it.
+A host claims its machines, all at once, for as long as it is there. Every other one answers it: *heard*; the *second*
+that claims one of them, and not heard before the first is gone; or *estranged*, because its storage is not the one with
+which one of them was met (`link.Memory`). Two hosts are connected when each hears the other: what one of them refuses
+the other has to know before it moves anything, and so does the person who has started it. Whoever is heard stays heard
+while it is there.
 
-What carries claims and answers is the link's; this only knows what follows from them.
+Claims and answers of one host may come in any order, and so may those of several. What carries them is the link's; this
+only knows what follows from them.
+
+Rejected: a claim and an answer for each machine. A host could then be known by one machine before another one shows
+that it is to be refused, and would be remembered by that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
@@ -24,11 +30,24 @@ from firable.executor.links.link import (
 
 
 class Answer(StrEnum):
-    """What a host says to a process that claims a machine."""
+    """What a host says to another one that claims machines."""
 
     HEARD = "heard"
     SECOND = "second"
     ESTRANGED = "estranged"
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """An answer, and the machines of the other host that it is because of."""
+
+    answer: Answer
+    machines: tuple[str, ...]
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether the other host is heard."""
+        return self.answer is Answer.HEARD
 
 
 _JOINED: Final = "-"
@@ -45,100 +64,92 @@ def storage_of(session: str) -> str:
 
 
 class Claims:
-    """What the host of the machines `names` hears of others; `say` has an answer told, or taken back where it is None.
+    """Whom a host hears, and who hears it; `say` has a session told the answer to it, or that taken back by None."""
 
-    Who says it, and to whom: a machine and the session that claims it.
-    """
-
-    def __init__(
-        self, names: Sequence[str], listener: LinkListener, say: Callable[[str, str, Answer | None], None]
-    ) -> None:
-        self.names = names
+    def __init__(self, listener: LinkListener, say: Callable[[str, Said | None], None]) -> None:
         self.listener = listener
         self.say = say
-        self.sessions: dict[str, list[str]] = {}
-        """For each machine the sessions that claim it, in the order in which they came."""
-        self.given: dict[tuple[str, str], Answer] = {}
-        """What was answered, to a machine of a session."""
-        self.taken: dict[str, dict[str, Answer]] = {}
-        """What each session has answered, to the machines here."""
+        self.machines: dict[str, tuple[str, ...]] = {}
+        """What each session claims, in the order in which they came."""
+        self.given: dict[str, Said] = {}
+        """What each session is answered."""
+        self.taken: dict[str, Said] = {}
+        """What each session answers, if it does."""
         self.reached: dict[str, str] = {}
         """For each machine that is connected its session."""
-        self.told: set[tuple[str, str]] = set()
-        """The machines and sessions of which it was told that they refuse this host."""
+        self.told: dict[str, Said] = {}
+        """What sessions answer that refuse this host, as it was told."""
 
-    def claimed(self, machine: str, session: str) -> None:
-        """A session claims a machine."""
-        sessions = self.sessions.setdefault(machine, [])
-        if session not in sessions:
-            sessions.append(session)
-        for claimed in self._claimed_by(session):
-            self._settle(claimed)
+    def claimed(self, session: str, machines: Sequence[str]) -> None:
+        """A session claims its machines."""
+        self.machines[session] = tuple(machines)
+        self._settle()
 
-    def given_up(self, machine: str, session: str) -> None:
-        """A session is gone, or claims a machine no more."""
-        if session in self.sessions.get(machine, ()):
-            self.sessions[machine].remove(session)
-        if self.given.pop((machine, session), None) is not None:
-            self.say(machine, session, None)
-        self.told.discard((machine, session))
-        self._settle(machine)
-
-    def answered(self, own: str, session: str, answer: Answer, *, taken_back: bool = False) -> None:
-        """A session has answered a machine here, or takes that answer back."""
-        answers = self.taken.setdefault(session, {})
-        if not taken_back:
-            answers[own] = answer
-        elif answers.get(own) is answer:  # and no newer one
-            del answers[own]
-        if not answers:
-            del self.taken[session]
-        for machine in self._claimed_by(session):
-            self._settle(machine)
-
-    def _settle(self, machine: str) -> None:
-        heard = ""
-        for session in self.sessions.get(machine, ()):
-            answer = Answer.SECOND if heard else self._answer(session)
-            heard = session if answer is Answer.HEARD else heard
-            self._give(machine, session, answer)
-            self._told_against(machine, session)
-        answers = self.taken.get(heard, {})
-        reached = heard if all(answers.get(own) is Answer.HEARD for own in self.names) else ""
-        if (was := self.reached.get(machine, "")) != reached:
-            if was:
-                del self.reached[machine]
-                self.listener.lost(machine)
-            if reached:
-                self.reached[machine] = reached
-                self.listener.connected(machine, storage_of(reached))
-
-    def _claimed_by(self, session: str) -> list[str]:
-        return [machine for machine, sessions in self.sessions.items() if session in sessions]
-
-    def _answer(self, session: str) -> Answer:
-        theirs = Memory(storage_of(session))
-        is_another = theirs.met_otherwise(self._claimed_by(session), by=self.listener.memory)
-        return Answer.ESTRANGED if is_another else Answer.HEARD
-
-    def _give(self, machine: str, session: str, answer: Answer) -> None:
-        if self.given.get((machine, session)) is answer:
+    def given_up(self, session: str) -> None:
+        """A session is gone."""
+        if session not in self.machines:
             return
-        self.given[machine, session] = answer
-        self.say(machine, session, answer)
-        if answer is not Answer.HEARD:
-            why = run_by_two if answer is Answer.SECOND else come_back_without
-            self.listener.refused(machine, why([machine]))
+        self._connect(session, is_connected=False)
+        del self.machines[session], self.given[session]
+        self.told.pop(session, None)
+        self.say(session, None)
+        self._settle()
 
-    def _told_against(self, machine: str, session: str) -> None:
+    def answered(self, session: str, said: Said, *, taken_back: bool = False) -> None:
+        """A session has answered this host, or takes that answer back."""
+        if not taken_back:
+            self.taken[session] = said
+        elif self.taken.get(session) == said:  # and no newer one
+            del self.taken[session]
+        self._settle()
+
+    def _settle(self) -> None:
+        for session in self.machines:
+            self._give(session, self._answer(session))
+            taken = self.taken.get(session)
+            both = self.given[session].is_heard and taken is not None and taken.is_heard
+            self._connect(session, is_connected=both)
+            self._tell_against(session, taken)
+
+    def _answer(self, session: str) -> Said:
+        given = self.given.get(session)
+        if given is not None and given.is_heard:
+            return given
+        machines = self.machines[session]
+        heard = {name for other, said in self.given.items() if said.is_heard for name in self.machines[other]}
+        if second := [name for name in machines if name in heard]:
+            return Said(Answer.SECOND, tuple(second))
+        if estranged := Memory(storage_of(session)).met_otherwise(machines, by=self.listener.memory):
+            return Said(Answer.ESTRANGED, tuple(estranged))
+        return Said(Answer.HEARD, machines)
+
+    def _give(self, session: str, said: Said) -> None:
+        if self.given.get(session) == said:
+            return
+        self.given[session] = said
+        self.say(session, said)
+        if not said.is_heard:
+            why = run_by_two if said.answer is Answer.SECOND else come_back_without
+            for name in self.machines[session]:
+                self.listener.refused(name, why(said.machines))
+
+    def _connect(self, session: str, *, is_connected: bool) -> None:
+        for name in self.machines[session]:
+            if is_connected and name not in self.reached:
+                self.reached[name] = session
+                self.listener.connected(name, storage_of(session))
+            elif not is_connected and self.reached.get(name) == session:
+                del self.reached[name]
+                self.listener.lost(name)
+
+    def _tell_against(self, session: str, taken: Said | None) -> None:
         """Tell that a session refuses this host, once, unless it is refused itself."""
-        answers = self.taken.get(session, {})
-        against = [own for own, answer in answers.items() if answer is not Answer.HEARD]
-        if not against:
-            self.told.discard((machine, session))
-        elif self.given[machine, session] is Answer.HEARD and (machine, session) not in self.told:
-            self.told.add((machine, session))
-            if estranged := [own for own in against if answers[own] is Answer.ESTRANGED]:
-                self.listener.disowned(machine, known_otherwise(estranged, machine))
-            else:
-                self.listener.refused(machine, run_by_two(against))
+        if taken is None or taken.is_heard:
+            self.told.pop(session, None)
+        elif self.given[session].is_heard and self.told.get(session) != taken:
+            self.told[session] = taken
+            for name in self.machines[session]:
+                if taken.answer is Answer.ESTRANGED:
+                    self.listener.disowned(name, known_otherwise(taken.machines, name))
+                else:
+                    self.listener.refused(name, run_by_two(taken.machines))

@@ -3,13 +3,13 @@
 A greeting is a *liveliness token*, which Zenoh shows to every peer and takes back when the session ends, its TCP
 connection breaks or its lease is over. Its key says all that the greeting has to:
 
-    firable/VERSION/DIGEST/alive/NAME/SESSION            a machine is there
-    firable/VERSION/DIGEST/heard/NAME/SESSION/by/SESSION/ANSWER    it is heard by that host, or is not and why
-    firable/VERSION/DIGEST/to/NAME/SESSION/from/NAME/SESSION    a message
+    firable/VERSION/DIGEST/alive/NAMES/SESSION                     a host is there, with these machines
+    firable/VERSION/DIGEST/heard/SESSION/by/SESSION/ANSWER/NAMES   it is heard by that one, or is not, and why
+    firable/VERSION/DIGEST/to/NAME/SESSION/from/NAME/SESSION       a message
 
 Keys of messages bear version, digest and both sessions, so that nothing of another bundle, or meant for the process
 that ran the machine before, is even routed. A SESSION is Zenoh's identity of it and the storage of its host (`Memory`).
-Two hosts are connected when each has answered all machines of the other that it hears them: what one refuses, the other
+Two hosts are connected when each has answered the other that it hears it (`claims.py`): what one refuses, the other
 must know, before anything moves there. Of two hosts that claim one machine the first is heard and the other
 refused; where the first is dead and nobody has noticed yet, the second takes its place when the lease is over.
 
@@ -42,7 +42,7 @@ from urllib.parse import quote, unquote
 
 import zenoh
 
-from firable.executor.links.claims import Answer, Claims, session_of
+from firable.executor.links.claims import Answer, Claims, Said, session_of
 from firable.executor.links.encoding import EncodingError, decode, encode
 from firable.executor.links.lending import LendingLoop
 from firable.executor.links.link import COORDINATOR, Arrival, Greeting, LinkListener, cannot_open, objection
@@ -55,6 +55,7 @@ LEASE_SECONDS: Final = 1.0
 
 _OPENING_SECONDS: Final = 2.0
 _NAMELESS: Final = "%"  # which no name is quoted to
+_AND: Final = ","  # which is in no quoted name
 _REST: Final = "**"
 
 
@@ -89,8 +90,8 @@ class ZenohLink:
         self.identity = ""
         self.broken: asyncio.Future[None] | None = None
         self.claims: Claims | None = None
-        self.answers: dict[tuple[str, str], Any] = {}  # tokens, the end of which Zenoh gives no type
-        """To a machine of a session."""
+        self.answers: dict[str, Any] = {}  # tokens, the end of which Zenoh gives no type
+        """What each session is answered."""
         self.publishers: dict[tuple[str, str, str], zenoh.Publisher] = {}
         """For each sender here, receiver and session of the receiver."""
         self.damaged = 0
@@ -109,7 +110,7 @@ class ZenohLink:
             raise cannot_open(", ".join((*self.listen, *self.join)), str(error).partition(" at /")[0]) from None
         self.session, self.listener = session, listener
         self.identity = session_of(str(session.info.zid()), listener.memory.storage)
-        self.claims = Claims(self.greeting.names, listener, self._answer)
+        self.claims = Claims(listener, self._answer)
         self.lending = loop if isinstance(loop, LendingLoop) else None
         try:
             ours, tokens = self._ours(), session.liveliness()
@@ -117,9 +118,8 @@ class ZenohLink:
             for name in self.greeting.names:
                 at = f"{ours}/to/{_spelled(name)}/{self.identity}/{_REST}"
                 kept.append(session.declare_subscriber(at, lambda s: self._on(loop, s, is_message=True)))
-            for name in self.greeting.names:
-                kept.append(tokens.declare_token(f"{ours}/alive/{_spelled(name)}/{self.identity}"))
-            for heard in (f"{ours}/heard/*/{self.identity}/by/*/*", "firable/*/*/alive/*/*"):
+            kept.append(tokens.declare_token(f"{ours}/alive/{_all_spelled(self.greeting.names)}/{self.identity}"))
+            for heard in (f"{ours}/heard/{self.identity}/by/*/*/*", "firable/*/*/alive/*/*"):
                 take = partial(self._on, loop, is_message=False)
                 kept.append(tokens.declare_subscriber(heard, take, history=True))
             self.broken = loop.create_future()
@@ -243,26 +243,31 @@ class ZenohLink:
             self.listener.arrived_together(came)
 
     def _host(self, listener: LinkListener, claims: Claims, key: str, gone: bool) -> None:
-        _, version, digest, what, name, session, *by = key.split("/")
+        _, version, digest, what, *rest = key.split("/")
         if what == "heard":
+            _, _, by, answer, machines = rest
             with suppress(ValueError):  # no answer that there is
-                claims.answered(_read(name), by[1], Answer(by[2]), taken_back=gone)
-        elif session != self.identity:
-            peer = _read(name)
-            greeting = Greeting(_read(digest), (peer,), int(version) if version.isdecimal() else -1)
-            if (problem := objection(self.greeting, greeting)) is None:
-                (claims.given_up if gone else claims.claimed)(peer, session)
-            elif not gone:
-                listener.refused(peer, problem)
+                claims.answered(by, Said(Answer(answer), _all_read(machines)), taken_back=gone)
+        elif rest[1] != self.identity:
+            machines, session = rest
+            greeting = Greeting(_read(digest), _all_read(machines), int(version) if version.isdecimal() else -1)
+            if (problem := objection(self.greeting, greeting)) is not None:
+                for name in greeting.names if not gone else ():
+                    listener.refused(name, problem)
+            elif gone:
+                claims.given_up(session)
+            else:
+                claims.claimed(session, greeting.names)
         self.publishers = {to: kept for to, kept in self.publishers.items() if claims.reached.get(to[1]) == to[2]}
 
-    def _answer(self, machine: str, session: str, answer: Answer | None) -> None:
-        """Say to a machine of a session whether it is heard, in place of what was said before."""
-        if (said := self.answers.pop((machine, session), None)) is not None:
-            said.undeclare()
-        if answer is not None and self.session is not None:
-            key = f"{self._ours()}/heard/{_spelled(machine)}/{session}/by/{self.identity}/{answer}"
-            self.answers[machine, session] = self.session.liveliness().declare_token(key)
+    def _answer(self, session: str, said: Said | None) -> None:
+        """Say to a session whether it is heard, in place of what was said before."""
+        if (before := self.answers.pop(session, None)) is not None:
+            before.undeclare()
+        if said is not None and self.session is not None:
+            answer = f"{said.answer}/{_all_spelled(said.machines)}"
+            key = f"{self._ours()}/heard/{session}/by/{self.identity}/{answer}"
+            self.answers[session] = self.session.liveliness().declare_token(key)
 
     def _message(self, key: str, payload: bytes, gone: bool) -> Sequence[Arrival]:
         receiver, peer, session = _parsed(key)
@@ -310,3 +315,11 @@ def _spelled(name: str) -> str:
 
 def _read(spelled: str) -> str:
     return COORDINATOR if spelled == _NAMELESS else unquote(spelled)
+
+
+def _all_spelled(names: Sequence[str]) -> str:
+    return _AND.join(map(_spelled, names))
+
+
+def _all_read(spelled: str) -> tuple[str, ...]:
+    return tuple(map(_read, spelled.split(_AND)))

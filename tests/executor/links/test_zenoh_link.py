@@ -88,6 +88,25 @@ def test_of_two_hosts_with_one_name_the_first_is_heard_until_it_ends() -> None:
     asyncio.run(main())
 
 
+def test_a_second_host_is_known_by_none_of_its_machines() -> None:
+    """Or the right host of the others, started when the mistake is seen, would be refused."""
+
+    async def main() -> None:
+        at = f"tcp/127.0.0.1:{free_port()}"
+        more = replace(ROBOT, names=("robot", "mc"))
+        first = running(ZenohLink(ROBOT, join=[at]), Memory("r1"))
+        async with running(ZenohLink(CENTRE, listen=[at])) as centre, first:
+            await centre.until_told(("connected", "robot"))
+            async with running(ZenohLink(more, join=[at]), Memory("r1")) as second:
+                await second.until_told(("refused", COORDINATOR))
+                await asyncio.sleep(0.2)
+                assert ("connected", "mc") not in centre.told
+            async with running(ZenohLink(replace(ROBOT, names=("mc",)), join=[at])):
+                await centre.until_told(("connected", "mc"))
+
+    asyncio.run(main())
+
+
 def test_what_a_stranger_publishes_is_not_delivered() -> None:
     async def main() -> None:
         port = free_port()

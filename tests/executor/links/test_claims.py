@@ -1,0 +1,189 @@
+"""Hosts that claim machines and answer each other, with everything that is said delivered in any order of senders."""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from hypothesis import given
+from hypothesis import strategies as st
+from support.examples import examples
+
+from firable.executor.links.claims import Claims, Said, session_of
+from firable.executor.links.link import Arrival, Memory
+from firable.executor.protocol.messages import Message
+from firable.nets.diagnostics import Diagnostic
+
+
+class Party:
+    """A host, and what it was told."""
+
+    def __init__(self, wires: Wires, number: int, names: tuple[str, ...], memory: Memory) -> None:
+        self.wires = wires
+        self.names = names
+        self.session = session_of(f"p{number}", memory.storage)
+        self.memory = memory
+        self.before = memory
+        """What it remembered when it was started."""
+        self.connected_to: dict[str, str] = {}
+        self.was_connected: list[str] = []
+        self.disowned_by: set[str] = set()
+        self.refusals: list[tuple[str, Diagnostic]] = []
+        self.claims = Claims(self, self.say)
+
+    def say(self, session: str, said: Said | None) -> None:
+        self.wires.tell(self, session, said)
+
+    def arrived_together(self, messages: Sequence[Arrival]) -> None: ...
+
+    def arrived(self, sender: str, receiver: str, message: Message) -> None: ...
+
+    def connected(self, peer: str, storage: str) -> None:
+        assert peer not in self.connected_to
+        self.connected_to[peer] = storage
+        self.was_connected.append(peer)
+        self.memory = Memory(self.memory.storage, {peer: storage, **self.memory.known})
+
+    def lost(self, peer: str) -> None:
+        del self.connected_to[peer]
+
+    def refused(self, peer: str, problem: Diagnostic) -> None:
+        self.refusals.append((peer, problem))
+
+    def disowned(self, peer: str, problem: Diagnostic) -> None:
+        self.refusals.append((peer, problem))
+        self.disowned_by.add(peer)
+
+
+class Wires:
+    """One from each host to each other one: what is said on it comes in its order, and to that of others in none."""
+
+    def __init__(self, dice: random.Random) -> None:
+        self.dice = dice
+        self.started = 0
+        self.parties: list[Party] = []
+        self.wires: dict[tuple[str, str], deque[Callable[[], None]]] = {}
+        self.standing: dict[tuple[str, str], Said] = {}
+        """What each session was told last by another one, on its wire or heard."""
+
+    def start(self, names: tuple[str, ...], memory: Memory) -> Party:
+        self.started += 1
+        party = Party(self, self.started, names, memory)
+        for other in self.parties:
+            if not set(other.names) & set(names):  # or each is refused by the other, and not claimed
+                for one, its in ((party, other), (other, party)):
+                    self.wire(one, its).append(partial(its.claims.claimed, one.session, one.names))
+        self.parties.append(party)
+        return party
+
+    def tell(self, by: Party, session: str, said: Said | None) -> None:
+        to = next((party for party in self.parties if party.session == session), None)
+        if to is None:
+            return
+        before = self.standing.pop((by.session, session), None)
+        if before is not None:
+            self.wire(by, to).append(partial(to.claims.answered, by.session, before, taken_back=True))
+        if said is not None:
+            self.standing[by.session, session] = said
+            self.wire(by, to).append(partial(to.claims.answered, by.session, said))
+
+    def end(self, party: Party) -> None:
+        self.parties.remove(party)
+        for other in self.parties:
+            self.wires.pop((other.session, party.session), None)
+            last = [partial(other.claims.given_up, party.session)]
+            if (said := self.standing.pop((party.session, other.session), None)) is not None:
+                last.append(partial(other.claims.answered, party.session, said, taken_back=True))
+            self.dice.shuffle(last)  # who tells of the end of a session tells in any order what ends with it
+            self.wire(party, other).extend(last)
+
+    def wire(self, by: Party, to: Party) -> deque[Callable[[], None]]:
+        return self.wires.setdefault((by.session, to.session), deque())
+
+    def deliver(self, most: int) -> None:
+        for _ in range(most):
+            busy = [wire for wire in self.wires.values() if wire]
+            if not busy:
+                return
+            self.dice.choice(busy).popleft()()
+
+    def all_delivered(self) -> None:
+        self.deliver(10_000)
+        assert not any(self.wires.values())
+
+
+def fit(one: Party, other: Party) -> bool:
+    """Whether neither has met the other by another storage, and they do not run the same machine."""
+    met = other.memory.met_otherwise(other.names, by=one.memory) or one.memory.met_otherwise(one.names, by=other.memory)
+    return not met and not set(one.names) & set(other.names)
+
+
+DICE = st.integers(0, 10**6).map(random.Random)
+MEMORIES = st.lists(
+    st.dictionaries(st.sampled_from(["a", "b", "c", "d"]), st.sampled_from(["s0", "s1", "s2"])), min_size=3, max_size=3
+)
+
+
+@examples(200)
+@given(DICE, MEMORIES, st.lists(st.integers(0, 8), min_size=1, max_size=6))
+def test_hosts_of_different_machines_end_connected_exactly_if_none_knows_another_otherwise(
+    dice: random.Random, memories: list[dict[str, str]], pauses: list[int]
+) -> None:
+    """Whatever is delivered first, and however often they were ended and started again meanwhile."""
+    wires, all_names = Wires(dice), (("a", "b"), ("c",), ("d",))
+    now = [wires.start(names, Memory(f"s{i}", memories[i])) for i, names in enumerate(all_names)]
+    for pause in pauses:
+        wires.deliver(pause)
+        number = dice.randrange(3)
+        wires.end(now[number])
+        wires.deliver(dice.randrange(4))
+        now[number] = wires.start(now[number].names, now[number].memory)
+    wires.all_delivered()
+    for one in now:
+        for other in now:
+            if one is not other:
+                is_connected = {name in one.connected_to for name in other.names}
+                assert is_connected == {fit(one, other)}
+                estranged = bool(one.before.met_otherwise(one.names, by=other.before))
+                if estranged and not other.before.met_otherwise(other.names, by=one.before):
+                    assert one.disowned_by >= set(other.names)
+                    assert other.refusals
+
+
+@examples(100)
+@given(DICE, st.integers(0, 12))
+def test_of_two_hosts_with_a_machine_in_common_one_is_connected_and_the_other_when_that_is_gone(
+    dice: random.Random, most: int
+) -> None:
+    """And nothing of the other one is connected, nor remembered, before."""
+    wires = Wires(dice)
+    centre = wires.start(("c",), Memory("s0"))
+    one, both = wires.start(("a",), Memory("s1")), wires.start(("a", "b"), Memory("s1"))
+    wires.deliver(most)
+    wires.all_delivered()
+    (heard,) = [party for party in (one, both) if party.connected_to]
+    (other,) = [party for party in (one, both) if party is not heard]
+    assert centre.connected_to.keys() == set(heard.names)
+    assert centre.memory.known.keys() == set(heard.names)
+    assert centre.was_connected == list(heard.names)
+    assert not other.was_connected
+    assert {problem.message for _, problem in other.refusals} == {"'a' is run by two hosts"}
+    wires.end(heard)
+    wires.all_delivered()
+    assert centre.connected_to.keys() == set(other.names)
+    assert other.connected_to.keys() == {"c"}
+
+
+@examples(50)
+@given(DICE)
+def test_a_host_that_is_refused_for_one_machine_is_never_known_by_another(dice: random.Random) -> None:
+    wires = Wires(dice)
+    centre = wires.start(("c",), Memory("s0", {"b": "s1"}))
+    stranger = wires.start(("a", "b"), Memory("s2"))
+    wires.all_delivered()
+    assert not centre.was_connected
+    assert not stranger.was_connected
+    assert centre.memory.known == {"b": "s1"}
+    assert stranger.disowned_by == {"c"}
