@@ -47,7 +47,7 @@ class Greeting:
 class Memory:
     """What hosts know each other by: what this host's stable storage is called, and those of the machines it has met.
 
-    A storage is called by a random name from when it is made, and outlives what it is called by no process.
+    A storage gets its name, at random, when it is made. That of a host without a journal is gone with its process.
     """
 
     storage: str = ""

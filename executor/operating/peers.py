@@ -11,9 +11,11 @@ decide, and an idle cell would talk for ever. As soon as something new is said t
 is back is told at once.
 
 *Memory*: a host keeps by which storage it met each machine, and is refused, or refuses, where that is another (F5025).
-It keeps it before anything leaves that rests on what the machine said. Until it has met one of those that its machines
-talk to, ever, nothing moves here: a journal that was mistyped or left out looks like the first start of a cell, and
-only the others know better. If they do before anybody else was met, this host ends: its places of the start are wrong.
+It keeps it before anything leaves that rests on what the machine said, and what its own storage is called before
+anybody is told that. Until it has met one of those that its machines talk to, or where they talk to nobody any other
+host, ever, nothing moves here: a journal that was mistyped or left out looks like the first start of a cell, and
+only the others know better. If they do before that, or before anybody was met since this host was started, it ends:
+its places of the start are wrong.
 
 Where all machines are on one host there are no others, and this does nothing.
 """
@@ -24,6 +26,7 @@ import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
+from firable.executor.journal.journal import sync_now
 from firable.executor.journal.memory import HOSTS, keeping, remembered
 from firable.executor.links.link import Arrival, Link, Memory, called
 from firable.executor.operating.acts import Acts
@@ -72,9 +75,11 @@ class Peers:
         }
         self.needed = tuple(sorted((deciding | voting) - here))
         """Those that some machine here talks to."""
-        self.memory = remembered(acts.journal.kept(HOSTS))
-        if link is not None:
-            acts.remember(HOSTS, keeping(self.memory))
+        kept = acts.journal.kept(HOSTS)
+        self.memory = remembered(kept)
+        if link is not None and not kept:
+            acts.journal.write(HOSTS, keeping(self.memory))
+            sync_now(acts.journal)
         self.connected_to: set[str] = set()
         self.met: set[str] = set()
         self.turned_away: dict[str, str] = {}
@@ -85,8 +90,9 @@ class Peers:
 
     @property
     def is_unmet(self) -> bool:
-        """Whether nobody that the machines here talk to was ever met: then nothing moves here."""
-        return self.link is not None and bool(self.needed) and self.memory.known.keys().isdisjoint(self.needed)
+        """Whether nobody who could know better was ever met: then nothing moves here."""
+        others = self.needed or self.names
+        return self.link is not None and bool(others) and self.memory.known.keys().isdisjoint(others)
 
     async def run(self) -> None:
         """Be linked to them until cancelled; raises `InputError` where the link cannot be opened, or fails."""
@@ -194,9 +200,9 @@ class Peers:
         self._turn_away(peer, f"{called(peer)} is refused", problem)
 
     def disowned(self, peer: str, problem: Diagnostic) -> None:
-        """A host knows a machine here by another storage: if nobody was met before, this host knows nothing of it."""
+        """A host knows a machine here by another storage: where nobody has shown that this one is right, it ends."""
         self._turn_away(peer, f"{called(peer)} refuses this host", problem)
-        if not self.met:
+        if self.is_unmet or not self.met:
             self.end(InputError([problem]))
 
     def _turn_away(self, peer: str, what: str, problem: Diagnostic) -> None:

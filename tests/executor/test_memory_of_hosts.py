@@ -1,6 +1,7 @@
 """Hosts remember each other's journals: one that comes back without its own is refused, and moves nothing."""
 
 import asyncio
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,10 @@ from firable.decompose import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
 from firable.executor.drivers.dry_run import DryRunDriver
 from firable.executor.journal.journal import Journal, MemoryJournal
+from firable.executor.journal.memory import HOSTS, keeping
 from firable.executor.journal.sqlite_journal import SqliteJournal
 from firable.executor.links.in_process import Exchange, InProcessLink
-from firable.executor.links.link import COORDINATOR, Greeting
+from firable.executor.links.link import COORDINATOR, Greeting, Memory
 from firable.executor.operating.host import Host
 from firable.executor.operating.recorder import Recorder
 from firable.executor.operating.situation import Situation, State
@@ -33,6 +35,19 @@ transitions:
   hand: {from: [a.lamp, b.idle], to: [a.over, b.has]}
 """)
 )
+
+LAMP = """\
+firable: 1
+cell: cell
+controllers:
+  a: {start: free, places: {free: , over: }}
+  b: {start: idle, places: {idle: , has: }}
+  c: {start: dark, places: {dark: , lit: {send: {machine: C, command: SHINE}}}}
+transitions:
+  hand: {from: [a.free, b.idle], to: [a.over, b.has]}
+  light: {from: c.dark, to: c.lit}
+"""
+"""c talks to nobody."""
 
 
 class Counting(DryRunDriver):
@@ -194,3 +209,56 @@ def test_what_a_host_remembers_outlives_it_in_its_journal(tmp_path: Path) -> Non
         again.close()
 
     asyncio.run(main())
+
+
+def test_what_a_journal_is_called_is_stored_before_anybody_is_told(tmp_path: Path) -> None:
+    """Or a host that is killed as soon as it was met would come back by another name, and be refused."""
+    path = tmp_path / "a.journal"
+    with closing(SqliteJournal(path, "d", ("a",))) as journal:
+        called = Hosts().host(("a",), journal).peers.memory.storage  # and here it is killed
+    with closing(SqliteJournal(path, "d", ("a",))) as journal:
+        assert Hosts().host(("a",), journal).peers.memory.storage == called
+
+
+def test_a_host_whose_machines_talk_to_nobody_moves_nothing_either_before_another_host_is_met() -> None:
+    async def main() -> None:
+        alone = split(parse_net(LAMP))
+        exchange, driver = Exchange(), Counting([alone.subnet("c")], 1.0)
+
+        def host(*machines: str) -> Host:
+            link = InProcessLink(exchange, Greeting("d", machines))
+            recorder = Recorder(alone.net, "", None, None, machines)
+            devices = driver if machines == ("c",) else DryRunDriver([], 1.0)
+            return Host(alone, devices, recorder, machines=machines, link=link)
+
+        tasks = [asyncio.create_task(host("c").main())]
+        await asyncio.sleep(10)
+        assert driver.sent == 0
+        tasks.append(asyncio.create_task(host("a", "b", COORDINATOR).main()))
+        await asyncio.sleep(3)
+        assert driver.sent > 0
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks)
+
+    run_in_virtual_time(main())
+
+
+def test_a_host_that_has_met_only_those_who_cannot_know_it_ends_when_one_does() -> None:
+    async def main() -> None:
+        hosts, memory = Hosts(), MemoryJournal()
+        memory.write(HOSTS, keeping(Memory("of the coordinator", {"a": "of another journal"})))
+        run = hosts.host(("a",), MemoryJournal())
+        ending = asyncio.create_task(run.main())
+        tasks = [asyncio.create_task(hosts.host(("b",), MemoryJournal()).main())]
+        await asyncio.sleep(3)
+        assert run.peers.met == {"b"}
+        assert hosts.driver.sent == 0
+        tasks.append(asyncio.create_task(hosts.host((COORDINATOR,), memory).main()))
+        assert (await refusal(ending)).code == "F5025"
+        assert hosts.driver.sent == 0
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks)
+
+    run_in_virtual_time(main())
