@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
@@ -58,8 +59,9 @@ def takeover(
     """
     from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of
     from firable.executor.journal.takeover import dealt_out, take_over
+    from firable.executor.operating.hosting import machines_of as hosted
     from firable.executor.operating.running import load
-    from firable.executor.protocol.deciders import coordinators
+    from firable.executor.protocol.deciders import TOP, coordinators
     from firable.nets.bundle import read_bundle
     from firable.nets.writing import write_whole
 
@@ -68,8 +70,7 @@ def takeover(
     for bundle in (old, new):
         refuse_a_net(bundle, "a cell is taken over from bundle to bundle")
     before, after = read_bundle(old), load(new)
-    for file in journals:
-        _refuse_missing(file)
+    _refuse_missing(journals)
     _refuse_standing(into)
     deciding = coordinators(after.decomposition)
     machines = {file: machines_of(file) for file in journals}
@@ -77,11 +78,12 @@ def takeover(
     for file, names in machines.items():
         with closing(SqliteJournal(file, before.digest, names)) as read:
             kept |= {name: dict(read.kept(name)) for name in names}
-    dealt = dealt_out(
-        machines,
-        [*coordinators(before.decomposition), *(subnet.name for subnet in before.decomposition.subnets)],
-        [*deciding, *(subnet.name for subnet in after.decomposition.subnets)],
-    )
+    everything = [*coordinators(before.decomposition), *(subnet.name for subnet in before.decomposition.subnets)]
+    controllers = dealt_out(machines, everything, [subnet.name for subnet in after.decomposition.subnets])
+    at_top = [file for file, names in machines.items() if TOP in names and after.net.coordinator is None]
+    dealt = {file: hosted(after.net, names, coordinator=file in at_top) for file, names in controllers.items()}
+    if len(journals) == 1:
+        dealt = {file: (*deciding, *names) for file, names in controllers.items()}
     moved = take_over(before.decomposition, after.decomposition, kept, deciding)
     _demand_reachable(after.net, moved.marking, budget(max_markings, max_memory, max_seconds))
     targets = dict(zip(journals, into, strict=True))
@@ -94,7 +96,8 @@ def takeover(
     click.echo("  begun anew: whose turn it is where arbiters alternate; what sensors show is read at the start")
     for file, names in dealt.items():
         if names:
-            host = "".join(f" --controller {name}" for name in names if name not in deciding) if len(dealt) > 1 else ""
+            host = "".join(f" --controller {name}" for name in controllers[file]) if len(dealt) > 1 else ""
+            host += " --coordinator" if len(dealt) > 1 and file in at_top else ""
             with_what = "its links, and the binding" if len(dealt) > 1 else "the plant or binding"
             click.echo(f"  next: firable run {new}{host} --journal {targets[file]}, with {with_what} of the cell")
         else:
@@ -119,8 +122,8 @@ def _write(journals: Mapping[str, Sequence[str]], digest: str, moved: Takeover) 
             written = Path(aside, str(number))
             others = Memory(storages[file], {name: storage for name, storage in of.items() if name not in names})
             with closing(SqliteJournal(written, digest, names)) as journal:
-                for name in names:
-                    journal.write(name, [Keep(key, value) for key, value in moved.kept[name].items()])
+                for name in names:  # of a coordinator that decides nothing there is nothing to keep
+                    journal.write(name, [Keep(key, value) for key, value in moved.kept.get(name, {}).items()])
                 if others.known:
                     journal.write(HOSTS, keeping(others))
                 sync_now(journal)
@@ -159,13 +162,17 @@ def _reachable(net: Net, marking: tuple[str, ...], allowed: Budget) -> Verdict:
     return check(asked, budget=allowed).verdict(f"property.{_ASKED}")
 
 
-def _refuse_missing(journal: str) -> None:
+def _refuse_missing(journals: Sequence[str]) -> None:
     from firable.nets.diagnostics import Diagnostic, InputError
     from firable.nets.source import printable
 
-    if not Path(journal).is_file():
-        message = f"{printable(journal)}: there is no journal"
-        raise InputError([Diagnostic("F1001", message, "name the file that `firable run OLD --journal` wrote")])
+    for file in journals:
+        if _is_twice(file, journals):
+            message = f"{printable(file)}: the journal is named twice"
+            raise InputError([Diagnostic("F5050", message, "name one journal for each host, that of its last run")])
+        if not Path(file).is_file():
+            message = f"{printable(file)}: there is no journal"
+            raise InputError([Diagnostic("F1001", message, "name the file that `firable run OLD --journal` wrote")])
 
 
 def _refuse_standing(into: Sequence[str]) -> None:
@@ -174,8 +181,18 @@ def _refuse_standing(into: Sequence[str]) -> None:
 
     for file in into:
         message = f"{printable(file)}: a file stands there, and may be the journal of a cell"
-        if into.count(file) > 1:
+        hint = "name another file"
+        if _is_twice(file, into):
             message = f"{printable(file)}: two journals would be written there"
+        elif Path(f"{file}-wal").exists():  # SQLite would take it for the end of the new one
+            message = f"{printable(file)}-wal: what an earlier journal of that name has left stands there"
+            hint = "name another file, or remove that one with its journal"
         elif not Path(file).exists():
             continue
-        raise InputError([Diagnostic("F1017", message, "name another file")])
+        raise InputError([Diagnostic("F1017", message, hint)])
+
+
+def _is_twice(file: str, files: Sequence[str]) -> bool:
+    """Whether files are one, however they are spelled."""
+    places = [os.path.realpath(each) for each in files]
+    return places.count(os.path.realpath(file)) > 1

@@ -78,10 +78,11 @@ def take_over(
 def dealt_out(
     journals: Mapping[str, tuple[str, ...]], old: Iterable[str], new: Iterable[str]
 ) -> dict[str, tuple[str, ...]]:
-    """For each journal of the old cell, with its machines, the machines of the new cell that go on from it.
+    """For each journal of the old cell, with its machines, the controllers of the new cell that go on from it.
 
-    A machine stays where it is; what only the new cell has goes to the journal of the whole cell, if there is one.
-    Raises `InputError` F5050 where a machine of the old cell is in no journal or in two, or one of the new has no host.
+    A controller stays where it is; one that only the new cell has goes to the journal of the whole cell, if there is
+    one. Raises `InputError` F5050 where a machine of the old cell is in no journal or in two, or a controller of the
+    new one has no host.
     """
     problems, names = [], tuple(new)
     for name in old:

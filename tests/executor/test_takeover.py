@@ -12,7 +12,7 @@ from firable.cli.main import main
 from firable.decompose.splitting.cut import split
 from firable.executor.journal.journal import sync_now
 from firable.executor.journal.memory import HOSTS, remembered
-from firable.executor.journal.sqlite_journal import SqliteJournal
+from firable.executor.journal.sqlite_journal import SqliteJournal, machines_of
 from firable.executor.journal.takeover import take_over
 from firable.executor.links.link import COORDINATOR, Memory
 from firable.executor.protocol.controller import LocalController
@@ -299,6 +299,74 @@ def test_a_marking_is_taken_over_whole_from_one_journal_for_each_machine(
     assert main([*takeover, *same]) == 2
     assert "two journals would be written there" in capsys.readouterr().err
     assert not list(tmp_path.glob("*.new*"))
+
+
+def test_a_journal_is_named_once_however_it_is_spelled(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    takeover = ["takeover", *map(str, bundles)]
+    whole = str(journal(tmp_path / "whole", bundles[0], {"robot.worked_out", "table.full"}))
+    assert (
+        main([*takeover, "--journal", whole, "--into", f"{whole}.1", "--journal", whole, "--into", f"{whole}.2"]) == 2
+    )
+    assert "error[F5050]: " in (said := capsys.readouterr().err)
+    assert "the journal is named twice" in said
+    same = hosts(bundles, tmp_path)
+    (tmp_path / "folder").mkdir()
+    same[-1] = str(tmp_path / "folder" / ".." / "robot.new")
+    assert main([*takeover, *same]) == 2
+    assert "two journals would be written there" in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.new*"))
+
+
+def test_what_a_killed_run_has_left_of_its_journal_is_not_taken_for_the_end_of_the_new_one(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = journal(tmp_path / "whole", bundles[0], {"robot.worked_out", "table.full"})
+    new = tmp_path / "new"
+    takeover = ["takeover", *map(str, bundles), "--journal", str(whole), "--into", str(new)]
+    assert main(takeover) == 0
+    names = (COORDINATOR, "line", "robot", "table")
+    with closing(SqliteJournal(new, read_bundle(bundles[1]).digest, names)) as running:
+        running.write("robot", [Keep("word", "1")])
+        sync_now(running)
+        left = Path(f"{new}-wal").read_bytes()  # it is killed here
+    for file in (new, Path(f"{new}.generation")):
+        file.unlink()
+    Path(f"{new}-wal").write_bytes(left)
+    assert main(takeover) == 2
+    assert f"error[F1017]: {new}-wal: what an earlier journal of that name has left" in capsys.readouterr().err
+    assert not new.exists()
+
+
+def coordinators_of(bundles: tuple[Path, Path], folder: Path) -> dict[str, tuple[str, ...]]:
+    """The machines of the journals of the hosts of the new cell, as a run of each opens them."""
+    read = read_bundle(bundles[1])
+    found = {}
+    for name in HOSTS_OF_OLD:
+        machines = machines_of(folder / f"{name}.new")
+        with closing(SqliteJournal(folder / f"{name}.new", read.digest, machines)):
+            found[name] = machines
+    return found
+
+
+def test_the_coordinator_goes_to_the_host_where_the_new_net_has_it(
+    bundles: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = OLD.replace("line: {coordinator: true, places: {}}", "line: {places: {}}")
+    other = other.replace("  robot:\n", "  robot:\n    coordinator: true\n")
+    new = (bundles[0], bundle(tmp_path, "other", other))
+    assert main(["takeover", *map(str, new), *hosts(new, tmp_path)]) == 0
+    assert coordinators_of(new, tmp_path) == {"system": ("line",), "robot": ("", "robot"), "table": ("table",)}
+    assert "--coordinator" not in capsys.readouterr().out
+    folder = tmp_path / "nobody"
+    folder.mkdir()
+    nobody = (bundles[0], bundle(folder, "nobody", OLD.replace("line: {coordinator: true, ", "line: {")))
+    assert main(["takeover", *map(str, nobody), *hosts(nobody, folder)]) == 0
+    assert coordinators_of(nobody, folder) == {"system": ("", "line"), "robot": ("robot",), "table": ("table",)}
+    told = capsys.readouterr().out
+    assert f"firable run {nobody[1]} --controller line --coordinator --journal {folder / 'system.new'}, with" in told
+    assert f"firable run {nobody[1]} --controller robot --journal {folder / 'robot.new'}, with" in told
 
 
 def test_a_controller_that_only_the_new_net_has_needs_a_host(
