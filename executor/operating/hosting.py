@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ssl
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -152,9 +152,9 @@ def _demand_certificates(authority: str, certificate: str, key: str) -> None:
 
 
 def own_net(decomposition: Decomposition, machines: Sequence[str]) -> Net:
-    """The places and signals of some machines: what their driver has to serve."""
+    """The places and signals of some machines, wherever those above them are: what their driver has to serve."""
     subnets = [subnet for subnet in decomposition.subnets if subnet.name in machines]
-    controllers = tuple(c for c in decomposition.net.controllers if c.name in machines)
+    controllers = tuple(replace(c, under=None) for c in decomposition.net.controllers if c.name in machines)
     places = tuple(place for subnet in subnets for place in subnet.places)
     signals = tuple(signal for subnet in subnets for signal in subnet.signals)
     return Net(decomposition.net.name, places, (), signals=signals, controllers=controllers)

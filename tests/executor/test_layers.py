@@ -15,7 +15,7 @@ from support.rehearsals import BAD, ORDERLY, rehearsed
 
 from firable.decompose.splitting.cut import split
 from firable.executor.cell.virtual_time import run_in_virtual_time
-from firable.executor.operating.hosting import SerialLine, machines_of, make_link
+from firable.executor.operating.hosting import SerialLine, machines_of, make_link, own_net
 from firable.executor.operating.running import execute
 from firable.executor.protocol.controller import LocalController
 from firable.executor.protocol.coordinator import Coordinator
@@ -270,3 +270,7 @@ def test_what_another_coordinator_says_in_its_name_is_dropped(tmp_path: Path) ->
         await cell.stop()
 
     run_in_virtual_time(main())
+
+
+def test_a_driver_serves_a_machine_whose_coordinator_is_on_another_host() -> None:
+    assert [controller.name for controller in own_net(TWO_CELLS, ["robot_a"]).controllers] == ["robot_a"]
