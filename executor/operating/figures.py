@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Protocol
 
 from firable.executor.protocol.messages import Message
@@ -10,6 +11,10 @@ from firable.semantics.trace import Event
 
 class Figures(Protocol):
     """A counter of what happens; it must not fail, and must not wait."""
+
+    def taken_up(self, marking: Collection[str]) -> None:
+        """The run goes on in this marking, after a restart."""
+        ...
 
     def seen(self, event: Event) -> None:
         """An event of the trace."""

@@ -120,6 +120,8 @@ class Host:
         self.turn = 0
         self.clock: RunClock | None = None
         self.begin(resume=resume)
+        if figures is not None and self.taking_up is not None:
+            figures.taken_up(self.marking)
         if isinstance(monitor, LocalMonitor):
             monitor.excuse(lambda signal: self.controllers[self.owner_of[signal]].holds(signal))
 

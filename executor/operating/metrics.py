@@ -24,6 +24,7 @@ from firable.semantics.trace import CommandSent, Event, Fired, Noted, SignalChan
 
 CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
 
+_FAULTS: Final = ("fault", "divergence", "emergency stop")
 _CYCLE_SECONDS: Final = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 45, 60, 90, 120, 300, 600, 1800, 3600)
 
 
@@ -108,6 +109,14 @@ class Metrics:
                 self.since[place.name] = 0.0
         for transition in net.transitions:
             self.firings.labels(transition.name)
+        for kind in _FAULTS:  # whoever asks for an increase must find what it has increased from
+            self.faults.labels(kind)
+
+    def taken_up(self, marking: Collection[str]) -> None:
+        """Go on in the marking of a run that was interrupted; how long its tokens have stayed there nobody has seen."""
+        self.since.clear()
+        for place in self.here:
+            self.marked.labels(place).set(place in marking)
 
     def seen(self, event: Event) -> None:
         """Count an event of the trace."""
@@ -129,7 +138,7 @@ class Metrics:
             case Noted(at, note, {"controller": str(controller), "transition": str(name)}) if note == APPLIED:
                 self._moved(at, name, {place.name for place in self.net.places if place.owner == controller})
             case Noted(_, note):
-                if note in ("fault", "divergence", "emergency stop"):
+                if note in _FAULTS:
                     self.faults.labels(note).inc()
                 if note in ("emergency stop", "reset"):
                     self.latched.set(note == "emergency stop")

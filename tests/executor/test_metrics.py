@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 from collections import Counter
 
 from prometheus_client.parser import text_string_to_metric_families
 
 from firable.decompose.splitting.cut import split
+from firable.executor.cell.virtual_time import run_in_virtual_time
+from firable.executor.drivers.dry_run import DryRunDriver
+from firable.executor.journal.journal import MemoryJournal
+from firable.executor.operating.host import Host
 from firable.executor.operating.metrics import Metrics
+from firable.executor.operating.recorder import KEY, TRACE, Recorder
 from firable.executor.operating.running import execute
 from firable.executor.protocol.messages import Decision, Readiness, Vote
 from firable.nets.catalogue import catalogue_net, catalogue_plant
@@ -51,6 +57,34 @@ def test_figures_are_those_of_the_trace() -> None:
     marked = {labels[0] for (name, labels), value in found.items() if name == "firable_marked" and value}
     assert trace.end is not None
     assert marked == set(trace.end.marking)
+
+
+def test_a_run_that_is_taken_up_shows_the_marking_that_it_has_and_no_times_that_nobody_saw() -> None:
+    decomposition, journal = split(NET), MemoryJournal()
+    recorder = Recorder(NET, "", None)
+    first = Host(decomposition, DryRunDriver(decomposition.subnets, 1.0), recorder, journal=journal)
+
+    async def main() -> None:
+        ending = asyncio.create_task(first.main())
+        await asyncio.sleep(2.5)
+        first.stop()
+        await ending
+
+    run_in_virtual_time(main())
+    metrics, again = Metrics(NET), Recorder(NET, "", None, journal.kept(TRACE)[KEY])
+    driver = DryRunDriver(decomposition.subnets, 1.0)
+    second = Host(decomposition, driver, again, journal=journal, figures=metrics)
+    marked = {labels[0] for (name, labels), value in samples(metrics).items() if name == "firable_marked" and value}
+    assert marked == set(second.marking) == set(first.marking) != set(NET.names(NET.initial_marking))
+    leaving = next(t for t in NET.transitions if set(t.inputs) <= marked)
+    metrics.seen(Fired(9.0, (leaving.name,), 0))
+    assert not [labels for name, labels in samples(metrics) if name == "firable_place_seconds_count"]
+
+
+def test_what_can_go_wrong_is_counted_from_nought() -> None:
+    found = samples(Metrics(NET))
+    faults = {labels: value for (name, labels), value in found.items() if name == "firable_faults_total"}
+    assert faults == {("fault",): 0, ("divergence",): 0, ("emergency stop",): 0}
 
 
 def test_a_round_counts_once_however_many_take_part_and_however_often_it_is_told() -> None:
