@@ -42,9 +42,12 @@ from firable.executor.operating.own_certificate import fault_of, unloaded
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import Answer
 from firable.nets.diagnostics import Diagnostic, InputError
+from firable.nets.source import printable
 
 METRICS_CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
 _SAID: Final = tuple(answer.value for answer in Answer if answer is not Answer.UNKNOWN)
+STRANGERS_MAX: Final = 100
+"""So many lines of a trace tell of those who were not let in."""
 SHUTDOWN_SECONDS: Final = 1.0
 """So long what is being answered may take once the run is over; then the process ends, whatever a client does."""
 
@@ -86,6 +89,10 @@ class Operated(Protocol):
 
     def commanded(self, command: str, by: str) -> None:
         """Keep in the trace who commanded what."""
+        ...
+
+    def turned_away(self, command: str, by: str) -> None:
+        """Keep in the trace who has asked for what and was not let in."""
         ...
 
 
@@ -166,12 +173,22 @@ def _reason(error: OSError) -> str:
     return os.strerror(number) if number in errno.errorcode else str(error.strerror or error)
 
 
-def admission(endpoint: Endpoint, public: Collection[str] = ()) -> Middleware:
-    """Let only those reach a handler who may, but for the paths that are public."""
+def admission(
+    endpoint: Endpoint, public: Collection[str] = (), turned_away: Callable[[str, str], None] = lambda _what, _by: None
+) -> Middleware:
+    """Let only those reach a handler who may, but for the paths that are public.
+
+    Who else asks is told of once for each address and path, and of `STRANGERS_MAX` at most: no trace is theirs to fill.
+    """
+    strangers: set[tuple[str, str]] = set()
 
     @web.middleware
     async def who_may(request: web.Request, handler: Handler) -> web.StreamResponse:
         if request.path not in public and _name_of(request, endpoint) is None:
+            stranger = printable(request.path[:100]), request.remote or "somebody"
+            if stranger not in strangers and len(strangers) < STRANGERS_MAX:
+                strangers.add(stranger)
+                turned_away(*stranger)
             return web.json_response(
                 {"error": "who are you? show the token"}, status=401, headers={"WWW-Authenticate": "Bearer"}
             )
@@ -231,7 +248,8 @@ def application(
         refused = [] if is_asked else [f"nobody asks after {place}" if word in _SAID else f"say {', '.join(_SAID)}"]
         return web.json_response({"refused": refused, **_situation(run)})
 
-    app = web.Application(middlewares=[admission(endpoint, () if page is None else page.public)], client_max_size=1024)
+    who_may = admission(endpoint, () if page is None else page.public, run.turned_away)
+    app = web.Application(middlewares=[who_may], client_max_size=1024)
     app.router.add_get("/situation", situation)
     app.router.add_get("/metrics", metrics)
     app.router.add_post("/pause", commanding("pause", run.pause))

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from firable.executor.operating.host import Host
 
 AT_THE_END: Final = "stopped at the end of the cycle"
+ENDS_WITH_THE_CYCLE: Final = "the operator has asked for the end at the end of the cycle"
 _TOLD_ALREADY: Final = (State.FAULT, State.STOPPED, State.LATCHED)
 """An end says what has become of devices, and a latched host what is against a reset."""
 
@@ -53,8 +54,9 @@ def _situation(run: Host) -> Situation:
         return Situation(State.STOPPED, run.marking, waiting, run.ended_by or others)
     if run.latch is not None:
         return latch.situation(run)
-    if run.ends_at_home and not run.is_whole:
-        others = "; ".join(filter(None, (alone(run), others)))
+    if run.draining:
+        at_home = alone(run) if run.ends_at_home and not run.is_whole else ""
+        others = "; ".join(filter(None, (ENDS_WITH_THE_CYCLE, at_home, others)))
     if run.taking_up is not None:
         held = restart.told(run, run.taking_up)
         return Situation(State.HELD, run.marking, (), "; ".join(filter(None, (held, others))))

@@ -38,7 +38,7 @@ from firable.executor.operating.groups import Groups
 from firable.executor.operating.items import SignalRead
 from firable.executor.operating.latch import Latch
 from firable.executor.operating.local_monitor import LocalMonitor
-from firable.executor.operating.log import Log
+from firable.executor.operating.log import TURNED_AWAY, Log
 from firable.executor.operating.monitor import Divergence, Monitor
 from firable.executor.operating.peers import Peers
 from firable.executor.operating.recorder import TRACE, Recorder
@@ -254,6 +254,10 @@ class Host:
     def commanded(self, command: str, by: str) -> None:
         """Who commanded what stands in the trace."""
         self.note("commanded", what=command, by=by)
+
+    def turned_away(self, command: str, by: str) -> None:
+        """Who was not let in stands there, too."""
+        self.note(TURNED_AWAY, what=command, by=by)
 
     def answer(self, controller: str, place: str, entry: int, answer: Answer) -> None:
         """Say what became of a command that was under way when the host was restarted."""

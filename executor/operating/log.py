@@ -28,11 +28,14 @@ from firable.semantics.trace import Event, Noted
 FROZEN: Final = "frozen"
 """The kind of note of a time in which this process did not run."""
 
+TURNED_AWAY: Final = "not let in"
+"""The kind of note of somebody who would act on the run, and has shown that they may not."""
+
 LEVELS: Final[Mapping[str, int]] = MappingProxyType(
     {
         **dict.fromkeys(("fault", "divergence", "emergency stop", "latched", HANGS), logging.ERROR),
         **dict.fromkeys(
-            ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold", FROZEN),
+            ("lost", "refused", "never-met", "dropped", "held", "unasked", "withdrawn", "untold", FROZEN, TURNED_AWAY),
             logging.WARNING,
         ),
     }

@@ -162,12 +162,16 @@ def test_a_run_that_is_paused_from_elsewhere_waits_though_its_machines_have_come
 def test_the_token_is_for_its_owner_alone_and_no_other_gets_in(
     served: tuple[subprocess.Popen[str], str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    _, address, folder = served
+    process, address, folder = served
     assert stat.S_IMODE((folder / "token").stat().st_mode) == 0o600
     (folder / "other").write_text(new_token())
     assert main(["operate", address, "stop", "--token-file", str(folder / "other")]) == 2
     assert "error[F5063]" in capsys.readouterr().err
     assert "tokens on" in operate(address, "situation", folder, capsys)
+    operate(address, "stop", folder, capsys)
+    process.communicate(timeout=PATIENCE_SECONDS)
+    notes = [event for event in read_trace(folder / "run.trace").events if isinstance(event, Noted)]
+    assert [dict(note.data) for note in notes if note.note == "not let in"] == [{"what": "/stop", "by": "127.0.0.1"}]
 
 
 def test_who_may_operate_is_told_as_it_is_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

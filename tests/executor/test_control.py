@@ -20,7 +20,7 @@ from cryptography.x509.oid import NameOID
 
 from firable.cli.run import run
 from firable.executor.drivers.bench import PATIENCE_S, until
-from firable.executor.operating.control import Endpoint, new_token, serving, tls_context
+from firable.executor.operating.control import STRANGERS_MAX, Endpoint, new_token, serving, tls_context
 from firable.executor.operating.situation import Situation, State
 from firable.executor.protocol.commands import Answer
 from firable.nets.diagnostics import InputError
@@ -66,6 +66,9 @@ class Told:
 
     def commanded(self, command: str, by: str) -> None:
         self.log.append(f"{by}: {command}")
+
+    def turned_away(self, command: str, by: str) -> None:
+        self.log.append(f"{by}: {command} not let in")
 
 
 def with_endpoint(
@@ -157,7 +160,19 @@ def test_who_shows_no_token_learns_nothing_and_moves_nothing(headers: dict[str, 
                 assert answer.status == 401
                 assert "robot" not in await answer.text()
 
-    assert with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask) == []
+    paths = ("/stop", "/resume", "/reset", "/situation", "/metrics")
+    assert with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask) == [f"127.0.0.1: {one} not let in" for one in paths]
+
+
+def test_a_stranger_fills_no_trace() -> None:
+    async def ask(session: ClientSession, url: str) -> None:
+        for number in (*range(STRANGERS_MAX + 20), 0, 1):
+            async with session.get(f"{url}/{number % 110}\x1b[31m") as answer:
+                assert answer.status == 401
+
+    told = with_endpoint(Endpoint("127.0.0.1", 0, TOKEN), ask)
+    assert len(told) == STRANGERS_MAX
+    assert told[0] == "127.0.0.1: /0·[31m not let in"
 
 
 def test_figures_are_served_as_text_for_prometheus() -> None:

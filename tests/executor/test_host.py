@@ -389,7 +389,7 @@ def test_a_cell_whose_driver_cannot_keep_work_out_ends_its_cycle_with_the_machin
         await asyncio.sleep(33)
         assert host.recorder.marking != decomposition.net.initial_marking
         host.stop(at_end_of_cycle=True)
-        assert not host.situation().message, "of a whole cell the end of the cycle is that it is empty"
+        assert host.situation().message == "the operator has asked for the end at the end of the cycle"
         begun = host.recorder.firings["G1"]
         ended = await ended_within(ending, 100)
         assert (ended.state, ended.message) == (State.STOPPED, "stopped at the end of the cycle")
