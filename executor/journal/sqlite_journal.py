@@ -253,7 +253,7 @@ def _failures(path: Path, done: str) -> Iterator[None]:
         ):
             _damaged(path, str(error))
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        if name.startswith("SQLITE_CANTOPEN"):
+        if name.startswith(("SQLITE_CANTOPEN", "SQLITE_IOERR", "SQLITE_READONLY")):
             reason = _why_not_opened(path) or reason
         message = f"{shown}: the journal cannot be {done}: {reason}"
         hint = "name a folder on a disk with room, that you may write to"

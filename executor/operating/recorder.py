@@ -17,6 +17,7 @@ the run is taken up again.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -93,7 +94,10 @@ class TraceFile:
         except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
             reason = error.strerror if isinstance(error, OSError) else str(error)
             message = f"{printable(str(self.path))}: the trace cannot be written: {reason}"
-            raise InputError([Diagnostic("F1017", message, "name a file in a folder that you may write to")]) from None
+            hint = "name a file in a folder that you may write to"
+            if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
+                hint = "make room on its disk; with --journal, the same command then takes the run up"
+            raise InputError([Diagnostic("F1017", message, hint)]) from None
 
 
 TRACE: Final = "\ntrace"

@@ -127,6 +127,7 @@ def test_full_disk_is_an_error_of_the_trace(workpieces: int) -> None:
         run(proved_bundle(), plant_of("one_robot"), workpieces=workpieces, trace_path="/dev/full")
     assert [problem.code for problem in refusal.value.diagnostics] == ["F1017"]
     assert "/dev/full: the trace cannot be written: No space left" in str(refusal.value)
+    assert refusal.value.diagnostics[0].hint.startswith("make room on its disk; with --journal, the same command")
 
 
 def test_other_errors_of_the_system_are_not_taken_for_errors_of_the_trace(tmp_path: Path) -> None:

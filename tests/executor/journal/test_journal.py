@@ -1,8 +1,10 @@
 """Journals: what is written is there after a crash, all of a group or nothing, and nothing else is taken for it."""
 
+import errno
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Callable
@@ -236,6 +238,26 @@ def test_file_that_is_a_folder_is_refused(tmp_path: Path) -> None:
     code, message = refused(lambda: sqlite(tmp_path))
     assert code == "F5034"
     assert "Is a directory" in message
+
+
+@pytest.mark.parametrize("name", ["SQLITE_IOERR_SHMOPEN", "SQLITE_READONLY_DIRECTORY", "SQLITE_CANTOPEN"])
+def test_a_disk_that_may_only_be_read_is_told_in_the_words_of_the_system(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SQLite says "disk I/O error" of it."""
+
+    def connect(*_: object, **__: object) -> None:
+        error = sqlite3.OperationalError("disk I/O error")
+        error.sqlite_errorname = name
+        raise error
+
+    def only_to_be_read(*_: object) -> int:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(sqlite3, "connect", connect)
+    monkeypatch.setattr(os, "open", only_to_be_read)
+    with pytest.raises(InputError, match="the journal cannot be opened: Read-only file system"):
+        SqliteJournal(tmp_path / "journal", "", ["a"])
 
 
 def test_write_that_fails_ends_the_journal(tmp_path: Path) -> None:
