@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from firable.executor.operating import latch, restart
-from firable.executor.operating.situation import Situation, State, blocked, blocked_here, deadlocked
+from firable.executor.operating.situation import Blocked, Situation, State, blocked, blocked_here, deadlocked
 from firable.executor.operating.uncut import Patience, uncut
 from firable.executor.protocol.token_player import TokenPlayer
 from firable.nets.net import Net, SignalKind
@@ -43,7 +43,7 @@ def _situation(run: Host) -> Situation:
     if run.is_whole:
         waiting = tuple(blocked(run.recorder.player, run.recorder.word, run.dispatch.untaken))
     else:
-        waiting = blocked_here(run.controllers.values(), run.dispatch.untaken)
+        waiting = tuple(_unready(run, one) for one in blocked_here(run.controllers.values(), run.dispatch.untaken))
     barred = beginnings(run.net) if run.ends_at_home else ()
     waiting = tuple(replace(one, is_barred=one.transition in barred) for one in waiting)
     if run.fault:
@@ -65,6 +65,14 @@ def _situation(run: Host) -> Situation:
     if run.is_whole and run.recorder.is_deadlock:
         return Situation(State.DEADLOCK, run.marking, waiting, deadlocked(run.net, run.recorder.marking))
     return Situation(State.PAUSED if run.paused else State.WAITING, run.marking, waiting, others)
+
+
+def _unready(run: Host, one: Blocked) -> Blocked:
+    """Who else is waited for, as far as the coordinator is here and has heard of them."""
+    if one.decided_by is None or (decider := run.coordinators.get(one.decided_by)) is None:
+        return one
+    those = (name for name in decider.participants.get(one.transition, ()) if name not in run.controllers)
+    return replace(one, unready=tuple(name for name in those if one.transition not in decider.ready[name]))
 
 
 def ended(run: Host) -> Situation | None:

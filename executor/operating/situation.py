@@ -52,6 +52,8 @@ class Blocked:
     """Places whose command no machine is known to have, and which has no completion to wait for."""
     decided_by: str | None = None
     """The coordinator of a transition of which only a part is seen."""
+    unready: tuple[str, ...] = ()
+    """Where that is here, the controllers elsewhere that have not reported their parts as ready."""
     is_barred: bool = False
     """Whether the operator, who ends the cycle, lets it fire no more."""
 
@@ -62,6 +64,8 @@ class Blocked:
         reasons += [f"{place} to become empty" for place in self.full]
         reasons += [f"{signal}" if wanted else f"not {signal}" for signal, wanted in self.gates]
         reasons += [f"the machine to take the command of {place}" for place in self.untaken]
+        if not reasons and self.unready:
+            return f"{self.transition} is ready here, and waits for {', '.join(self.unready)} to be ready"
         if not reasons and self.decided_by is not None:
             return f"{self.transition} is ready here, and is decided by {called(self.decided_by)}"
         return f"{self.transition} waits for {', '.join(reasons)}" if reasons else f"{self.transition} is enabled"

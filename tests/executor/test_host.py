@@ -355,6 +355,45 @@ def test_a_command_that_is_decided_when_the_driver_fails_is_asked_after_at_the_r
     run_in_virtual_time(main())
 
 
+CROSSED = """
+firable: 1
+cell: crossed
+controllers:
+  left: {start: free, inputs: part, places: {free: , hold: {send: {machine: L, command: HOLD}, until: held}}}
+  right: {start: free, inputs: part, places: {free: , hold: {send: {machine: R, command: HOLD}, until: held}}}
+transitions:
+  take_left: {from: left.free, to: left.hold}
+  take_right: {from: right.free, to: right.hold}
+  give_left: {from: left.hold, to: left.free, if: [left.held, right.part]}
+  give_right: {from: right.hold, to: right.free, if: [right.held, left.part]}
+"""
+
+
+def test_the_host_of_the_coordinator_says_who_else_a_transition_waits_for() -> None:
+    async def main() -> None:
+        decomposition, own = split(parse_net(CROSSED)), (COORDINATOR, "left")
+        exchange, hosts = Exchange(), []
+        for machines in (own, ("right",)):
+            subnets = [decomposition.subnet(name) for name in machines if name]
+            driver = DryRunDriver(subnets, 1.0, {f"{machines[-1]}.part": False})
+            recorder = Recorder(decomposition.net, "", None, None, machines)
+            link = InProcessLink(exchange, Greeting("d", machines))
+            hosts.append(Host(decomposition, driver, recorder, machines=machines, link=link))
+        tasks = [asyncio.create_task(host.main()) for host in hosts]
+        await asyncio.sleep(5)
+        left, right = ([str(one) for one in host.situation().blocked] for host in hosts)
+        assert left == ["give_left is ready here, and waits for right to be ready", "give_right waits for left.part"]
+        assert right == [
+            "give_left waits for right.part",
+            "give_right is ready here, and is decided by the coordinator",
+        ]
+        for host in hosts:
+            host.stop()
+        await asyncio.gather(*tasks)
+
+    run_in_virtual_time(main())
+
+
 def test_an_emergency_stop_of_a_host_is_safe_first_and_commands_nothing_more(tmp_path: Path) -> None:
     class Strict(DryRunDriver):
         def send(self, place: Place, entry: int) -> None:
