@@ -219,7 +219,9 @@ def test_binding_that_another_cell_serves_stays_as_it_is_where_no_port_is_free(
     assert "modbus at" not in said.out
 
 
-@pytest.mark.parametrize("path", catalogue_path("one_robot").parent.glob("*.plant.yaml"), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted(catalogue_path("one_robot").parent.glob("*.plant.yaml")), ids=lambda path: path.stem
+)
 def test_a_binding_that_is_made_fits_its_net_whatever_that_has(path: Path) -> None:
     net = catalogue_net(path.name.removesuffix(".plant.yaml"))
     assert (
